@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.statistics import Asked, Course
+from mechdesign.statistics import Course, Request
 
 if TYPE_CHECKING:
     import pandas
@@ -160,7 +160,7 @@ class Scope:
 
     poses_only: bool = False
     missing: str = ""
-    course: Callable[[Asked], Course | None] | None = None
+    course: Callable[[Request], Course | None] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

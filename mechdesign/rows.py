@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
-from mechdesign.statistics import STATISTICS, Asked, Course, Interval, Part, RowSpread
+from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread
 
 HELP_PAGE = "reference/study/requirements"
 
@@ -58,12 +58,12 @@ class Chosen:
     def course(self) -> Course | None:
         """The column between the rows, where these are poses of a motion that is followed."""
         scope = self.table.scope
-        return None if scope is None or scope.course is None or self.picked else scope.course(self.asked)
+        return None if scope is None or scope.course is None or self.picked else scope.course(self.request)
 
     @property
-    def asked(self) -> Asked:
+    def request(self) -> Request:
         """What has to be known of the column between the rows."""
-        return Asked(self.column, self.part, bool(self.statistic) and STATISTICS[self.statistic].integral)
+        return Request(self.column, self.part, bool(self.statistic) and STATISTICS[self.statistic].integral)
 
     def shaped(self, designs: int, *, assembled: bool = False) -> tuple[Floats, Flags]:
         """Values of several designs, shape (designs, rows), and which count; `assembled`: only assembled poses do."""
@@ -185,10 +185,10 @@ def named(result: Result, path: str) -> tuple[str, str]:
     UnknownColumnError
         If there is no such column or statistic.
     """
-    if _found(result, path) is not None:
+    if _place(result, path) is not None:
         return path, ""
     head, _, word = path.rpartition(".")
-    if not head or _found(result, head) is None:
+    if not head or _place(result, head) is None:
         located(result, head if word in STATISTICS and head else path)
     if word not in STATISTICS:
         raise UnknownColumnError(f"{head} has no {word!r}; it has {', '.join(STATISTICS)}")
@@ -257,7 +257,7 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
 
 def located(result: Result, path: str) -> tuple[Table, str, Flags]:
     """The table, the column and the rows that a path names; see `choose`."""
-    if (place := _found(result, path)) is not None:
+    if (place := _place(result, path)) is not None:
         return place
     for absent in result.absent:
         if absent in path.split("."):
@@ -266,7 +266,7 @@ def located(result: Result, path: str) -> tuple[Table, str, Flags]:
     raise UnknownColumnError(_unknown(f"the result of {result.command}", path, names))
 
 
-def _found(result: Result, path: str) -> tuple[Table, str, Flags] | None:
+def _place(result: Result, path: str) -> tuple[Table, str, Flags] | None:
     """What `located` gives; None where there is no such column."""
     name, _, rest = path.partition(".")
     named = result.tables.get(name)

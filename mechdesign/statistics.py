@@ -141,7 +141,7 @@ class Interval(NamedTuple):
 Part = tuple[tuple[str, Interval], ...]
 
 
-class Asked(NamedTuple):
+class Request(NamedTuple):
     """A column along a part of a motion, and whether its mean is needed (`integral`).
 
     `end` is 1 if only its largest value is needed, -1 if only its smallest, else 0.

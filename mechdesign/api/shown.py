@@ -91,7 +91,7 @@ class Answer(Result):
     @property
     def figures(self) -> tuple[str, ...]:
         """Names of its pictures, in the order in which they are best read."""
-        return self._seen[0]
+        return self._gallery[0]
 
     def figure(self, name: str) -> Figure:
         """One of its pictures, made anew and yours to change: Matplotlib's, in inches, without pyplot.
@@ -172,10 +172,10 @@ class Answer(Result):
     def _repr_html_(self) -> str:
         from mechdesign.api.html import answer_html
 
-        return answer_html(self.study, self, self._judged(), *self._seen)
+        return answer_html(self.study, self, self._judged(), *self._gallery)
 
     def _repr_png_(self) -> bytes | None:
-        return self._seen[1]
+        return self._gallery[1]
 
     def _judged(self) -> tuple[Verdict, ...] | str:
         """The verdicts, or why there are none: what shows a result must not fail."""
@@ -185,7 +185,7 @@ class Answer(Result):
             return str(error)
 
     @cached_property
-    def _seen(self) -> tuple[tuple[str, ...], bytes | None]:
+    def _gallery(self) -> tuple[tuple[str, ...], bytes | None]:
         """Names of its pictures, and the first of them as a PNG; None where there is none."""
         from mechdesign.report.figures import style
 

@@ -235,7 +235,7 @@ _add(
     _watch,
     "watch",
     (
-        given.FILE, given.ASKED, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET, given.STRICT,
+        given.FILE, given.COMMANDS, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET, given.STRICT,
         given.NO_PLOTS, given.FORMAT, given.STYLE, given.REPORT, given.ANIMATE, given.ALLOW_FILES,
     ),
     "Answer a study's questions again whenever it is saved.",

@@ -216,7 +216,7 @@ def _folder(name: str, meaning: str) -> Parameter:
 FILE = _parameter(
     "file", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
 )
-ASKED = _parameter(
+COMMANDS = _parameter(
     "commands",
     list[str] | None,
     None,

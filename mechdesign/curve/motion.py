@@ -132,7 +132,7 @@ class Curve:
         return np.array(values).reshape(len(self.angles), len(s))
 
     def beside(self, line: Ints, s: Floats) -> Floats:
-        """The same angles at the nodes nearest to the places, less than half a turn away: they tell the turns."""
+        """The same angles at the nearest nodes, less than half a turn away: they fix the number of turns."""
         if not len(self._closed.line):
             return np.full((len(self.angles), len(s)), np.nan)
         k, x = self._within(line, s)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.cautions import fails
 from mechdesign.errors import explain
-from mechdesign.experiments.wanted import Wanted, judged
+from mechdesign.experiments.case_numbers import CaseNumber, judged
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.together import Group
@@ -75,7 +75,7 @@ class Answered:
 class Sheet:
     """Collects the answers of some cases, command by command."""
 
-    def __init__(self, study: Study, results: Sequence[Wanted], count: int) -> None:
+    def __init__(self, study: Study, results: Sequence[CaseNumber], count: int) -> None:
         self._required, self._results, self._mobility = study.requirements, results, study.mechanism.mobility
         self._fail_on = study.fail_on
         self._numbers = np.full((count, len(results)), np.nan)

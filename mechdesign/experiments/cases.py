@@ -11,7 +11,7 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
-from mechdesign.experiments.wanted import Wanted
+from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look
 from mechdesign.questions.together import Group
@@ -34,7 +34,7 @@ def seeded(study: Study, seed: int | None) -> Study:
 
 
 def answers(
-    study: Study, cases: Sequence[Changes], results: Sequence[Wanted] = (), *, begin: int = 0, jobs: int | None = 1
+    study: Study, cases: Sequence[Changes], results: Sequence[CaseNumber] = (), *, begin: int = 0, jobs: int | None = 1
 ) -> Iterator[Answered]:
     """Verdicts on the requirements and the `results` of the cases of a study, batch by batch.
 
@@ -57,7 +57,7 @@ class Answer:
     """Answers cases of a study that change the same entries; `first` is the first of all of them."""
 
     study: Study
-    results: tuple[Wanted, ...]
+    results: tuple[CaseNumber, ...]
     first: Changes
 
     def __call__(self, cases: Sequence[Changes]) -> Answered:
@@ -101,13 +101,13 @@ class Answer:
                 sheet.note(rows[group.rows], designs, group)
 
 
-def commands_of(study: Study, results: Iterable[Wanted]) -> tuple[str, ...]:
+def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:
     """The commands that compute the requirements of a study and some results."""
     needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in results}
     return tuple(command for command in COMMANDS if command in needed)
 
 
-def foresee(study: Study, results: Iterable[Wanted]) -> None:
+def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
     """Find results and requirements that no table has, by a short look at each command's answer.
 
     Raises

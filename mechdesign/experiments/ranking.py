@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.experiments.case_numbers import CaseNumber, Numbers
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.schema.matrix import Best
-from mechdesign.experiments.wanted import Numbers, Wanted
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
 from mechdesign.questions.together import Group
@@ -22,11 +22,11 @@ _RESOLUTION = 1e-12
 
 
 @dataclass(frozen=True)
-class Goal(Wanted):
+class Goal(CaseNumber):
     """A number of a case that is maximised or minimised; nan where a part of the motion is missing."""
 
     def find(self, group: Group) -> Numbers:
-        """The number of each design; see `Wanted.find`."""
+        """The number of each design; see `CaseNumber.find`."""
         numbers = super().find(group)
         terms = terms_of(group.result, path_of(self.name), dict(self.where))
         scoped = any(part.table.scope for part in terms.parts)

@@ -13,10 +13,10 @@ from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
+from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.schema.sensitivities import Changed
 from mechdesign.experiments.tally import Tally
-from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.progress import NULL, Progress
@@ -54,7 +54,7 @@ class Changing:
             yield from (((self.name, self.value + sign * step),) for step in (self.step * STEPS).tolist())
 
 
-def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
+def prepared(study: Study) -> tuple[list[CaseNumber], list[Changing]]:
     """The results to differentiate and the numbers that change, checked by a short look at the study's answers.
 
     Raises
@@ -67,7 +67,7 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
         raise StudyError(
             "sensitivities need a section of that name, e.g. sensitivities: {results: [GII], parameters: [r]}"
         )
-    results = wanted_in(SENSITIVITIES.name, section.results)
+    results = numbers_in(SENSITIVITIES.name, section.results)
     changes: list[Changing] = []
     problems: list[Problem] = []
     for k, parameter in enumerate(section.parameters):
@@ -156,7 +156,7 @@ class Row:
         return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
 
 
-def _rows(results: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
+def _rows(results: Sequence[CaseNumber], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
     values = np.column_stack([tally.result(k)[0] for k in range(len(results))])
     middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(results))
     slopes = [slope(middle, pair[0], pair[1], number.step) for number, pair in zip(numbers, sides, strict=True)]

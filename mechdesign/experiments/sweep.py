@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError, counted
+from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.design import Design, Listed, cases_of
 from mechdesign.experiments.ranking import Ranking, goals_of
 from mechdesign.experiments.tally import Tally
-from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
@@ -33,7 +33,7 @@ from mechdesign.work.threads import one_thread
 _SECTION = "matrix"
 
 
-def prepared(study: Study) -> tuple[Design, list[Wanted]]:
+def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
     """The cases of a study and the results to compute of each, checked by a short look at the study's answers.
 
     Raises
@@ -47,7 +47,7 @@ def prepared(study: Study) -> tuple[Design, list[Wanted]]:
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
     goals = {number.title: number for number in goals_of(matrix.best)}
-    results = [*({number.title: number for number in wanted_in(_SECTION, matrix.results)} | goals).values()]
+    results = [*({number.title: number for number in numbers_in(_SECTION, matrix.results)} | goals).values()]
     if not commands_of(study, results):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
@@ -87,7 +87,7 @@ def sweep(
     return _result(study, cases, tally, results)
 
 
-def _result(study: Study, cases: Design, tally: Tally, results: Sequence[Wanted]) -> Result:
+def _result(study: Study, cases: Design, tally: Tally, results: Sequence[CaseNumber]) -> Result:
     """The result with the table of the answered cases."""
     count, total, failed = len(tally), len(cases), tally.failed
     counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
@@ -110,7 +110,7 @@ def _result(study: Study, cases: Design, tally: Tally, results: Sequence[Wanted]
     )  # fmt: skip
 
 
-def _drawn(study: Study, tally: Tally, numbers: Sequence[Wanted]) -> DrawnCases:
+def _drawn(study: Study, tally: Tally, numbers: Sequence[CaseNumber]) -> DrawnCases:
     """The entries that vary, the results with what is required of them, and which are goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
@@ -125,7 +125,7 @@ def _goals(study: Study) -> dict[str, int]:
     return {number.title: sign for number, sign in goals_of(best).items()}
 
 
-def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[Wanted]) -> Iterator[Column]:
+def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
     yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))

@@ -252,7 +252,7 @@ class _Bodies:
         """Order a ring (joint k between links k and k + 1): frame, input, coupler, output."""
         k = self._frame(links)
         links, joints = [*links[k:], *links[:k]], [*joints[k:], *joints[:k]]
-        if self._known(links[3], joints[3]) < self._known(links[1], joints[0]):
+        if self._placing_group(links[3], joints[3]) < self._placing_group(links[1], joints[0]):
             links, joints = [links[0], *links[:0:-1]], joints[::-1]
         return FourBar(tuple(link.replace(":", " ") for link in links), tuple(joints), (math.nan,) * 4, math.nan)
 
@@ -266,7 +266,7 @@ class _Bodies:
                 return links.index(reference)
         return min(range(4), key=lambda k: list(self.frames).index(links[k]))
 
-    def _known(self, link: str, joint: Joint) -> int:
+    def _placing_group(self, link: str, joint: Joint) -> int:
         """Index of the group that places a link against the frame; -1 if the drives do."""
         structure, edges = self.mechanism.forward.structure, self.mechanism.graph.edges
         root = structure.ties[self.frames[link]].root

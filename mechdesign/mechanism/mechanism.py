@@ -13,10 +13,9 @@ from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
-from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
-from mechdesign.mechanism.derivatives import Jacobian, Linearization
+from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
@@ -140,10 +139,6 @@ class Mechanism(Core):
     def linearize(self, configuration: Configuration) -> Linearization:
         """Loop equations of the drives' groups at a configuration, for derivatives of any kind."""
         return Linearization(self.forward.structure, self.geometry, configuration)
-
-    def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> Floats:
-        """Derivatives of outputs with respect to the drives, per radian; shape (..., outputs, drives)."""
-        return Jacobian.of(self.linearize(configuration), outputs).matrix
 
     def _assemble_sketch(self) -> Configuration:
         plan = self.forward

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Ints
 from mechdesign.results import Column, Result, Scope, Table
-from mechdesign.statistics import Asked, Course
+from mechdesign.statistics import Course, Request
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +86,13 @@ class Group:
         return Table(table.name, columns, table.meaning, scope)
 
 
-def _course_of(scope: Scope, design: int) -> Callable[[Asked], Course | None] | None:
+def _course_of(scope: Scope, design: int) -> Callable[[Request], Course | None] | None:
     """A column along the motion of one design of several."""
     together = scope.course
     if together is None:
         return None
 
-    def own(request: Asked) -> Course | None:
+    def own(request: Request) -> Course | None:
         course = together(request)
         return None if course is None else course.of(design)
 

@@ -228,7 +228,7 @@ def _differences(
 
 
 def _closing(longer: tuple[list[int], Floats], shorter: tuple[list[int], Floats]) -> list[tuple[int, Ints]]:
-    """Which two neighbouring ends the rays with fewer ends lack: the number of the first, and the pairs of rays.
+    """The two neighbouring ends that the rays with fewer ends lack: number of the first, and the pairs of rays.
 
     The remaining ends should be of the same margins; among several choices their radii should agree best.
     """

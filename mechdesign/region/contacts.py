@@ -23,12 +23,12 @@ CHECKED_ALONG = 101
 TOUCHING = 1e-7
 # Rounds of the check: an outline that lies outside shrinks and is checked again.
 LOOKS = 4
-# Contacts of a shape: the lowest local minima of the scales that rays allow, so many, and one with a hole between rays.
+# Contacts of a shape: so many of the lowest local minima of the scale over the rays, and one at a hole between rays.
 MINIMA = 6
 CONTACTS = MINIMA + 1
-# Scales that agree in so many decimals of the lowest are equal.
+# Scales over the lowest one are equal if they agree in so many decimals.
 EVEN = 10
-# Contacts within this factor of the lowest are found exactly, in so many steps.
+# Contacts up to this factor above the lowest are refined, in so many steps.
 LOW = 1.3
 STEPS = 8
 # A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
@@ -88,7 +88,7 @@ class Contacts:
         return theta, self.at(lane, theta.ravel()).reshape(theta.shape)
 
     def _with_overlooked(self, theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
-        """Contacts with one more where the lowest place of a margin is a hole between the rays."""
+        """Contacts, and one more where a margin is lowest in a hole between the rays."""
         shape, lanes = self._shape, np.arange(len(self._centre))
         scale, sizes = np.where(self._inside, scales[1].min(axis=0), 0.0), self._designs.of(lanes)
 
@@ -165,7 +165,7 @@ class Contacts:
         if not is_turn(self._designs.scan):
             begin, end = within_scan(self._designs, self._centre[lane], theta)
             inner, outer = np.maximum(inner, begin), np.minimum(outer, end)
-        # From a piece that does not count the way out of it is meant.
+        # A ray that begins in a piece that does not count has to leave that piece.
         enters = np.where(inner > 0, np.where(inner < outer, inner, np.inf), outer)
         return np.where(self._inside[lane], np.where(inner > 0, 0.0, outer), enters)
 
@@ -184,7 +184,7 @@ class Contacts:
 
 
 def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
-    """Where scales are least around: directions with the two beside each, and the scales, given as (directions, lanes).
+    """Local minima of scales, given as (directions, lanes): each direction with its two neighbours, and their scales.
 
     Both are of shape (3, contacts, lanes); the scales are infinite where there are fewer.
     """
@@ -193,7 +193,7 @@ def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
         even = np.round(scales / scales.min(axis=0), EVEN)
     after = np.roll(even, -1, axis=0)
     rises = even < after
-    # All around an outline on a circle it is one, too.
+    # A circle that touches a circular boundary all around has one contact, too.
     rises[-1] |= even[-1] == after[-1]
     low = (even <= np.roll(even, 1, axis=0)) & rises & np.isfinite(even)
     row = np.argsort(np.where(low, scales, np.inf), axis=0, kind="stable")[:MINIMA]
@@ -217,7 +217,7 @@ def within_scan(designs: Designs, z: Complexes, theta: Floats) -> tuple[Floats, 
     end = np.where(within & (slope < 0), crossing, np.inf)
     if designs.scan[1] - designs.scan[0] <= np.pi:
         return begin.max(axis=0), end.min(axis=0)
-    # Beyond half a turn the scan is what lies on the inner side of either.
+    # A scan of more than half a turn holds what lies on the inner side of either of its end rays.
     order = begin.argsort(axis=0)
     begin, end = np.take_along_axis(begin, order, axis=0), np.take_along_axis(end, order, axis=0)
     return begin[0], np.where(begin[1] <= end[0], end.max(axis=0), end[0])

@@ -13,7 +13,7 @@ from mechdesign.region.regions import RAYS, regions
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
-# Number of poses of all regions together, about: a question may be costly at each of them.
+# Approximate number of poses of all regions together: a question may be costly at each pose.
 MAX_POSES = 2000
 # Least number of rays of a patch.
 MIN_RAYS = 3
@@ -47,7 +47,7 @@ def workspace_nodes(study: Study) -> Poses:
             continue
         rays = region.rays or RAYS
         coarse, finer = list(patches(panels, min(rays, most))), list(patches(panels, rays))
-        # A panel has `FEWEST` rays or more: where these are too many, some but the first and the last are left out.
+        # Each panel has at least `FEWEST` rays; of too many, some between the first and the last are left out.
         total = sum(float(np.ptp(patch.theta)) for patch in coarse)
         sectors = []
         for patch, fine in zip(coarse, finer if len(finer) == len(coarse) else coarse, strict=True):

@@ -1,4 +1,4 @@
-"""How large a circle or a rectangle may be for a region to hold it: it grows until the region's end stops it.
+"""The largest circle or rectangle in a region: the shape grows until the boundary of the region stops it.
 
 A free centre, and the sides of a rectangle that stretches, change until the scale that fits is largest. The contacts,
 which limit the scale, show the way: a step goes to where the lowest of their planes, less the curvature that the steps
@@ -18,13 +18,13 @@ from mechdesign.region.rays import SAME_ROOT, is_turn
 from mechdesign.region.rules import cubic, spread
 from mechdesign.region.shapes import Shape
 
-# A free centre starts at the best places on rays about the scan's centre: rays of a full turn, least rays of a panel.
+# Rays about the scan's centre on which a free centre starts: number in a full turn, and least number in a panel.
 TURN_RAYS = 96
 PANEL_RAYS = 7
 # Places on each interval of these rays, as parts of it; and the number of places that centres start from.
 FRACTIONS = np.array([0.08, 0.25, 0.5, 0.75, 0.92])
 TRIALS = 2
-# Stretches (see `Shape.placed`) that a rectangle which stretches starts from.
+# First stretches (see `Shape.placed`) of a rectangle of free proportions.
 STRETCHES = (-0.7, 0.0, 0.7)
 # Most steps of a shape.
 STEPS = 40
@@ -34,15 +34,15 @@ DAMPING, SHORTER, LONGER = 4.0, 4.0, 0.25
 LEAST_DAMPING = 1e-6
 # Slopes show a curvature where their change has this part of itself along the step.
 ALONG = 1e-3
-# A step is not made for a gain below this part of the scale.
+# A step is not made if it gains less than this part of the scale.
 LEAST_GAIN = 1e-14
-# A start is given up if so many times the gain hoped for would not bring it to the best of the same design.
+# A start is given up if so many times its predicted gain would not reach the best start of the same design.
 LEAD = 3.0
-# Scale, as a logarithm, of a contact that there is not.
+# Logarithm of the scale of a missing contact.
 MISSING = 1e3
-# Sets of contacts that may stop a shape together, one a row: at most one more than what may change.
+# Sets of contacts that may stop a shape together, one a row: at most one contact more than there are free parameters.
 SETS = np.array([members for members in itertools.product([False, True], repeat=CONTACTS) if 1 <= sum(members) <= 4])
-# What keeps equations solvable whose contacts oppose the same changes, as a part of their largest coefficient.
+# Regularisation, as a part of the largest coefficient, of equations whose contacts have dependent slopes.
 RIDGE = 1e-13
 
 
@@ -151,7 +151,7 @@ def _largest(
 
 
 def _step(heights: Floats, slopes: Floats, curvature: Floats, damping: Floats) -> tuple[Floats, Floats, Floats]:
-    """Steps to where the lowest of planes, less what is curved and damped, is highest; the gain; shares of the planes.
+    """Steps that maximise the lowest plane less curvature and damping; their gains; the multipliers of the planes.
 
     Of shapes (lanes, 3), (lanes,) and (lanes, contacts). The shares, which weigh the planes' slopes, make the highest
     possible value lowest: of all sets of planes one has it where its planes are equally high.
@@ -183,7 +183,7 @@ def _step(heights: Floats, slopes: Floats, curvature: Floats, damping: Floats) -
 def _bent(
     curvature: Floats, step: Floats, shares: Floats, theta: Floats, slopes: Floats, now: Floats, new_slopes: Floats
 ) -> Floats:
-    """Curvature of what limits the scale after a step, by what the slopes of the same contacts have changed (BFGS).
+    """Curvature of the limiting contacts after a step, from the change of their slopes (BFGS).
 
     A contact is the same as the one before, at `theta`, that is nearest in angle, `now`.
     """

@@ -45,9 +45,9 @@ class Panels:
         Whether any ray meets the region.
     intervals : ndarray of int, shape (panels,)
         Number of intervals of each ray in a panel.
-    seen : ndarray, shape (designs,)
+    raster_area : ndarray, shape (designs,)
         Lower bound of the area by the raster: its inside cells, less the error of that sum.
-    unseen : ndarray, shape (designs,)
+    undecided : ndarray, shape (designs,)
         Area of the cells of which the raster neither found a point inside nor excludes one.
     """
 
@@ -59,8 +59,8 @@ class Panels:
     reach: Floats
     closes: Flags
     intervals: Ints
-    seen: Floats
-    unseen: Floats
+    raster_area: Floats
+    undecided: Floats
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
         """Intersect rays, as long as the reach, with the region; `slack` as in `mechdesign.region.rays.trace`.
@@ -132,7 +132,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     full = (counts > 0) | (high - low < NARROW)
     area, error = raster.area
     return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
-                  raster.unseen)  # fmt: skip
+                  raster.undecided)  # fmt: skip
 
 
 def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:

@@ -12,7 +12,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import SAME_ROOT, ray_through
 
-# An interval is kept whose ends rounding has exchanged by up to this fraction of the reach.
+# An interval is kept down to minus this width (fraction of the reach): rounding may exchange two equal ends.
 SLACK = 1e-9
 # Least number of rays of a panel.
 FEWEST = 25
@@ -132,6 +132,6 @@ def patches_of_pieces(whole: Panels, pieces: Iterable[Panels], rays: int) -> lis
 
 
 def _most(values: Ints) -> int:
-    """The most frequent of values, one for each ray: a ray through a corner may meet another margin than the rest."""
+    """The most frequent value of the rays: a ray through a corner may meet another margin than the rest."""
     names, counts = np.unique(values, return_counts=True)
     return int(names[np.argmax(counts)])

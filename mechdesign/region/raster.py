@@ -53,7 +53,7 @@ class Raster:
         Whether the centre of each cell lies in the region.
     holes, slivers : (ndarray of int, complex ndarray)
         Designs and places in holes, and in slivers of the region, that hold no centre.
-    unseen : ndarray, shape (designs,)
+    undecided : ndarray, shape (designs,)
         Area that may hold slivers thinner still.
     cut : ndarray of bool, shape (designs,)
         Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
@@ -65,7 +65,7 @@ class Raster:
     inside: Flags
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
-    unseen: Floats
+    undecided: Floats
     cut: Flags
 
     @staticmethod
@@ -109,7 +109,7 @@ class Raster:
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
         Cells that no margin excludes are divided once, and again while that takes no more points than the raster has.
-        What is left counts as unseen area if no part of its cell lies inside and each margin is positive at some part.
+        Cells left then count as undecided if no part of them lies inside and each margin is positive at some part.
         """
         row, column, lane = _open(margins, *np.nonzero(scanned & ~_spread(inside)))
         design, place, cell = designs[lane], place[row, column, lane], self.cell[designs[lane]]
@@ -131,7 +131,7 @@ class Raster:
             design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
             rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         hit = ~np.isnan(witness)
-        np.add.at(self.unseen, design, cell.real * cell.imag * (rises & ~hit[cell_of_part]))
+        np.add.at(self.undecided, design, cell.real * cell.imag * (rises & ~hit[cell_of_part]))
         return cell_design[hit], witness[hit]
 
     def _between_centres(self, designs: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:

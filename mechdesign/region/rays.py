@@ -202,7 +202,7 @@ class Intervals:
         return table
 
     def whole(self, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-        """Ray, radii and margins of the intervals, one where only a point divides two (a leg has no length there).
+        """Ray, radii and margins of the intervals; two that only a point divides (a leg of no length) count as one.
 
         Intervals of a ray are joined where the gap between them is at most `near`.
         """

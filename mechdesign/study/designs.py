@@ -42,12 +42,12 @@ class Designs:
         """Parameters that differ from the study's own design, shape (count,)."""
         values = self.study.parameters.values(self.changed)
         moved = self.study.parameters.moved(self.changed)
-        return {name: self._each(value) for name, value in values.items() if name in moved}
+        return {name: self._by_design(value) for name, value in values.items() if name in moved}
 
     @cached_property
     def places(self) -> dict[str, Floats]:
         """Places of the geometry that do, in lengths and radians, shape (count,)."""
-        return {name: self._each(value) for name, value in self.study.parameters.places(self.changed).items()}
+        return {name: self._by_design(value) for name, value in self.study.parameters.places(self.changed).items()}
 
     @cached_property
     def numbers(self) -> Numbers:
@@ -143,7 +143,7 @@ class Designs:
                     self._judge(section, command, note)
         return reasons
 
-    def _each(self, value: Number) -> Floats:
+    def _by_design(self, value: Number) -> Floats:
         return np.broadcast_to(np.asarray(value, dtype=float), self.count)
 
     def _judge_geometry(self, note: Any) -> None:

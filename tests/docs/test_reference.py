@@ -102,7 +102,12 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         "kinematics={motion: {P.x: [{from: 0, to: 0.1, time: 1}], P.y: 1, platform.angle: 0}, instants: 2}",
         "stiffness.poses=null", "stiffness.characteristic_length=0.2", "stiffness.loads=[{at: B1, force: [1, 0]}]",
     ])  # fmt: skip
+    rubbed = study_of(
+        FOUR_BAR, "mechanism.friction={B: {coefficient: 0.1, radius: 2}}",
+        "kinematics={poses: [{crank: 30}], outputs: [B], loads: [{at: B, force: [1, 0]}]}",
+    )  # fmt: skip
     return (
+        ("friction", mechdesign.kinematics(rubbed), rubbed),
         ("pieces", mechdesign.workspace(bar), bar),
         ("time and centres", mechdesign.kinematics(crank), crank),
         ("errors over time", mechdesign.reliability(crank), crank),

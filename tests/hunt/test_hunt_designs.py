@@ -14,9 +14,9 @@ import numpy as np
 
 import mechdesign
 from mechdesign.errors import MechdesignError
+from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
-from mechdesign.experiments.wanted import Wanted
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
@@ -281,7 +281,7 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 entries[".".join(map(str, path))] = float(value) * (1 + WIDTH * rng.uniform(-1, 1))
             cases.append(entries)
         names = [f"{name}.{word}" for name in columns(command, own)[:12] for word in ("min", "max")]
-        wanted = [Wanted(name) for name in names]
+        wanted = [CaseNumber(name) for name in names]
         tally = Tally([tuple(entries.items()) for entries in cases], len(wanted), 0)
         for answered in answers(mechdesign.load(data), tally.cases, wanted):
             tally.add(answered)

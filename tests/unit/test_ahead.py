@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.work import ahead
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
@@ -77,5 +77,5 @@ def test_a_result_is_the_same_in_another_process() -> None:
     result = mechdesign.kinematics(study)
     _, sent = pickle.loads(pickle.dumps((study, result.seen)))
     assert sent.main["rocker.angle"].tolist() == result.main["rocker.angle"].tolist()
-    largest = [each.main.scope.course(Asked("rocker.angle")).worst(1)[0] for each in (result, sent)]
+    largest = [each.main.scope.course(Request("rocker.angle")).worst(1)[0] for each in (result, sent)]
     assert largest[0] == largest[1]

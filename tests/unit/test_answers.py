@@ -13,7 +13,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.analysis import answers, kinematics
 from mechdesign.questions.poses import study_poses
 from mechdesign.results import Column, Result
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs, variant
 
@@ -177,7 +177,7 @@ def worst(result: Result, name: str, sign: int, absolute: bool) -> tuple[float, 
     scope = result.tables["motion"].scope
     assert scope is not None
     assert scope.course is not None
-    course = scope.course(Asked(name))
+    course = scope.course(Request(name))
     assert course is not None
     (value,), (place,) = course.worst(sign, absolute=absolute)
     return float(value), course.shown(float(place))

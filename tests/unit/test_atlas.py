@@ -88,13 +88,13 @@ def test_designs_of_other_sizes_have_their_own_poses() -> None:
     """Together as alone, and as their closed form has it: also regions much larger than that of the sketch."""
     text = PLATFORM.format(held=BY_MEASURE, assembly="any")
     rods = np.array([0.25, 0.3, 0.45])
-    (question,) = questions(study_of(text), wanted=("area", "GII"))
+    (question,) = questions(study_of(text), columns=("area", "GII"))
     places = {f"rod_{k}.length": rods for k in (1, 2, 3)}
     together = answer(question, places, 3, BATCH)
-    (closed,) = questions(study_of(PLATFORM.format(held=BY_ANGLE, assembly="any")), wanted=("area", "GII"))
+    (closed,) = questions(study_of(PLATFORM.format(held=BY_ANGLE, assembly="any")), columns=("area", "GII"))
     exact = answer(closed, places, 3, BATCH)
     for k, rod in enumerate(rods.tolist()):
-        (own,) = questions(study_of(text, f"mechanism.parameters.rod={rod}"), wanted=("area", "GII"))
+        (own,) = questions(study_of(text, f"mechanism.parameters.rod={rod}"), columns=("area", "GII"))
         alone = answer(own, {}, 1, BATCH)
         for name in ("area", "GII"):
             assert together.values[name][k] == pytest.approx(alone.values[name][0], rel=1e-6)
@@ -104,7 +104,7 @@ def test_designs_of_other_sizes_have_their_own_poses() -> None:
 def test_fold_distance_is_linear_through_a_fold() -> None:
     """With B3.x held the angle has a fold where P.x is 0.2 beside it: squared determinant 0.2^2 - (x - lead)^2."""
     lead = 0.45
-    (question,) = questions(study_of(PLATFORM.format(held=f"lead: [{lead}]", assembly="any")), wanted=("area",))
+    (question,) = questions(study_of(PLATFORM.format(held=f"lead: [{lead}]", assembly="any")), columns=("area",))
     x = lead - 0.2 + np.array([-1e-4, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.05, 0.2])
     margins = question.field.margins(x + 0.34j, {})
     fold_distance = margins[[label for _, label in question.field.labels].index("continuation")]
@@ -119,7 +119,7 @@ def test_fold_distance_is_linear_through_a_fold() -> None:
 
 @pytest.mark.nightly
 def test_a_region_between_folds_has_its_area() -> None:
-    (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), wanted=("area",))
+    (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), columns=("area",))
     found = answer(question, {}, 1, BATCH)
     assert found.values["area"][0] == pytest.approx(reached(0.45), rel=1e-6)
 
@@ -134,7 +134,7 @@ def test_region_of_a_design_that_does_not_close_where_the_sketch_is_drawn() -> N
     areas = []
     for held in (BY_ANGLE, BY_MEASURE):
         study = variant(study_of(PLATFORM.format(held=held, assembly="any"), far), {"crank": 0.16})
-        (question,) = questions(study, wanted=("area",))
+        (question,) = questions(study, columns=("area",))
         areas.append(answer(question, {}, 1, BATCH).values["area"][0])
     assert areas[0] > 0.008
     assert areas[1] == pytest.approx(areas[0], rel=1e-4)

@@ -11,9 +11,9 @@ from helpers.studies import IN_LINE
 
 import mechdesign
 from mechdesign.errors import StudyError
+from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.cases import answers, foresee
 from mechdesign.experiments.tally import Tally
-from mechdesign.experiments.wanted import Wanted
 from mechdesign.study.variants import with_entries
 
 SLIDER_CRANK = (
@@ -32,11 +32,11 @@ mechanism:
   sketch: {A: [0, 30], B: [75, 55]}
 kinematics: {poses: [{crank: 90}], outputs: [B.y]}
 """
-STROKE = Wanted("kinematics.extremes.B.x.range")
-SWING = Wanted("kinematics.rod.angle.max")
+STROKE = CaseNumber("kinematics.extremes.B.x.range")
+SWING = CaseNumber("kinematics.rod.angle.max")
 
 
-def asked(text: str, cases: list[dict[str, object]], *wanted: Wanted, jobs: int = 1) -> Tally:
+def asked(text: str, cases: list[dict[str, object]], *wanted: CaseNumber, jobs: int = 1) -> Tally:
     study, given = mechdesign.load(text=text), [tuple(case.items()) for case in cases]
     tally = Tally(given, len(wanted), len(study.requirements))
     for answered in answers(study, given, wanted, jobs=jobs):
@@ -106,7 +106,7 @@ def test_a_case_that_fails_is_answered_with_its_reason():
 
 def test_the_assembly_stays_that_of_the_sketch_unless_that_is_changed():
     # With the crank this much shorter the sketched B would be nearer to the other side.
-    height = Wanted("kinematics.B.y")
+    height = CaseNumber("kinematics.B.y")
     moved = {"mechanism.links.ground.D": [100, 90]}
     kept, mirrored = asked(FOUR_BAR, [moved, moved | {"mechanism.sketch.B": [75, -55]}], height).result(0)[0]
 
@@ -129,7 +129,7 @@ def test_another_mechanism_is_assembled_anew():
 
 def test_what_no_result_has_is_found_before_anything_is_computed():
     study = mechdesign.load(text=SLIDER_CRANK)
-    wrong = [Wanted("kinematics.rod.angel.max"), Wanted("kinematics.B.x")]
+    wrong = [CaseNumber("kinematics.rod.angel.max"), CaseNumber("kinematics.B.x")]
     with pytest.raises(StudyError) as error:
         foresee(study, [STROKE, SWING, *wrong])
     misspelt, several = map(str, error.value.problems)

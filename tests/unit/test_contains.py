@@ -59,7 +59,7 @@ RECTANGLE = Shape(180, 90, round=False)
 
 def scales(text: str, shape: Shape, *changes: str, places: dict[str, Floats] | None = None) -> Floats:
     """Scales that fit, of the study's own design or of several with other places."""
-    (question,) = questions(study_of(text, *changes), wanted=("area",))
+    (question,) = questions(study_of(text, *changes), columns=("area",))
     count = len(next(iter(places.values()))) if places else 1
     return fitted(shape, answer(question, places or {}, count, BATCH).panels)[0]
 
@@ -123,7 +123,7 @@ def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
     study = study_of(RRR, "workspace.assembly=same")
     rng = np.random.default_rng(3)
     places = {name: rng.uniform(110, 150, 3) for name in ("rod_1.length", "rod_2.length", "rod_3.length")}
-    (question,) = questions(study, wanted=("area",))
+    (question,) = questions(study, columns=("area",))
     given = answer(question, places, 3, BATCH)
     theta = np.linspace(0, 2 * np.pi, 721)[:, None]
     for shape in (RECTANGLE, Shape(50, 90, False, 10 + 5j)):

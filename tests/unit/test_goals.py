@@ -234,7 +234,7 @@ def test_transmission_angles_of_the_loops(changes: tuple[str, ...]) -> None:
 
 @pytest.mark.slow
 def test_workspaces_where_the_section_depends_on_a_variable() -> None:
-    """Asked of each design then, with the same numbers as all at once."""
+    """Request of each design then, with the same numbers as all at once."""
     study, other = (varied("two_rrr.yaml", ["l_min"], f"workspace.scan.about=[{x}, 0]") for x in ("0", "0*l_min"))
     goals = [goal("GII"), goal("workspace.area"), goal("sigma_min_mean")]
     designs = {"l_min": np.array([1.5, 2.0, 40.0])}

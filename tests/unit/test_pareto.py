@@ -10,7 +10,7 @@ from helpers.syntheses import tray
 
 import mechdesign
 from mechdesign.numerics.fronts import crowding
-from mechdesign.questions.optimize.explorer import Explorer, Known
+from mechdesign.questions.optimize.explorer import Explorer, Points
 from mechdesign.questions.optimize.pareto import evolve_front, front, knee
 from mechdesign.questions.optimize.search import sample
 
@@ -40,17 +40,17 @@ def zdt1(u):
 def spread(function, margins=lambda u: np.empty((len(u), 0)), seed=0):
     def evaluated(u):
         values = function(u)
-        return Known(u, values, margins(u), np.empty((len(u), 0)), np.isnan(values).any(axis=1).astype(float))
+        return Points(u, values, margins(u), np.empty((len(u), 0)), np.isnan(values).any(axis=1).astype(float))
 
     explorer = Explorer(evaluated, 3, 3000)
     evolve_front(explorer, np.ones(2), sample(3, np.random.default_rng(seed), 100, 100), seed)
-    return explorer.known
+    return explorer.points
 
 
 def test_front_of_zdt1():
-    known = spread(zdt1)
-    assert len(known.u) <= 3000
-    values = known.values[front(known.values)]
+    points = spread(zdt1)
+    assert len(points.u) <= 3000
+    values = points.values[front(points.values)]
     assert values[:, 1] == pytest.approx(1 - np.sqrt(values[:, 0]), abs=0.02)
     assert np.ptp(values[:, 0]) > 0.98
     assert np.diff(np.sort(values[:, 0])).max() < 0.05
@@ -59,8 +59,8 @@ def test_front_of_zdt1():
 
 
 def test_a_condition_cuts_the_front():
-    known = spread(zdt1, lambda u: (u[:, 0] - 0.3)[:, None])
-    values = known.values[known.feasible]
+    points = spread(zdt1, lambda u: (u[:, 0] - 0.3)[:, None])
+    values = points.values[points.feasible]
     values = values[front(values)]
     assert values[:, 0].min() == pytest.approx(0.3, abs=0.01)
     # A design that is on the front for being nearest to the condition alone may be far from it in the other goal.
@@ -69,8 +69,8 @@ def test_a_condition_cuts_the_front():
 
 
 def test_points_without_a_value_do_not_reach_the_front():
-    known = spread(lambda u: np.where(u[:, [0]] < 0.2, np.nan, zdt1(u)))
-    values = known.values[known.feasible]
+    points = spread(lambda u: np.where(u[:, [0]] < 0.2, np.nan, zdt1(u)))
+    values = points.values[points.feasible]
     assert np.isfinite(values).all()
     assert values[front(values)][:, 0].min() == pytest.approx(0.2, abs=0.02)
 

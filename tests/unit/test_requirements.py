@@ -12,7 +12,7 @@ from mechdesign.results import Column, Result, Table
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     result: str
     where: dict = field(default_factory=dict)
     abs: bool = False
@@ -45,38 +45,38 @@ def verdict(asked, **columns):
 
 
 def test_the_smallest_row_counts_for_at_least():
-    given = verdict(Asked("kinematics.mu", at_least=40), mu=[50.0, 39.0, 60.0])
+    given = verdict(Request("kinematics.mu", at_least=40), mu=[50.0, 39.0, 60.0])
     assert not given.met
     assert given.worst == 39
     assert given.place == "theta 90"
 
 
 def test_the_largest_row_counts_for_at_most():
-    assert verdict(Asked("kinematics.mu", at_most=60), mu=[50.0, 39.0, 60.0]).met
-    assert verdict(Asked("kinematics.mu", at_most=59.9), mu=[50.0, 39.0, 60.0]).worst == 60
+    assert verdict(Request("kinematics.mu", at_most=60), mu=[50.0, 39.0, 60.0]).met
+    assert verdict(Request("kinematics.mu", at_most=59.9), mu=[50.0, 39.0, 60.0]).worst == 60
 
 
 def test_both_bounds_and_the_one_that_fails_is_told():
-    given = verdict(Asked("kinematics.mu", at_least=30, at_most=55), mu=[50.0, 39.0, 60.0])
+    given = verdict(Request("kinematics.mu", at_least=30, at_most=55), mu=[50.0, 39.0, 60.0])
     assert (given.met, given.worst) == (False, 60)
 
 
 def test_nan_is_not_met():
-    given = verdict(Asked("kinematics.mu", at_least=0), mu=[50.0, np.nan, 60.0])
+    given = verdict(Request("kinematics.mu", at_least=0), mu=[50.0, np.nan, 60.0])
     assert not given.met
     assert np.isnan(given.worst)
 
 
 def test_absolute_value():
-    assert not verdict(Asked("kinematics.mu", at_least=40), mu=[-50.0, 45.0, 60.0]).met
-    assert verdict(Asked("kinematics.mu", abs=True, at_least=40), mu=[-50.0, 45.0, 60.0]).met
+    assert not verdict(Request("kinematics.mu", at_least=40), mu=[-50.0, 45.0, 60.0]).met
+    assert verdict(Request("kinematics.mu", abs=True, at_least=40), mu=[-50.0, 45.0, 60.0]).met
 
 
 @pytest.mark.parametrize(
     ("where", "worst"), [({"theta": 90}, 39.0), ({"kind": "b"}, 60.0), ({"kind": "b", "theta": 180}, 60.0)]
 )
 def test_where_chooses_rows_by_number_and_word(where, worst):
-    given = verdict(Asked("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], kind=["a", "a", "b"])
+    given = verdict(Request("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], kind=["a", "a", "b"])
     assert given.worst == worst
 
 
@@ -94,7 +94,7 @@ def test_where_chooses_rows_by_number_and_word(where, worst):
 def test_rows_that_never_are_are_mistakes_of_the_study(where, told):
     columns = {"kind": ["first_order", "first_order", "monte_carlo"], "none": [np.nan] * 3}
     with pytest.raises(StudyError) as caught:
-        verdict(Asked("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], **columns)
+        verdict(Request("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], **columns)
     assert told in str(caught.value)
     assert "requirements.0" in str(caught.value)
 
@@ -102,28 +102,28 @@ def test_rows_that_never_are_are_mistakes_of_the_study(where, told):
 def test_the_nearest_of_many_rows_is_told():
     given = Table("motion", (Column("theta", np.linspace(0, 360, 73)), Column("mu", np.ones(73))))
     with pytest.raises(StudyError, match="there are 0 to 360, 35 the nearest"):
-        judge(Result("kinematics", {"motion": given}), [Asked("kinematics.mu", where={"theta": 36}, at_least=1)])
+        judge(Result("kinematics", {"motion": given}), [Request("kinematics.mu", where={"theta": 36}, at_least=1)])
 
 
 def test_no_valid_row_is_not_met():
-    asked = Asked("kinematics.mu", where={"valid": 1, "theta": 90}, at_least=1)
+    asked = Request("kinematics.mu", where={"valid": 1, "theta": 90}, at_least=1)
     assert not verdict(asked, mu=[50.0, np.nan, 60.0], valid=[True, False, True]).met
     empty = Table("motion", tuple(Column(name, np.zeros(0)) for name in ("theta", "valid", "mu")))
     assert not judge(Result("kinematics", {"motion": empty}), [asked])[0].met
 
 
 def test_columns_of_other_tables_and_names_with_dots():
-    assert verdict(Asked("kinematics.range", at_least=80)).met
-    assert verdict(Asked("kinematics.extremes.range", at_least=80)).met
-    assert verdict(Asked("kinematics.B.x", at_least=1), **{"B.x": [1.0, 2.0, 3.0]}).met
+    assert verdict(Request("kinematics.range", at_least=80)).met
+    assert verdict(Request("kinematics.extremes.range", at_least=80)).met
+    assert verdict(Request("kinematics.B.x", at_least=1), **{"B.x": [1.0, 2.0, 3.0]}).met
 
 
 def test_other_commands_are_left_alone():
-    assert judge(result(), [Asked("stiffness.k_y", at_least=1)]) == ()
+    assert judge(result(), [Request("stiffness.k_y", at_least=1)]) == ()
 
 
 def test_unknown_columns_are_mistakes_of_the_study_all_in_one_go():
-    asked = [Asked("kinematics.muu", at_least=1), Asked("kinematics.output", at_least=1)]
+    asked = [Request("kinematics.muu", at_least=1), Request("kinematics.output", at_least=1)]
     with pytest.raises(StudyError) as caught:
         judge(result(mu=[1.0, 2.0, 3.0]), asked)
     lines = str(caught.value).splitlines()

@@ -15,7 +15,7 @@ from mechdesign.cli.app import app
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.questions.optimize.analysis import _doubts
 from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.explorer import Explorer, Known, Part, Spent
+from mechdesign.questions.optimize.explorer import Explorer, Part, Points, Spent
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.optimize.search import Ending, search
@@ -55,7 +55,7 @@ def rastrigin(u):
 
 def evaluated(u, values, margins, rows):
     """Points of which those without a value are all alike."""
-    return Known(u, values, margins, rows, np.isnan(values).any(axis=1).astype(float))
+    return Points(u, values, margins, rows, np.isnan(values).any(axis=1).astype(float))
 
 
 def explorer(function, dimensions, margins=None, budget=3000):
@@ -71,10 +71,10 @@ def explorer(function, dimensions, margins=None, budget=3000):
 
 
 def least(function, dimensions, margins=None, seed=0):
-    known = explorer(function, dimensions, margins)
-    search(known, np.ones(1), [[1.0]], seed)
-    row = int(np.argmin(known.known.merit(FIRST)))
-    return known.known.u[row], known.known.values[row, 0]
+    searched = explorer(function, dimensions, margins)
+    search(searched, np.ones(1), [[1.0]], seed)
+    row = int(np.argmin(searched.points.merit(FIRST)))
+    return searched.points.u[row], searched.points.values[row, 0]
 
 
 @pytest.mark.nightly
@@ -131,10 +131,10 @@ def worst_of(rows, dimensions, margins=None):
         return evaluated(u, values, np.empty((len(u), 0)) if margins is None else margins(u), found)
 
     places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
-    known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
-    assert search(known, np.ones(1), [[1.0]], 0).checked
-    row = int(np.argmin(known.known.merit(FIRST)))
-    return known.known.u[row], known.known.values[row, 0]
+    searched = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
+    assert search(searched, np.ones(1), [[1.0]], 0).checked
+    row = int(np.argmin(searched.points.merit(FIRST)))
+    return searched.points.u[row], searched.points.values[row, 0]
 
 
 @pytest.mark.slow
@@ -170,10 +170,10 @@ def test_two_worst_rows_weighed_under_a_condition_that_is_one():
 
     parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
              Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
-    known = Explorer(outcome, 2, 5000, parts)
-    assert search(known, np.ones(2), [[1.0, 3.0]], 0).checked
-    best = int(np.argmin(known.known.merit(np.array([1.0, 3.0]))))
-    assert known.known.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
+    searched = Explorer(outcome, 2, 5000, parts)
+    assert search(searched, np.ones(2), [[1.0, 3.0]], 0).checked
+    best = int(np.argmin(searched.points.merit(np.array([1.0, 3.0]))))
+    assert searched.points.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
 
 
 def test_rows_of_goals_are_those_of_the_tables():
@@ -197,24 +197,24 @@ def test_rows_of_goals_are_those_of_the_tables():
 
 def test_no_point_is_evaluated_twice_nor_more_than_allowed():
     asked = []
-    known = explorer(lambda u: asked.append(u.copy()) or rastrigin(u), 2, budget=60)
-    assert not search(known, np.ones(1), [[1.0]], 0).checked
+    searched = explorer(lambda u: asked.append(u.copy()) or rastrigin(u), 2, budget=60)
+    assert not search(searched, np.ones(1), [[1.0]], 0).checked
     points = np.concatenate(asked)
-    assert len(points) == len(known.known.u) <= 60
+    assert len(points) == len(searched.points.u) <= 60
     assert len(np.unique(points, axis=0)) == len(points)
     with pytest.raises(Spent):
-        known(np.random.default_rng(9).random((61, 2)))
+        searched(np.random.default_rng(9).random((61, 2)))
 
 
 @pytest.mark.slow
 def test_extremes_and_weighted_sum_of_two_goals():
     """Of (x, 1 - x^2), normalised, the equal-weight best is where 1 = 2 x."""
-    known = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
-    assert search(known, -np.ones(2), [[1.0, 1.0]], 0).checked
-    values = known.known.values
+    searched = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
+    assert search(searched, -np.ones(2), [[1.0, 1.0]], 0).checked
+    values = searched.points.values
     assert values.min(axis=0) == pytest.approx([0, 0], abs=1e-12)
     assert values.max(axis=0) == pytest.approx([1, 1], abs=1e-12)
-    assert known.known.u[np.argmax(values.sum(axis=1))] == pytest.approx([0.5], abs=1e-3)
+    assert searched.points.u[np.argmax(values.sum(axis=1))] == pytest.approx([0.5], abs=1e-3)
 
 
 def test_bounds_that_depend_on_variables_above():

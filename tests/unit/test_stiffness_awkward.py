@@ -123,7 +123,7 @@ def test_concurrent_legs_leave_a_turn_about_their_common_point(text: str) -> Non
     moved, loose = structure.frame.respond(structure.asked, np.array([[1.0, 0], [0, 1.0], [0, 0]]))
     assert loose.shape[1] == 1
     assert_allclose((stiff @ moved[3 * structure.asked : 3 * structure.asked + 3])[:2], np.eye(2), atol=1e-6)
-    # Asked elsewhere on the platform, the free twist goes round the same point.
+    # Request elsewhere on the platform, the free twist goes round the same point.
     assert free(ask_stiffness(text, UPRIGHT, "stiffness.at=FAR")) == pytest.approx([-4000, 3000, 1], rel=1e-9)
 
 
@@ -438,7 +438,7 @@ def test_a_clamp_has_no_bearing(name: str) -> None:
 
 
 def test_a_pivot_on_a_rigid_ground_does_not_move_at_all() -> None:
-    """Asked at its own foot a leg turns there, and nothing else."""
+    """Request at its own foot a leg turns there, and nothing else."""
     text = TRIPOD.replace("link: platform", "link: leg_1").replace("at: P", "at: A1")
     compliance = matrix(ask_stiffness(text), "C")
     assert compliance[2, 2] > 0

@@ -343,7 +343,7 @@ def test_order_of_the_midpoint_rule() -> None:
     errors = []
     for count in nodes:
         study = study_of(ARM, f"workspace.integrate={{rule: midpoint, nodes: {count}}}", "workspace.scan.rays=8")
-        errors.append(abs(answer(questions(study, wanted=["manipulability_mean"])[0], {}, 1, BATCH)
+        errors.append(abs(answer(questions(study, columns=["manipulability_mean"])[0], {}, 1, BATCH)
                           .values["manipulability_mean"][0] - exact))  # fmt: skip
     order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
     assert order == pytest.approx(1.5, abs=0.1)

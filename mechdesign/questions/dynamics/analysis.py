@@ -31,7 +31,7 @@ from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.work.threads import one_thread
@@ -58,15 +58,15 @@ class DrawnForces(DrawnPoses):
         """
         yield from super().vectors(motion, shown)
         unit, forces = question_of(motion).study.units.label("force"), dict[str, list[Vector]]()
-        for each in actions_on(motion, shown):
-            if not each.reaction and np.nan_to_num(each.force).any():
-                words = each.name if each.kind == each.name else f"{each.name} on {each.link or 'the pin'}"
-                forces.setdefault(each.kind, []).append((words, each.place, each.force))
+        for action in actions_on(motion, shown):
+            if not action.reaction and np.nan_to_num(action.force).any():
+                words = action.name if action.kind == action.name else f"{action.name} on {action.link or 'the pin'}"
+                forces.setdefault(action.kind, []).append((words, action.place, action.force))
         x, y = (motion.arrays[f"shaking.{axis}"][shown.rows] for axis in "xy")
         frame = [point for owner, point in shown.configuration.graph.points if owner == GROUND and ":" not in point]
         place = sum(shown.configuration.point(point) for point in frame) / len(frame) if frame else 0j
         forces["shaking"] = [("on the frame", np.broadcast_to(place, shown.rows.shape), x + 1j * y)]
-        yield from (Vectors(kind, unit, each) for kind, each in forces.items())
+        yield from (Vectors(kind, unit, vectors) for kind, vectors in forces.items())
 
 
 @one_thread()
@@ -105,7 +105,7 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
 
 def tables(
     motion: Motion, question: MotionQuestion, chosen: Collection[str], outputs: Collection[str] | None = None,
-    requests: Collection[Asked] = (),
+    requests: Collection[Request] = (),
 ) -> tuple[dict[str, Table], Along | None]:  # fmt: skip
     """Some tables of a motion, and the motion between its poses, which is that of the question.
 
@@ -113,7 +113,7 @@ def tables(
     """
     names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
     followed = [name for name in names if name not in EFFICIENCIES]
-    integrals = [Asked(name, integral=True) for name in followed] if "extremes" in chosen else []
+    integrals = [Request(name, integral=True) for name in followed] if "extremes" in chosen else []
     along = along_of(question, followed, requests=[*requests, *integrals])
     parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
     if "extremes" in chosen:

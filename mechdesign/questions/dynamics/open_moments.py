@@ -43,8 +43,8 @@ def with_open_moments(
     network, configuration = applied.network, applied.configuration
     twists = twists_of(network, section, configuration, length, applied)
     # Poses that are not known are solved as if nothing moved.
-    known = np.isfinite(twists.twist).all(axis=(1, 2))
-    twist, compliance = (np.where(known, part.T, 0.0).T for part in (twists.twist, twists.compliance))
+    finite = np.isfinite(twists.twist).all(axis=(1, 2))
+    twist, compliance = (np.where(finite, part.T, 0.0).T for part in (twists.twist, twists.compliance))
     loaded = load(replace(twists, twist=twist, compliance=compliance), 3)
     origin, completed = configuration.point(section.at), list(reactions)
     for position, contact in enumerate(joints.contacts):
@@ -53,7 +53,7 @@ def with_open_moments(
             arm = configuration.nodes[contact.node] - origin
             besides = np.abs(moments_about(arm, loaded.open_wrenches[:, k])).max(axis=1, initial=0.0)
             moment = sign * moments_about(arm, loaded.wrenches[:, k, :, -1:])[:, 0]
-            moment = np.where(known & (besides <= RIGID_MOMENT * length), moment, np.nan)
+            moment = np.where(finite & (besides <= RIGID_MOMENT * length), moment, np.nan)
             completed[position] = reactions[position]._replace(moment=moment)
     return completed
 

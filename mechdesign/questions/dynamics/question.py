@@ -44,7 +44,7 @@ class ForceQuestion:
     joints: Joints
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
     tempo: float  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
-    wanted: frozenset[str] | None = None  # columns of `statics` to be computed; None of all with what joints bear
+    subset: frozenset[str] | None = None  # columns of `statics` that are computed; None for all, with parts
 
     @classmethod
     def of(cls, study: Study, *, moves: bool, tempo: float = 0.0) -> ForceQuestion:
@@ -99,7 +99,7 @@ class ForceQuestion:
 
     def lean(self, names: Collection[str]) -> ForceQuestion:
         """The question for some of the columns of `statics` alone."""
-        return replace(self, wanted=frozenset(names))
+        return replace(self, subset=frozenset(names))
 
     @quiet
     def columns(
@@ -107,18 +107,18 @@ class ForceQuestion:
     ) -> Mapping[str, Value]:  # fmt: skip
         """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
 
-        Where some columns alone are wanted it is the sizes of joint forces, if they are among these.
+        Of a subset of the columns joint forces are computed only if one is among them, and then their sizes alone.
         """
         columns, held = self._held(poses, linear, rows, moving)
-        if self.wanted is None or not self.wanted.isdisjoint(self.forces):
+        if self.subset is None or not self.subset.isdisjoint(self.forces):
             borne, stiffness = self._borne(held), self.study.stiffness
-            if self.wanted is None and self.joints.open and stiffness is not None and self.friction is None:
+            if self.subset is None and self.joints.open and stiffness is not None and self.friction is None:
                 section = poses.section(stiffness, rows)
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
                 self.apply(applied, 0, poses, rows, moving)
                 borne = with_open_moments(borne, self.joints, applied, section, self.study.mechanism.size or 1.0)
             for name, reaction in zip(self.forces, borne, strict=True):
-                columns |= self._parts(name, reaction) if self.wanted is None else {name: np.abs(reaction.force)}
+                columns |= self._parts(name, reaction) if self.subset is None else {name: np.abs(reaction.force)}
         return columns
 
     def _held(
@@ -132,7 +132,7 @@ class ForceQuestion:
         if self.friction is None:
             held: Balance | Slipping = balance(linear, forces, mechanism.pressing)
         else:
-            back = self.wanted is None or "back_efficiency" in self.wanted
+            back = self.subset is None or "back_efficiency" in self.subset
             held = self.friction.solve(linear, forces, moving.velocity, back=back)
             columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):

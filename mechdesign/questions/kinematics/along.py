@@ -27,7 +27,7 @@ from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import unitless
 from mechdesign.questions.poses import SolvedPoses, unit_of
 from mechdesign.results import POSES_ONLY, Column, TableKind
-from mechdesign.statistics import Asked, Part
+from mechdesign.statistics import Part, Request
 from mechdesign.study import Study
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
@@ -52,7 +52,7 @@ class Along:
     ----------
     names, also : collection of str
         Columns that are followed: those of the table of extremes where the first is left out, and others.
-    asked : collection of Asked
+    requests : collection of Request
         Columns that are followed over the motion or parts of it, whether their means are asked, and which extremes.
     loops : sequence of FourBar
         Four-bars and slider-cranks of which sines and cosines of transmission angles are followed, and with `toggles`
@@ -61,7 +61,7 @@ class Along:
 
     def __init__(
         self, question: MotionQuestion, curve: Curve, names: Collection[str] | None = None,
-        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), requests: Collection[Asked] = (),
+        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), requests: Collection[Request] = (),
         toggles: bool = False, passages: bool = False,
     ) -> None:  # fmt: skip
         self.question, self.curve = question, curve
@@ -356,7 +356,7 @@ class Along:
 
 def along_of(
     question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
-    also: Collection[str] = (), requests: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
+    also: Collection[str] = (), requests: Collection[Request] = (), toggles: bool = False, passages: bool = False,
 ) -> Along | None:  # fmt: skip
     """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
     curve = question.curve

@@ -9,10 +9,10 @@ import numpy as np
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 
 
-def course_of(along: Along, request: Asked) -> Followed | None:
+def course_of(along: Along, request: Request) -> Followed | None:
     """A column along motions or a part of them; None where it has no values between the poses."""
     if not along.knows(request.columns):
         return None
@@ -25,9 +25,9 @@ class Courses:
     """Columns along the motions of a question, each followed once for all designs; can be sent to another process."""
 
     question: MotionQuestion
-    _followed: dict[Asked, Followed | None] = field(default_factory=dict)
+    _followed: dict[Request, Followed | None] = field(default_factory=dict)
 
-    def __call__(self, request: Asked) -> Followed | None:
+    def __call__(self, request: Request) -> Followed | None:
         """A column along the motions; None where it has no values between the poses."""
         if request not in self._followed:
             along = along_of(self.question, (), requests=[request])

@@ -41,7 +41,7 @@ class Vectors:
 
     kind: str
     unit: str
-    each: Sequence[Vector]
+    arrows: Sequence[Vector]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +78,13 @@ class DrawnPoses(Drawn):
         solved = SolvedPoses(shown.rows, shown.poses.groups[0].names, configuration)
         velocity = moving_at(study, question.section, shown.poses, solved, linear).velocity
         assert velocity is not None
-        known = configuration.valid & (regularity(linear) >= STALLED)
-        each = []
+        regular = configuration.valid & (regularity(linear) >= STALLED)
+        arrows = []
         for point in default_outputs(study.mechanism):
             if study.mechanism.graph.is_point(point):
                 x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
-                each.append((point, point, np.where(known, x + 1j * y, np.nan)))
-        yield Vectors("velocity", study.units.label("velocity"), each)
+                arrows.append((point, point, np.where(regular, x + 1j * y, np.nan)))
+        yield Vectors("velocity", study.units.label("velocity"), arrows)
 
 
 @dataclass(frozen=True, eq=False)

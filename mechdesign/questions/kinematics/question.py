@@ -200,8 +200,8 @@ class MotionQuestion:
             pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
         ]
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        asked = self.borne is not None and any(static.name in names for static in self.borne.statics)
-        borne = self.borne.lean(names) if self.borne is not None and asked else None
+        needed = self.borne is not None and any(static.name in names for static in self.borne.statics)
+        borne = self.borne.lean(names) if self.borne is not None and needed else None
         directed = self.friction is not None and any(static.name in names for static in self.statics)
         if not (rates or directed) and borne is None and not coordinates_in(self.study, section.loads):
             unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}

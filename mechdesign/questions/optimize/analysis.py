@@ -125,7 +125,7 @@ def _ask(
     dimensions, signs = len(section.variables), np.array([goal.sign for goal in judge.goals])
     judge.progress.start(budget, "designs")
     explorer = Explorer(
-        judge.known, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=judge.rough
+        judge.points, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=judge.rough
     )
     if section.method == "search":
         use_all = section.evaluations is not None
@@ -144,17 +144,17 @@ def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) ->
         early = f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
         yield Caution("unconverged", early, "optimum")
     for row, (ends, rounding, best) in enumerate(zip(ending.ends, ending.rounding, ending.best, strict=True)):
-        found = ends[np.isfinite(ends)]
-        far = max(searching.AGREEMENT * np.abs(found).min(initial=np.inf), rounding)
-        agree = np.abs(found - found.min(initial=np.inf)) <= far
+        feasible = ends[np.isfinite(ends)]
+        far = max(searching.AGREEMENT * np.abs(feasible).min(initial=np.inf), rounding)
+        agree = np.abs(feasible - feasible.min(initial=np.inf)) <= far
         if len(ends) > 1 and agree.sum() < min(len(ends), searching.CONFIRMATIONS):
             of = f" for row {row + 1} of the weights" if len(ending.ends) > 1 else ""
-            lost = f", {len(ends) - len(found)} found no feasible design" if len(found) < len(ends) else ""
+            lost = f", {len(ends) - len(feasible)} found no feasible design" if len(feasible) < len(ends) else ""
             spread = "nowhere"
-            if len(found):
-                spread = f"with {objectives[row]} between {abs(found).min():.6g} and {abs(found).max():.6g}"
+            if len(feasible):
+                spread = f"with {objectives[row]} between {abs(feasible).min():.6g} and {abs(feasible).max():.6g}"
             last = f", and the last steps from the best led to {abs(best):.6g}" * bool(
-                len(found) and best < found.min() - far
+                len(feasible) and best < feasible.min() - far
             )
             yield Caution(
                 "unconverged",
@@ -171,10 +171,10 @@ def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
         pairs = zip(designs.goals, designs.weights[row], strict=True)
         weights = ", ".join(f"{goal.name} {weight:g}" for goal, weight in pairs)
         mark = designs.marks[row] if designs.marks else ""
-        what = f"Optimum of {designs.study.name} for the weights {weights}"
+        heading = f"Optimum of {designs.study.name} for the weights {weights}"
         if row < len(designs.chosen):
-            what = f"{mark[0].upper()}{mark[1:]} on the Pareto front of {designs.study.name}"
-        files[f"optimum_{row + 1}" if row else "optimum"] = winner, what
+            heading = f"{mark[0].upper()}{mark[1:]} on the Pareto front of {designs.study.name}"
+        files[f"optimum_{row + 1}" if row else "optimum"] = winner, heading
     return files | ({"knee": files["optimum"]} if len(designs.chosen) else {})
 
 
@@ -203,7 +203,9 @@ def _none_feasible(designs: Designs) -> str:
     message = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     for condition in designs.conditions:
         index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
-        values = designs.found[condition][np.isfinite(designs.found[condition])] if statistic == "min" else np.empty(0)
+        values = (
+            designs.results[condition][np.isfinite(designs.results[condition])] if statistic == "min" else np.empty(0)
+        )
         if values.size and (np.abs(values) <= 0).all():
             message += (
                 f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
@@ -246,7 +248,7 @@ def _warnings(question: DesignsQuestion, designs: Designs) -> Iterator[Caution]:
     if not question.regions or question.regions[0].rule != "gauss":
         return
     for goal, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * question.regions[0].tolerance * np.abs(designs.found[goal]))
+        loose = designs.feasible & (error > 2 * question.regions[0].tolerance * np.abs(designs.results[goal]))
         if loose.any():
             yield Caution(
                 "unconverged",
@@ -260,7 +262,7 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
     """Places at which a design's workspace holds shapes at the largest scale."""
     if not shapes:
         return []
-    panels = answer(questions(study, wanted=("area",))[0], {}, 1, SINGLE).panels
+    panels = answer(questions(study, columns=("area",))[0], {}, 1, SINGLE).panels
     return [complex(np.asarray(fitted(shape, panels)[1].centre)[0]) for shape in shapes]
 
 

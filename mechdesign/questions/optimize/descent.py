@@ -16,7 +16,7 @@ import numpy as np
 
 from mechdesign.numerics import quadratic
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known
+from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Points
 from mechdesign.questions.optimize.models import FAR, Models, Stencil, Terms, square, without_lost
 
 # Half the width of the box in which models are trusted: the first, the largest, and those below which a descent ends.
@@ -24,13 +24,13 @@ FIRST_WIDTH, LARGEST_WIDTH, SMALLEST_WIDTH, ROUGH_SMALLEST_WIDTH = 0.1, 0.5, 1e-
 # Parts of that width that are tried together, and the part to which it shrinks where none of them is better.
 NARROWER = (1.0, 0.25, 0.0625)
 SHRUNK = 1 / 64
-# Most steps of a descent. After `RACE` steps one ends that would not reach the best of the others in `CATCH_UP` more.
+# Most steps of a descent. After `RACE` steps a descent ends if it would not catch up with the best in `CATCH_UP` more.
 MOST_STEPS, RACE, CATCH_UP = 300, 8, 30
 # Most pairs of quadratic programs that minimise the models of one step.
 ROUNDS = 5
 # The minimum of the models is settled where a pair gains less than this part of the whole gain.
 SETTLED = 0.02
-# Rows of each worst, and of all conditions, that a program has per (variables + 1).
+# Most rows of each goal, and of all conditions, in a quadratic program, per (variables + 1).
 ROWS_HELD = 6
 # Descents that come nearer to each other than this, in parts of the ranges, continue as one.
 SAME = 1e-3
@@ -71,14 +71,14 @@ def descend(explorer: Explorer, descents: Sequence[tuple[Floats, int]], *, width
     Parameters
     ----------
     descents : sequence of (ndarray, int)
-        Factors of the goals in the sum that is minimised, and the row of `explorer.known` to start from.
+        Factors of the goals in the sum that is minimised, and the row of `explorer.points` to start from.
     width : float
         Half the first width of the boxes, in parts of the ranges.
 
     Returns
     -------
     list of int
-        Rows of `explorer.known` where the descents ended.
+        Rows of `explorer.points` where the descents ended.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def descend(explorer: Explorer, descents: Sequence[tuple[Floats, int]], *, width
             if scout.value < lane.value:
                 lane.row, lane.width, lane.value, lane.ended = scout.row, scout.width, scout.value, False
         for group in _alike(lanes):
-            _race(explorer.known, group)
+            _race(explorer.points, group)
         scouts = [
             (_Lane(lane.objective, lane.ahead[0], lane.ahead[1], lane.model_error), lane)
             for lane in lanes if lane.ahead is not None and not lane.ended
@@ -124,13 +124,13 @@ def _alike(lanes: Sequence[_Lane]) -> list[list[_Lane]]:
     return list(groups.values())
 
 
-def _race(known: Known, lanes: Sequence[_Lane]) -> None:
+def _race(points: Points, lanes: Sequence[_Lane]) -> None:
     """End descents of one objective that come to the place of a better one, or would not catch up with the best."""
     lanes = sorted(lanes, key=lambda lane: lane.value)
     for k, lane in enumerate(lanes):
         behind = lane.value - lane.pace * CATCH_UP > lanes[0].value
         lane.ended |= lane.steps > RACE and behind
-        near = (np.abs(known.u[[other.row for other in lanes[:k]]] - known.u[lane.row]) < SAME).all(axis=1)
+        near = (np.abs(points.u[[other.row for other in lanes[:k]]] - points.u[lane.row]) < SAME).all(axis=1)
         lane.ended |= bool(near.any())
 
 
@@ -175,8 +175,8 @@ class _Programs:
         limits = without_lost(limits.scaled(self._lengths))
         self._limits = limits.columns(limits.highest(widest, most)).take(wide)
         self._scales = scale[wide]
-        found, promised = self._best()
-        self.points = np.clip(centre[wide] + found, 0, 1).reshape(len(lanes), len(NARROWER), -1)
+        best, promised = self._best()
+        self.points = np.clip(centre[wide] + best, 0, 1).reshape(len(lanes), len(NARROWER), -1)
         self._promised = (promised * self._scales).reshape(len(lanes), -1).max(axis=1)
 
     def _scale(self, plain: Models, pieces: Models) -> Floats:
@@ -282,7 +282,7 @@ class _Programs:
             if best != 1 and merits[k, 1] < UNKNOWN:
                 lane.ahead = int(among[k, 1]), lane.width
             if best:
-                way = np.abs(self._explorer.known.u[among[k, best]] - self._at[k]).max()
+                way = np.abs(self._explorer.points.u[among[k, best]] - self._at[k]).max()
                 at_edge = best == 1 and way > 0.9 * lane.width
                 lane.width = min(3 * lane.width, LARGEST_WIDTH) if at_edge else max(min(2 * way, lane.width), TINY)
                 lane.row = int(among[k, best])
@@ -298,12 +298,12 @@ class _Programs:
 
     def _merits(self, rows: Ints) -> tuple[Floats, Floats]:
         """The merit of points, shape (lanes, points), and their violation of conditions."""
-        known, flat = self._explorer.known, rows.ravel()
+        points, flat = self._explorer.points, rows.ravel()
         limits = self._terms(rows)[2] / self._lengths[:, None]
         missed = np.nan_to_num(limits, nan=FAR).max(axis=2, initial=FAR)
-        values = (known.values[flat] @ self._objective).reshape(rows.shape)
-        valid = known.valid[flat].reshape(rows.shape)
-        feasible = known.feasible[flat].reshape(rows.shape)
+        values = (points.values[flat] @ self._objective).reshape(rows.shape)
+        valid = points.valid[flat].reshape(rows.shape)
+        feasible = points.feasible[flat].reshape(rows.shape)
         outside = np.where(valid | (missed > 0), CONDITION_MISSED * (1 + np.maximum(missed, 0.0)), UNKNOWN)
         return np.where(feasible, values, outside), missed
 

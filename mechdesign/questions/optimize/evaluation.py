@@ -56,7 +56,7 @@ class Evaluator:
         self._others: dict[tuple[float | str, ...], Evaluator | None] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy in another process makes evaluators of other studies by itself."""
+        """State for another process, which makes its own evaluators of other studies."""
         return self.__dict__ | {"_others": {}}
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
@@ -85,11 +85,11 @@ class Evaluator:
                 reasons[rows] = without_numbers(error)
                 continue
             own = {name: values for name, values in some.items() if name not in forms}
-            found = self._formed(some, ()) if other is None else other(own)
+            evaluated = self._formed(some, ()) if other is None else other(own)
             # Designs of another structure may have another number of rows behind their goals.
-            width = self.layout.width if found.table.shape[1] == self.layout.width else self.layout.head
-            table[rows, :width] = found.table[:, :width]
-            reasons[rows] = found.reasons if own else found.reasons[0]
+            width = self.layout.width if evaluated.table.shape[1] == self.layout.width else self.layout.head
+            table[rows, :width] = evaluated.table[:, :width]
+            reasons[rows] = evaluated.reasons if own else evaluated.reasons[0]
         return Evaluated(table, reasons.tolist())
 
     def _forms_study(self, name: str) -> bool:
@@ -129,9 +129,9 @@ class Evaluator:
         values: dict[str, ArrayLike] = {**self.study.parameters.nominal, **batch.designs.parameters}
         for goal in self.goals:
             if goal.expression is not None:
-                found = np.asarray(goal.expression.evaluate(values))
-                found = np.where(np.isfinite(found), found, np.nan)
-                batch.table[:, self.layout.column[goal]] = np.abs(found) if goal.absolute else found
+                numbers = np.asarray(goal.expression.evaluate(values))
+                numbers = np.where(np.isfinite(numbers), numbers, np.nan)
+                batch.table[:, self.layout.column[goal]] = np.abs(numbers) if goal.absolute else numbers
         if self.question.regions and self.question.regions_together:
             self._regions(batch, batch.feasible, self.question.regions)
         for command, tables in self.question.together.items():
@@ -144,23 +144,25 @@ class Evaluator:
             batch.note(slice(None), np.isnan(column), f"{goal.name} has no value")
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
-    def _regions(self, batch: Batch, rows: Ints, asked: Sequence[Question]) -> None:
+    def _regions(self, batch: Batch, rows: Ints, questions: Sequence[Question]) -> None:
         """Numbers of the workspaces of some designs, the worst over all values of the held coordinates.
 
         `asked` are the questions of the study, or of a single design.
         """
         if not len(rows):
             return
-        numbers, own = batch.designs.take(rows).numbers, asked is self.question.regions
+        numbers, own = batch.designs.take(rows).numbers, questions is self.question.regions
         try:
-            given = [answer(question, question.places(numbers) if own else {}, len(rows), BATCH) for question in asked]
+            regions = [
+                answer(question, question.places(numbers) if own else {}, len(rows), BATCH) for question in questions
+            ]
         except AssemblyError as error:
             # The workspace of one design has no end.
             for half in batch.halves(rows, error):
-                self._regions(batch, half, asked)
+                self._regions(batch, half, questions)
             return
-        for question, region in zip(asked, given, strict=True):
-            there = question.where if len(asked) > 1 else ""
+        for question, region in zip(questions, regions, strict=True):
+            there = question.where if len(questions) > 1 else ""
             batch.note(rows, ~(region.panels.closes & (region.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
         for goal in self.question.regional:
@@ -168,21 +170,21 @@ class Evaluator:
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
                 region.values[goal.column] if shape is None else fitted(shape, region.panels)[0]
-                for region in given
+                for region in regions
             ])  # fmt: skip
             # A missing value counts as the worst.
             worst = np.where(np.isnan(values), np.inf, values if goal.smallest else -values).argmax(axis=0)
             batch.table[rows, column] = values[worst, lanes]
             if split(goal.column)[1] == "mean":
-                errors = np.stack([region.errors[goal.column] for region in given])
+                errors = np.stack([region.errors[goal.column] for region in regions])
                 batch.table[rows, len(self.goals) + column] = errors[worst, lanes]
 
     def _tables(
         self, batch: Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints, study: Study, poses: Poses
     ) -> None:
-        wanted = {*tables, "motion"} if self.question.squares.intersection(chain(*tables.values())) else set(tables)
+        names = {*tables, "motion"} if self.question.squares.intersection(chain(*tables.values())) else set(tables)
         try:
-            stack = stacked.tables(study, command, wanted, poses, self.question.outputs, self.question.asked)
+            stack = stacked.tables(study, command, names, poses, self.question.outputs, self.question.requests)
         except MechdesignError as error:
             for half in batch.halves(rows, error):
                 own = study_poses(study, command, batch.designs.take(half).numbers)

@@ -9,8 +9,8 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Merits, larger than any goal, from which on a point misses a condition, has no value, or is not known at all; far
-# enough from each other for an order within each class.
+# Least merits, all larger than any goal, of points that miss a condition, of points without a value, and of those of
+# which nothing is known; far enough from each other for an order within each class.
 CONDITION_MISSED = 1e60
 NO_VALUE = 1e90
 UNKNOWN = 1e120
@@ -25,7 +25,7 @@ class Spent(Exception):
 
 @dataclass(frozen=True)
 class Part:
-    """Rows, columns `place` of `Known.rows`, of which a goal or a condition is the worst or the root mean square.
+    """The columns `place` of `Points.rows` whose worst value, or root mean square, is a goal or a condition.
 
     Parameters
     ----------
@@ -48,17 +48,17 @@ class Part:
 
     def pieces(self, rows: Floats) -> Floats:
         """Smooth functions whose largest value is ``sign * (goal - bound)``, the violation of a condition."""
-        found = self.sign * rows[:, self.place]
+        pieces = self.sign * rows[:, self.place]
         if self.absolute and self.sign > 0:
-            found = np.concatenate([found, -found], axis=1)
+            pieces = np.concatenate([pieces, -pieces], axis=1)
         elif self.absolute:
             # These values are made large, and so stay away from the kink at zero.
-            found = -np.abs(found)
-        return np.asarray(found - self.sign * self.bound)
+            pieces = -np.abs(pieces)
+        return np.asarray(pieces - self.sign * self.bound)
 
 
 @dataclass(frozen=True)
-class Known:
+class Points:
     """Evaluated points.
 
     Parameters
@@ -81,9 +81,9 @@ class Known:
     rows: Floats
     shortfall: Floats
 
-    def take(self, rows: Ints) -> Known:
+    def take(self, rows: Ints) -> Points:
         """Some of the points."""
-        return Known(*(column[rows] for column in vars(self).values()))
+        return Points(*(column[rows] for column in vars(self).values()))
 
     @property
     def valid(self) -> Flags:
@@ -130,11 +130,11 @@ class Explorer:
     left, reserve : int
         Evaluations that are left, and how many of these are kept for later.
     visited : ndarray of int
-        Rows of `known` that were asked for since the last `forget`.
+        Rows of `points` that were requested since the last `forget`.
     """
 
     def __init__(
-        self, evaluate: Callable[[Floats], Known], dimensions: int, budget: int, parts: Sequence[Part] = (),
+        self, evaluate: Callable[[Floats], Points], dimensions: int, budget: int, parts: Sequence[Part] = (),
         *, snap: Callable[[Floats], Floats] = np.asarray, rough: bool = False,
     ) -> None:  # fmt: skip
         self._evaluate, self._snap, self.dimensions, self.parts = evaluate, snap, dimensions, tuple(parts)
@@ -146,10 +146,10 @@ class Explorer:
         self._table, self._ends = np.empty((0, dimensions + 1)), [dimensions] * 4
 
     @property
-    def known(self) -> Known:
+    def points(self) -> Points:
         """Everything evaluated so far."""
         u, values, margins, rows, shortfall = np.split(self._table[: len(self._rows)], self._ends, axis=1)
-        return Known(u, values, margins, rows, shortfall[:, 0])
+        return Points(u, values, margins, rows, shortfall[:, 0])
 
     @property
     def evaluated(self) -> int:
@@ -158,7 +158,7 @@ class Explorer:
 
     @property
     def visited(self) -> Ints:
-        """Rows of `known` that were asked for since the last `forget`, each once."""
+        """Rows of `points` that were requested since the last `forget`, each once."""
         return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *self._visits]))
 
     def forget(self) -> None:
@@ -166,7 +166,7 @@ class Explorer:
         self._visits.clear()
 
     def __call__(self, u: Floats) -> Ints:
-        """Rows of `known` that hold these points, shape (m, dimensions).
+        """Rows of `points` that hold these points, shape (m, dimensions).
 
         Raises
         ------
@@ -181,8 +181,8 @@ class Explorer:
             if len(order) > self.left - self.reserve:
                 raise Spent
             self.left -= len(order)
-            found = self._evaluate(u[order])
-            parts = (found.u, found.values, found.margins, found.rows, found.shortfall[:, None])
+            points = self._evaluate(u[order])
+            parts = (points.u, points.values, points.margins, points.rows, points.shortfall[:, None])
             end = begun + len(order)
             if end > len(self._table):
                 *self._ends, width = np.cumsum([part.shape[1] for part in parts]).tolist()

@@ -28,7 +28,7 @@ BETWEEN = 100
 
 
 def design_files(
-    study: Study, designs: Designs, wanted: Mapping[str, tuple[int, str]]
+    study: Study, designs: Designs, optima: Mapping[str, tuple[int, str]]
 ) -> tuple[dict[str, str], list[Caution]]:
     """Texts by file name, and warnings about them.
 
@@ -39,7 +39,7 @@ def design_files(
     """
     files: dict[str, str] = {}
     doubts = []
-    for name, (k, heading) in wanted.items():
+    for name, (k, heading) in optima.items():
         heading = f"{heading}: {in_words(designs.design(k))}"
         form, numbers = parted(study, designs.design(k))
         # Sections that make other studies, such as the matrix, stay in the file.
@@ -91,13 +91,13 @@ def _parted(study: Study, designs: Designs) -> Iterator[str]:
 
 def _given(study: Study, commands: Iterable[str]) -> list[tuple[str, ...]]:
     """The coordinates that give the poses of commands, and the drives."""
-    found = [study.mechanism.drives]
+    coordinates = [study.mechanism.drives]
     for command in commands:
         if command == "workspace" and study.workspace is not None:
-            found.append((f"{study.workspace.point}.x", f"{study.workspace.point}.y", *study.workspace.at))
+            coordinates.append((f"{study.workspace.point}.x", f"{study.workspace.point}.y", *study.workspace.at))
         else:
-            found += [tuple(group.names) for group in study_poses(study, command).groups]
-    return found
+            coordinates += [tuple(group.names) for group in study_poses(study, command).groups]
+    return coordinates
 
 
 def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:

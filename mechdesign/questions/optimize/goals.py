@@ -15,13 +15,13 @@ from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
 from mechdesign.results import Result
 from mechdesign.rows import Chosen
-from mechdesign.statistics import STATISTICS, Asked, worst
+from mechdesign.statistics import STATISTICS, Request, worst
 from mechdesign.study import Study
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, command_of, path_of, terms_of
 
-# A shape that fits but for this part of its size is contained.
+# A shape counts as contained if it fits up to this part of its size.
 ROUNDING = 1e-9
 # A rule for the mean square of errors along a motion.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -59,7 +59,7 @@ class Goal:
     where: tuple[tuple[str, object], ...] = ()
     bound: float = 0.0
     unassembled: bool = False
-    expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
+    expression: Expression | None = None  # over parameters; `command` is empty then
     outline: Outline | None = None
     gate: bool = False
 
@@ -71,8 +71,8 @@ class Goal:
     @property
     def regional(self) -> bool:
         """Whether it is a number of the whole workspace."""
-        found = self.outline is not None or self.column in COLUMNS or bool(split(self.column)[0])
-        return self.command == "workspace" and found and not self.where
+        number = self.outline is not None or self.column in COLUMNS or bool(split(self.column)[0])
+        return self.command == "workspace" and number and not self.where
 
     def margin(self, values: Floats) -> Floats:
         """By how much values keep the bound, negative where they do not."""
@@ -102,29 +102,29 @@ class Goal:
             return Judgement(np.abs(numbers) if self.absolute else numbers, None)
         absolute = self.absolute or (statistic is not None and statistic.absolute)
         values, counts = chosen.shaped(designs, assembled=self.unassembled)
-        found = worst(np.abs(values) if absolute else values, counts, largest=self.smallest)
+        extreme = worst(np.abs(values) if absolute else values, counts, largest=self.smallest)
         if chosen.table.name == "targets" and chosen.column == "rms" and "motion" in result.tables:
             outputs = {str(name) for name in chosen.table["output"][chosen.counts]}
             if len(outputs) == 1:
-                return Judgement(found, _errors(result, outputs.pop(), found), squares=True)
+                return Judgement(extreme, _errors(result, outputs.pop(), extreme), squares=True)
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         rows = values[counts].reshape(designs, -1) if alike else None
-        if self.asked_of(chosen) is not None and chosen.course is not None:
+        if self.request(chosen) is not None and chosen.course is not None:
             course, take = chosen.course, np.fmax if self.smallest else np.fmin
             between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
             lost = (counts & np.isnan(values)).any(axis=1)
-            found = np.where(lost, np.nan, take(found, np.abs(between) if absolute else between))
-            between = np.where(np.isnan(between), found, between)
+            extreme = np.where(lost, np.nan, take(extreme, np.abs(between) if absolute else between))
+            between = np.where(np.isnan(between), extreme, between)
             rows = None if rows is None else np.column_stack([rows, between])
-        return Judgement(found, rows)
+        return Judgement(extreme, rows)
 
-    def asked_of(self, chosen: Chosen) -> Asked | None:
+    def request(self, chosen: Chosen) -> Request | None:
         """How a column is followed between the poses, for conditions, statistics and parts of a motion; else None."""
         between = self.gate or chosen.statistic or chosen.part
         if not between or chosen.picked:
             return None
         both = self.absolute or bool(chosen.statistic)
-        return chosen.asked._replace(end=0 if both else 1 if self.smallest else -1)
+        return chosen.request._replace(end=0 if both else 1 if self.smallest else -1)
 
 
 class Judgement(NamedTuple):
@@ -156,7 +156,7 @@ def _errors(result: Result, output: str, rms: Floats) -> Floats:
     motion, designs = result.tables["motion"], len(rms)
     parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
     follow = motion.scope.course if motion.scope is not None else None
-    courses = [follow(Asked(name, (), True)) for name in parts] if follow is not None else [None]
+    courses = [follow(Request(name, (), True)) for name in parts] if follow is not None else [None]
     followed = [course.at((1 + _NODES) / 2) * np.sqrt(_WEIGHTS) for course in courses if course is not None]
     columns = followed or [motion[name].reshape(designs, -1) for name in parts]
     errors = np.nan_to_num(np.concatenate(columns, axis=1))
@@ -198,7 +198,7 @@ def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:
-    """The worst rows that a condition judges, one for each of its bounds; or the scale at which a shape is held.
+    """The goals by which a condition is judged, one for each bound; of a shape, the scale at which it fits.
 
     Designs differ in the parameters `moved`.
     """

@@ -16,7 +16,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.questions.optimize.batch import Evaluated
 from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
-from mechdesign.questions.optimize.explorer import ASSEMBLY, Known, Part
+from mechdesign.questions.optimize.explorer import ASSEMBLY, Part, Points
 from mechdesign.questions.optimize.goals import Goal, unit_of
 from mechdesign.questions.optimize.question import DesignsQuestion
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
@@ -42,7 +42,7 @@ class Designs:
 
     Parameters
     ----------
-    found : dict of Goal to ndarray
+    results : dict of Goal to ndarray
         Values of the goals and of the bounded results; nan where a design has none.
     errors : dict of Goal to ndarray
         Estimated errors of goals that have any.
@@ -63,7 +63,7 @@ class Designs:
     variables: dict[str, Floats]
     goals: tuple[Goal, ...]
     conditions: tuple[Goal, ...]
-    found: dict[Goal, Floats]
+    results: dict[Goal, Floats]
     errors: dict[Goal, Floats]
     codes: NDArray[np.int32]
     words: list[str]
@@ -87,10 +87,10 @@ class Designs:
     @cached_property
     def failures(self) -> dict[str, Flags]:
         """Infeasible designs by reason: why they cannot be built, else every condition that they miss."""
-        found = {word: self.codes == code for code, word in enumerate(self.words) if word}
+        reasons = {word: self.codes == code for code, word in enumerate(self.words) if word}
         built = self.codes == 0
-        return found | {
-            f"not {condition.name}": built & ~condition.met(self.found[condition]) for condition in self.conditions
+        return reasons | {
+            f"not {condition.name}": built & ~condition.met(self.results[condition]) for condition in self.conditions
         }
 
     @cached_property
@@ -108,13 +108,13 @@ class Designs:
 
     def counted(self) -> list[tuple[str, int, int]]:
         """Reasons of infeasible designs, the most frequent first: reason, number of designs, and the first design."""
-        found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
-        return sorted(found, key=lambda reason: (-reason[1], reason[0]))
+        reasons = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
+        return sorted(reasons, key=lambda reason: (-reason[1], reason[0]))
 
     @cached_property
     def values(self) -> Floats:
         """Values of the goals, shape (designs, goals)."""
-        return np.stack([self.found[goal] for goal in self.goals], axis=1)
+        return np.stack([self.results[goal] for goal in self.goals], axis=1)
 
     @cached_property
     def _ends(self) -> tuple[Floats, Floats]:
@@ -134,7 +134,7 @@ class Designs:
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
     def merits(self, row: int) -> str:
-        """The optima that a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        """Which optima a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
         places = np.flatnonzero(self.winners == row).tolist()
         marks = [self.marks[place] for place in places if place < len(self.chosen)]
         weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]
@@ -184,7 +184,7 @@ class Designs:
         return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
-        """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
+        """Variables and goals of some designs, with the goals' errors if `errors` is true, and the CPI."""
         for name in self.variables:
             yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
         for goal in self.goals:
@@ -192,14 +192,14 @@ class Designs:
             if goal.name not in self.variables:
                 kind, unit, meaning = self._kind(goal)
                 words = {"parameter": goal.name, "result": goal.name, "meaning of the result": meaning}
-                yield kind.column(self.found[goal][rows], unit, **words)
+                yield kind.column(self.results[goal][rows], unit, **words)
         for goal, error in self.errors.items() if errors else ():
             if goal in self.goals:
                 yield DESIGNS["<result>_error"].column(error[rows], self._kind(goal)[1], result=goal.name)
         for condition in self.conditions:
             if condition.outline is not None:
                 words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
-                yield RESULT.column(self.found[condition][rows], **words)
+                yield RESULT.column(self.results[condition][rows], **words)
         yield CPI.column(self.cpi[rows])
 
     def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
@@ -245,85 +245,85 @@ class Judge:
         self._chunk = SLOW_DESIGNS_AT_ONCE if question.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
         # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
-        self._asked: list[Floats] = []
-        self._found: list[Floats] = []
+        self._variables: list[Floats] = []
+        self._rows: list[Floats] = []
 
     def parts(self) -> list[Part]:
         """The rows of a result that belong to each goal or condition; the margins of assembly come last."""
         head, margins = self.layout.head, self.layout.margins
         places = {goal: slice(at.start - head, at.stop - head) for goal, at in self.layout.rows.items()}
-        found = [
+        parts = [
             Part(column, goal.sign, goal.absolute, places[goal], goal.bound, goal in self._squares)
             for column, goal in enumerate((*self.goals, *self.conditions))
             if goal in places and (column < len(self.goals) or goal not in self._squares)
         ]
         if margins.start < margins.stop:
-            found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
-        return found
+            parts.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
+        return parts
 
-    def known(self, u: Floats) -> Known:
+    def points(self, u: Floats) -> Points:
         """Evaluate points of the unit cube."""
         designs, given, _ = from_cube(self.study, u)
-        found = np.full((len(u), self.layout.width), np.nan)
+        rows = np.full((len(u), self.layout.width), np.nan)
         if given.any():
-            found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
-        return self._known(u, found)
+            rows[given] = self.evaluate({name: column[given] for name, column in designs.items()})
+        return self._points(u, rows)
 
-    def _known(self, u: Floats, found: Floats) -> Known:
-        values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
+    def _points(self, u: Floats, rows: Floats) -> Points:
+        values = np.where(rows[:, [self.layout.code]] > 0, np.nan, rows[:, self.layout.values])
         margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
-        return Known(
+        return Points(
             u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
-            found[:, self.layout.head :], found[:, self.layout.shortfall],
+            rows[:, self.layout.head :], rows[:, self.layout.shortfall],
         )  # fmt: skip
 
     def nearest(self) -> int | None:
         """The infeasible design with the smallest violation; None where no violation is known."""
-        found = np.concatenate([np.empty((0, self.layout.head)), *self._found])
-        merit = self._known(np.empty((len(found), 0)), found).merit(np.zeros(len(self.goals)))
+        rows = np.concatenate([np.empty((0, self.layout.head)), *self._rows])
+        merit = self._points(np.empty((len(rows), 0)), rows).merit(np.zeros(len(self.goals)))
         return int(merit.argmin()) if np.isfinite(merit).any() else None
 
     def evaluate(self, designs: Batch) -> Floats:
         """Results of designs, in rows of `layout`, evaluated chunk by chunk unless the journal has them."""
-        count, begun = len(designs[self._names[0]]), len(self._found)
+        count, begun = len(designs[self._names[0]]), len(self._rows)
         chunks = [
             {name: column[k : k + self._chunk] for name, column in designs.items()}
             for k in range(0, count, self._chunk)
         ]
         keys = [digest([chunk[name] for name in self._names]) for chunk in chunks]
-        known: list[Floats] = []
-        while self._journal is not None and len(known) < len(keys):
-            rows = self._journal.recall(keys[len(known)])
+        recalled: list[Floats] = []
+        while self._journal is not None and len(recalled) < len(keys):
+            rows = self._journal.recall(keys[len(recalled)])
             if rows is None:
                 break
-            known.append(rows)
-        new = map(self._coded, self._compute(chunks[len(known) :]))
-        for chunk, key, rows in zip(chunks, keys, chain(known, new), strict=True):
-            self._asked.append(np.column_stack([chunk[name] for name in self._names]))
-            self._found.append(rows)
+            recalled.append(rows)
+        new = map(self._coded, self._compute(chunks[len(recalled) :]))
+        for chunk, key, rows in zip(chunks, keys, chain(recalled, new), strict=True):
+            self._variables.append(np.column_stack([chunk[name] for name in self._names]))
+            self._rows.append(rows)
             if self._journal is not None:
                 self._journal.add(key, rows, [*self._words])
             self.progress.update(len(rows))
-        found = self._found[begun:]
+        results = self._rows[begun:]
         # The rows behind the goals are returned, but not kept.
-        self._found[begun:] = [rows[:, : self.layout.head].copy() for rows in found]
-        return np.concatenate(found) if found else np.empty((0, self.layout.width))
+        self._rows[begun:] = [rows[:, : self.layout.head].copy() for rows in results]
+        return np.concatenate(results) if results else np.empty((0, self.layout.width))
 
-    def _coded(self, found: Evaluated) -> Floats:
-        codes = [self._words.setdefault(reason, len(self._words)) for reason in found.reasons]
-        found.table[:, self.layout.code] = codes
-        return found.table
+    def _coded(self, evaluated: Evaluated) -> Floats:
+        codes = [self._words.setdefault(reason, len(self._words)) for reason in evaluated.reasons]
+        evaluated.table[:, self.layout.code] = codes
+        return evaluated.table
 
     def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> Designs:
         """Everything evaluated so far; see `Designs` of the arguments."""
         head = self.layout.head
-        found = np.concatenate([np.empty((0, head)), *(rows[:, :head] for rows in self._found)])
-        asked = np.concatenate([np.empty((0, len(self._names))), *self._asked])
-        errors = zip(self.layout.column, found[:, self.layout.errors].T, strict=True)
+        rows = np.concatenate([np.empty((0, head)), *(part[:, :head] for part in self._rows)])
+        variables = np.concatenate([np.empty((0, len(self._names))), *self._variables])
+        errors = zip(self.layout.column, rows[:, self.layout.errors].T, strict=True)
         return Designs(
-            self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
-            dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
+            self.study, dict(zip(self._names, variables.T, strict=True)), self.goals, self.conditions,
+            dict(zip(self.layout.column, rows[:, self.layout.values].T, strict=True)),
             {goal: column for goal, column in errors if not np.isnan(column).all()},
-            found[:, self.layout.code].astype(np.int32), [*self._words], found[:, self.layout.shortfall], weights,
+            rows[:, self.layout.code].astype(np.int32), [*self._words], rows[:, self.layout.shortfall], weights,
             meanings,
         )  # fmt: skip

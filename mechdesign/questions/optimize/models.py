@@ -64,8 +64,8 @@ class Terms:
         They are the smooth sum, or its residuals; the rows of the goals that are worst of rows; and the functions of
         the conditions, which must not be positive.
         """
-        known, flat = self._explorer.known, rows.ravel()
-        lines, values, margins = known.rows[flat], known.values[flat], known.margins[flat]
+        points, flat = self._explorer.points, rows.ravel()
+        lines, values, margins = points.rows[flat], points.values[flat], points.margins[flat]
 
         def shaped(columns: Sequence[Floats]) -> Floats:
             return np.concatenate([np.empty((len(flat), 0)), *columns], axis=1).reshape(*rows.shape, -1)
@@ -91,8 +91,8 @@ class Terms:
     @staticmethod
     def _or_worst(pieces: Floats, worst: Floats, rows: Ints) -> Floats:
         """Pieces, and their worst where the pieces are not known."""
-        known = np.isfinite(pieces.reshape(*rows.shape, -1)[:, 0]).all(axis=1)
-        return np.column_stack([pieces, np.where(np.repeat(known, rows.shape[1]), np.nan, worst)])
+        complete = np.isfinite(pieces.reshape(*rows.shape, -1)[:, 0]).all(axis=1)
+        return np.column_stack([pieces, np.where(np.repeat(complete, rows.shape[1]), np.nan, worst)])
 
 
 class Stencil:
@@ -104,7 +104,7 @@ class Stencil:
         self.pairs = np.array([*combinations(range(n), 2)] if n <= MOST_CROSSED else [], dtype=int).reshape(-1, 2)
         one = np.eye(n)
         offsets = np.concatenate([np.zeros((1, n)), one, -one, one[self.pairs[:, 0]] + one[self.pairs[:, 1]]])
-        self.at = explorer.known.u[list(rows)]
+        self.at = explorer.points.u[list(rows)]
         self.centre = np.clip(self.at, self.step, 1 - self.step)
         points = self.centre[:, None] + self.step * offsets
         self.rows = explorer(points.reshape(-1, n)).reshape(points.shape[:2])

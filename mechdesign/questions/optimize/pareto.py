@@ -17,15 +17,15 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.numerics.evolution import offspring, simplex, survivors
 from mechdesign.questions.optimize.columns import HYPERVOLUME, PARETO
 from mechdesign.questions.optimize.descent import descend
-from mechdesign.questions.optimize.explorer import Explorer, Known, Spent
+from mechdesign.questions.optimize.explorer import Explorer, Points, Spent
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.search import sample, search
 from mechdesign.results import Table
 
-# Most evaluations for each goal where the study gives none, and where also designs are evaluated one by one.
+# Most evaluations for each goal where the study gives none: of designs in batches, and of designs one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
-# One in so many of all evaluations is spent at most on the best of each goal, on the ends of the front, and on the
-# weighted sums of a round.
+# Most evaluations, as one in so many of all, for the best of each goal, for the ends of the front, and for the weighted
+# sums of a round.
 BEST_PART, END_PART, SUMS_PART = 6, 20, 10
 # Size of a population for two goals, the least number of its generations, and the size of the smallest population. More
 # than two goals are spread by directions that divide each goal into this many parts, by the number of goals; else the
@@ -85,7 +85,7 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         weights = np.random.default_rng(seed + k).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
         _descend(explorer, signs, weights, budget // SUMS_PART)
         _fill(explorer, signs)
-        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before)):
+        if explorer.evaluated == before or not (use_all or _grows(explorer.points, signs, before)):
             break
     if use_all:
         # The evaluations that are left are too few for a population.
@@ -97,10 +97,10 @@ def _divisions(goals: int) -> int:
     return DIVISIONS.get(goals, MOST_DIVISIONS)
 
 
-def _front_rows(known: Known, signs: Floats) -> Ints:
+def _front_rows(points: Points, signs: Floats) -> Ints:
     """Rows of the feasible designs that no other surpasses."""
-    rows = np.flatnonzero(known.feasible)
-    return np.asarray(rows[front(known.values[rows] * signs)])
+    rows = np.flatnonzero(points.feasible)
+    return np.asarray(rows[front(points.values[rows] * signs)])
 
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
@@ -109,13 +109,13 @@ def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
     half = explorer.left // 2
     size = int(np.clip(half // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
-    known = explorer.known
-    begun = _front_rows(known, signs)
+    points = explorer.points
+    begun = _front_rows(points, signs)
     if len(begun):
-        begun = begun[np.argsort(-fronts.crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
+        begun = begun[np.argsort(-fronts.crowding(points.values[begun] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
     explorer.reserve = half
-    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
+    evolve_front(explorer, signs, np.concatenate([points.u[begun], others]), seed)
     explorer.reserve = 0
 
 
@@ -124,11 +124,11 @@ def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> N
 
     `weights` are of shape (sums, goals).
     """
-    known = explorer.known
-    rows = _front_rows(known, signs)
+    points = explorer.points
+    rows = _front_rows(points, signs)
     if not len(rows):
         return
-    values = known.values[rows] * signs
+    values = points.values[rows] * signs
     span = np.ptp(values, axis=0)
     begun = rows[np.argmin(weights @ normalised(values).T, axis=1)]
     factors = weights * signs / np.where(span > 0, span, np.inf)
@@ -147,16 +147,16 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
 
     distance = WIDEST_GAP
     while distance >= FINEST_GAPS.get(len(signs), FINEST_GAP):
-        known = explorer.known
-        rows = _front_rows(known, signs)
+        points = explorer.points
+        rows = _front_rows(points, signs)
         if not len(rows):
             return
-        share = normalised(known.values[rows] * signs)
+        share = normalised(points.values[rows] * signs)
         # One design in each cell of this width, and those in the cells beside it.
         cells = np.unique(np.floor(share / distance), axis=0, return_index=True)[1]
         pairs = cells[cKDTree(share[cells]).query_pairs(BESIDE_CELL * distance, output_type="ndarray")]
         pairs = pairs[np.linalg.norm(share[pairs[:, 0]] - share[pairs[:, 1]], axis=1) > distance / 2]
-        middles = known.u[rows[pairs]].mean(axis=1)
+        middles = points.u[rows[pairs]].mean(axis=1)
         with suppress(Spent):
             explorer(middles)
         distance /= 2
@@ -176,22 +176,22 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
     with suppress(Spent):
         rows = explorer(first)
         for generation in count(1):
-            known = explorer.known.take(rows)
-            order = survivors(known.values * signs, known.merit(np.zeros(goals)), directions, random)[: len(first)]
-            rows = np.unique(np.concatenate([rows[order], explorer(offspring(known.u[order], random))]))
+            points = explorer.points.take(rows)
+            order = survivors(points.values * signs, points.merit(np.zeros(goals)), directions, random)[: len(first)]
+            rows = np.unique(np.concatenate([rows[order], explorer(offspring(points.u[order], random))]))
             if generation % LOOKS == 0:
                 # Where all designs are evaluated already, further generations find nothing.
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                if not _grows(explorer.known, signs, (begun + 3 * before) // 4):
+                if not _grows(explorer.points, signs, (begun + 3 * before) // 4):
                     return
 
 
-def _grows(known: Known, signs: Floats, begun: int) -> bool:
+def _grows(points: Points, signs: Floats, begun: int) -> bool:
     """Whether the designs evaluated since row `begun` added more than `LEAST_GROWTH` of the front's hypervolume."""
-    rows = np.flatnonzero(known.feasible)
-    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))[1]
+    rows = np.flatnonzero(points.feasible)
+    before, last = volumes(points.values[rows] * signs, np.searchsorted(rows, [begun, len(points.u)]))[1]
     return bool(last - before > LEAST_GROWTH * last)
 
 

@@ -20,7 +20,7 @@ from mechdesign.questions.workspace.schema import Over
 from mechdesign.questions.workspace.tables import index_columns
 from mechdesign.results import Column, Result
 from mechdesign.rows import Chosen, UnknownColumnError
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount, QuantityError
@@ -46,7 +46,7 @@ class DesignsQuestion:
         Goals by command where each design is computed by itself.
     outputs : set of str
         Outputs whose extremes are needed.
-    asked : set of Asked
+    requests : set of Request
         Columns that are followed between the poses.
     graded : bool
         Whether the rows behind the goals are wanted, and how far poses are from assembling.
@@ -61,13 +61,13 @@ class DesignsQuestion:
     together: Mapping[str, Mapping[str, Sequence[Goal]]]
     alone: Mapping[str, Sequence[Goal]]
     outputs: set[str]
-    asked: set[Asked]
+    requests: set[Request]
     graded: bool
     squares: frozenset[Goal]
     layout: Layout
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy in another process asks for the regions again."""
+        """State for another process, which computes the regions again."""
         return {name: value for name, value in self.__dict__.items() if name != "regions"}
 
     @property
@@ -87,7 +87,7 @@ class DesignsQuestion:
 
     @cached_property
     def regions(self) -> list[Question]:
-        """One question a value of the held coordinates, of which a design's worst answer counts; see `regions_of`."""
+        """A question for each value of the held coordinates; a design's worst answer counts. See `regions_of`."""
         return regions_of(self.study, self.goals)
 
     @property
@@ -104,18 +104,20 @@ class DesignsQuestion:
     @property
     def meanings(self) -> dict[str, tuple[str, str]]:
         """Unit and meaning of each number of the workspace, by its column."""
-        found = {name: (column.unit, column.meaning) for name, column in self.columns.items()}
+        meanings = {name: (column.unit, column.meaning) for name, column in self.columns.items()}
         for goal in self.goals:
             if goal.outline is not None:
                 shape = goal.column.removeprefix("scale of ")
                 meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-                found[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
+                meanings[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
         if len(self.regions) < 2:
-            return found
+            return meanings
         assert self.study.workspace is not None
         held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
                 for name, values in self.study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
-        return {name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in found.items()}
+        return {
+            name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in meanings.items()
+        }
 
 
 def regions_of(study: Study, goals: Sequence[Goal]) -> list[Question]:
@@ -141,26 +143,26 @@ def designs_question(study: Study, goals: Sequence[Goal] = (), *, graded: bool =
     moved = study.parameters.moved(variables)
     # Each goal and the place in the study that names it.
     places = goals_of(study.optimize) | conditions_of(study.optimize, moved)
-    wanted = tuple(dict.fromkeys(goals or places))
+    judged = tuple(dict.fromkeys(goals or places))
     columns: Mapping[str, Column] = {}
     regions_together = True
-    if regions := regions_of(study, wanted):
+    if regions := regions_of(study, judged):
         columns = index_columns(study, regions[0])
         together = shared(study, regions, moved) and not remeasured(study, variables)
-        regions_together = together and all(batched(column) for column in regions[0].wanted)
+        regions_together = together and all(batched(column) for column in regions[0].columns)
     reader = _Reader(study, places, graded)
-    problems = [*_misfits(study, wanted, columns, places)]
-    for command in dict.fromkeys(goal.command for goal in wanted if not goal.regional and not goal.expression):
-        problems += reader.read(command, [goal for goal in wanted if goal.command == command and not goal.regional])
+    problems = [*_misfits(study, judged, columns, places)]
+    for command in dict.fromkeys(goal.command for goal in judged if not goal.regional and not goal.expression):
+        problems += reader.read(command, [goal for goal in judged if goal.command == command and not goal.regional])
     if not goals:
         problems += choice_problems(study)
     if problems:
         # A condition with two bounds has the same problem twice.
         raise StudyError([*dict.fromkeys(problems)])
-    bounded = tuple(reader.bounded.get(goal, goal) for goal in wanted)
+    bounded = tuple(reader.bounded.get(goal, goal) for goal in judged)
     question = DesignsQuestion(
-        study, bounded, columns, regions_together, reader.together, reader.alone, reader.outputs, reader.asked, graded,
-        frozenset(reader.squares), Layout(bounded, reader.rows, reader.margins),
+        study, bounded, columns, regions_together, reader.together, reader.alone, reader.outputs, reader.requests,
+        graded, frozenset(reader.squares), Layout(bounded, reader.rows, reader.margins),
     )  # fmt: skip
     return question if graded else question.limited(0)
 
@@ -179,7 +181,7 @@ def _misfits(
 
 
 class _Reader:
-    """Looks at the answers that the study's own design has, for the tables and rows of goals.
+    """Finds the tables and rows that goals need in the answers of the study's own design.
 
     `places` are those of goals in the study. What is read is described at `DesignsQuestion`; besides, `bounded` has
     goals with their bounds in the unit of their column, `rows` how many rows each has, and `margins` the number of
@@ -191,7 +193,7 @@ class _Reader:
         self.together: dict[str, dict[str, list[Goal]]] = {}
         self.alone: dict[str, list[Goal]] = {}
         self.outputs: set[str] = set()
-        self.asked: set[Asked] = set()
+        self.requests: set[Request] = set()
         self.squares: set[Goal] = set()
         self.bounded: dict[Goal, Goal] = {}
         self.rows: dict[Goal, int] = {}
@@ -233,15 +235,16 @@ class _Reader:
             for chosen in terms.parts:
                 if chosen.table.name == "extremes":
                     self.outputs.update(chosen.table["output"][chosen.counts].tolist())
-                elif (asked := goal.asked_of(chosen)) is not None:
-                    self.asked.add(asked)
+                elif (request := goal.request(chosen)) is not None:
+                    self.requests.add(request)
         tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
-        stack = stacked.tables(study, command, {"motion", *tables}, poses, self.outputs, self.asked)
+        stack = stacked.tables(study, command, {"motion", *tables}, poses, self.outputs, self.requests)
         judged: dict[str, list[Goal]] = {}
         for named_goal, terms in named.items():
             goal = self._count(named_goal, terms, stack.result)
-            wanted = [judged.setdefault(chosen.table.name, []) for chosen in terms.parts]
-            wanted[0].append(goal)
+            for chosen in terms.parts:
+                judged.setdefault(chosen.table.name, [])
+            judged[terms.parts[0].table.name].append(goal)
         self.together[command] = judged
         # Extremes may be those of a part of the poses.
         if self._graded and (poses.listed or set(judged) != {"extremes"}):

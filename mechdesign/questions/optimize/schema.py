@@ -40,7 +40,7 @@ WORDS = ", ".join(f"``{word}``" for word in STATISTICS_OF_ROWS)
 _UNASSEMBLED = {"allowed": "only the part of the motion that is valid counts; how much is missing is said"}
 
 
-def _known() -> tuple[str, ...]:
+def _statistics() -> tuple[str, ...]:
     """Results of a workspace that may be named without the command."""
     return (*REGIONAL, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in STATISTICS))
 
@@ -49,7 +49,7 @@ def read_result(raw: Any, context: Context) -> str | Expression:
     """The name of a result, a sum of results, or an expression over parameters; a result comes first."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         raise failure(f"expected a result, such as GII or kinematics.mu, or an expression, not {shown(raw)}")
-    if fields.COORDINATE.fullmatch(raw) and (raw not in context.parameters or raw in _known()):
+    if fields.COORDINATE.fullmatch(raw) and (raw not in context.parameters or raw in _statistics()):
         return raw
     try:
         if command_of(raw) and _is_sum(raw):
@@ -80,8 +80,8 @@ def _required(raw: Any, context: Context) -> str:
     if isinstance(raw, str) and raw.startswith("optimize."):
         # Columns of its tables may be named by expressions.
         return raw
-    if isinstance(found := read_result(raw, context), str):
-        return found
+    if isinstance(reading := read_result(raw, context), str):
+        return reading
     cure = f"give it as a measure, mechanism.measures: {{NAME: {raw}}}, and require kinematics.NAME"
     raise failure(f"a requirement judges the result of a command, and {shown(raw)} is of parameters alone; {cure}")
 
@@ -133,12 +133,12 @@ class Span(fields.Model):
             for end in ((self.at_least, self.at_most) if self.from_ is None else (self.from_, self.to))
         )
         turn = turn_in(unit) if self.from_ is not None else 0.0
-        found = Interval(-np.inf if low is None else low, np.inf if high is None else high, turn)
-        if turn and found.high - found.low >= turn:
+        interval = Interval(-np.inf if low is None else low, np.inf if high is None else high, turn)
+        if turn and interval.high - interval.low >= turn:
             return Interval()
-        if not turn and not found.low < found.high:
+        if not turn and not interval.low < interval.high:
             raise QuantityError(f"nothing lies {self}; the smaller one comes first")
-        return found
+        return interval
 
     def __str__(self) -> str:
         words = (("from", self.from_), ("to", self.to), ("at least", self.at_least), ("at most", self.at_most))
@@ -178,7 +178,7 @@ class Chosen(fields.Model):
     @property
     def name(self) -> str:
         """The result, and in parentheses which rows count."""
-        where = ", ".join(f"{column} {wanted}" for column, wanted in self.where.items())
+        where = ", ".join(f"{column} {value}" for column, value in self.where.items())
         text = self.result if isinstance(self.result, str) else self.result.text
         return f"{text} ({where})" if where else text
 
@@ -267,14 +267,14 @@ class Outline(fields.Model):
     def named(self, moved: Collection[str] = ()) -> str:
         """``rectangle 180 x 90 at (0, 250)``; numbers that the parameters in `moved` change are named by their text."""
 
-        def told(number: float) -> str:
+        def text(number: float) -> str:
             expression = Amount.of(number).expression
             return f"{number:g}" if expression is None or expression.names.isdisjoint(moved) else expression.text
 
-        size = f"circle {told(self.circle)}" if self.circle is not None else ""
+        size = f"circle {text(self.circle)}" if self.circle is not None else ""
         if self.rectangle is not None:
-            size = f"rectangle {' x '.join(map(told, self.rectangle))}"
-        return size if self.center is None else f"{size} at ({', '.join(map(told, self.center))})"
+            size = f"rectangle {' x '.join(map(text, self.rectangle))}"
+        return size if self.center is None else f"{size} at ({', '.join(map(text, self.center))})"
 
 
 class Containment(fields.Model):
@@ -433,11 +433,11 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
                 check_result(checker, term, path, required=required)
             return
     command, _, rest = name.partition(".")
-    known = _known()
+    statistics = _statistics()
     if rest:
         checker.check_name(command, COMMANDS, "command", path)
-    elif required or name not in known:
-        names = known if required else (*known, *checker.parameters.nominal)
+    elif required or name not in statistics:
+        names = statistics if required else (*statistics, *checker.parameters.nominal)
         hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")
     if not required:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.descent import descend
-from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known, Spent
+from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Points, Spent
 
 # Most evaluations of a search where the study gives none, per (variables + 1) and per row of weights; fewer where
 # designs are evaluated one by one.
@@ -119,21 +119,21 @@ def search(
     _starts(explorer, signs, rows, rng, visits, use_all)
     explorer.reserve = 0
     try:
-        checked = _confirmed(explorer, [_weighted(explorer.known, signs, row) for row in rows], rng)
+        checked = _confirmed(explorer, [_weighted(explorer.points, signs, row) for row in rows], rng)
     except Spent:
         checked = False
-    size = len(explorer.known.u)
+    size = len(explorer.points.u)
     if use_all:
         _starts(explorer, signs, rows, rng, visits, use_all)
-    known = explorer.known
-    objectives = [_weighted(known, signs, row) for row in rows]
-    checked &= all(_reached(known, objective, visits) for objective in objectives)
+    points = explorer.points
+    objectives = [_weighted(points, signs, row) for row in rows]
+    checked &= all(_reached(points, objective, visits) for objective in objectives)
     # Evaluations after these steps have not improved the optima.
-    checked &= all(_best(known, objective) < size for objective in objectives)
-    merits = [known.merit(objective) for objective in objectives if known.feasible.any()]
-    rounding = [_rounding(known, merit, merit.min()) for merit in merits] or [0.0] * len(rows)
-    best = [float(_ends(known, objective, [np.arange(len(known.u))])[0]) for objective in objectives]
-    return Ending(checked, [_ends(known, objective, visits) for objective in objectives], rounding, best)
+    checked &= all(_best(points, objective) < size for objective in objectives)
+    merits = [points.merit(objective) for objective in objectives if points.feasible.any()]
+    rounding = [_rounding(points, merit, merit.min()) for merit in merits] or [0.0] * len(rows)
+    best = [float(_ends(points, objective, [np.arange(len(points.u))])[0]) for objective in objectives]
+    return Ending(checked, [_ends(points, objective, visits) for objective in objectives], rounding, best)
 
 
 def _starts(
@@ -142,7 +142,7 @@ def _starts(
 ) -> None:  # fmt: skip
     """Start until each row's optimum is confirmed, or with `use_all` until evaluations, or designs, are used up.
 
-    The rows of `explorer.known` that each start visits are added to `visits`.
+    The rows of `explorer.points` that each start visits are added to `visits`.
     """
     open_ = list(rows)
     while open_ and explorer.left > explorer.reserve:
@@ -160,8 +160,8 @@ def _starts(
         if explorer.left == left:
             return
         if not use_all:
-            known = explorer.known
-            open_ = [row for row in open_ if not _reached(known, _weighted(known, signs, row), visits)]
+            points = explorer.points
+            open_ = [row for row in open_ if not _reached(points, _weighted(points, signs, row), visits)]
 
 
 def _start(
@@ -177,14 +177,14 @@ def _start(
         _extremes(explorer, signs, rng, allowed)
     for row in rows:
         most = min(EVOLUTION * (n + 1), int(EVOLUTION_PART * allowed) // len(rows))
-        evolve(explorer, _weighted(explorer.known, signs, row), rng, most)
+        evolve(explorer, _weighted(explorer.points, signs, row), rng, most)
     room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
     most = int(np.clip(room // 2, 1, ROUGH_MAX_DESCENTS if explorer.rough else MAX_DESCENTS))
-    known, descents = explorer.known, []
+    points, descents = explorer.points, []
     for row in rows:
-        objective = _weighted(known, signs, row)
-        apart = _apart(known, objective, explorer.visited, most, START_DISTANCE)
-        apart += _apart(known, objective, np.setdiff1d(begin, apart), most, SAMPLE_DISTANCE)
+        objective = _weighted(points, signs, row)
+        apart = _apart(points, objective, explorer.visited, most, START_DISTANCE)
+        apart += _apart(points, objective, np.setdiff1d(begin, apart), most, SAMPLE_DISTANCE)
         descents += [(objective, k) for k in apart]
     descend(explorer, descents)
 
@@ -195,39 +195,39 @@ def _extremes(explorer: Explorer, signs: Floats, rng: np.random.Generator, allow
     ends = [sign * line for line in np.eye(goals) for sign in (1.0, -1.0)]
     for end in np.diag(signs):
         evolve(explorer, end, rng, int(EVOLUTION_PART * allowed) // (4 * goals))
-    descend(explorer, [(end, k) for end in ends for k in [_best(explorer.known, end)]])
+    descend(explorer, [(end, k) for end in ends for k in [_best(explorer.points, end)]])
 
 
-def _apart(known: Known, objective: Floats, rows: Ints, most: int, distance: float) -> list[int]:
+def _apart(points: Points, objective: Floats, rows: Ints, most: int, distance: float) -> list[int]:
     """The best of some rows, each at least `distance` from the others."""
-    merit, u = known.merit(objective)[rows], known.u[rows]
-    found: list[int] = []
+    merit, u = points.merit(objective)[rows], points.u[rows]
+    chosen: list[int] = []
     free = np.isfinite(merit)
-    while free.any() and len(found) < most:
+    while free.any() and len(chosen) < most:
         k = int(np.argmin(np.where(free, merit, np.inf)))
-        found.append(int(rows[k]))
+        chosen.append(int(rows[k]))
         free &= np.abs(u - u[k]).max(axis=1) > distance
-    return found
+    return chosen
 
 
 def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective, with descents from points that one improves."""
     n, open_ = explorer.dimensions, list(objectives)
     for _ in range(MAX_CHECKS):
-        known = explorer.known
-        starts = [_best(known, objective) for objective in open_]
-        if not known.feasible[starts].all():
+        points = explorer.points
+        starts = [_best(points, objective) for objective in open_]
+        if not points.feasible[starts].all():
             return False
-        before = [known.merit(objective)[start] for objective, start in zip(open_, starts, strict=True)]
+        before = [points.merit(objective)[start] for objective, start in zip(open_, starts, strict=True)]
         descend(explorer, list(zip(open_, starts, strict=True)), width=CHECK_WIDTH)
-        bests = [_best(explorer.known, objective) for objective in open_]
+        bests = [_best(explorer.points, objective) for objective in open_]
         steps = [np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))]) for _ in open_]
-        points = [explorer.known.u[best] + CHECK_STEP * around for best, around in zip(bests, steps, strict=True)]
-        explorer(np.concatenate(points))
+        trials = [explorer.points.u[best] + CHECK_STEP * around for best, around in zip(bests, steps, strict=True)]
+        explorer(np.concatenate(trials))
         moving = []
         for objective, best, begun in zip(open_, bests, before, strict=True):
-            merit = explorer.known.merit(objective)
-            little = _rounding(explorer.known, merit, merit[best], NOISE if explorer.rough else ROUNDING)
+            merit = explorer.points.merit(objective)
+            little = _rounding(explorer.points, merit, merit[best], NOISE if explorer.rough else ROUNDING)
             still = begun - merit[best] > max(ENDED_GAIN * abs(merit[best]), little)
             if still or merit[best] - merit.min() > little:
                 moving.append(objective)
@@ -237,34 +237,34 @@ def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.
     return False
 
 
-def _best(known: Known, objective: Floats) -> int:
-    return int(np.argmin(known.merit(objective)))
+def _best(points: Points, objective: Floats) -> int:
+    return int(np.argmin(points.merit(objective)))
 
 
-def _rounding(known: Known, merit: Floats, value: float, part: float = ROUNDING) -> float:
+def _rounding(points: Points, merit: Floats, value: float, part: float = ROUNDING) -> float:
     """How far values of an objective may differ and still count as the same."""
-    inside = merit[known.feasible]
+    inside = merit[points.feasible]
     return part * abs(value) + RANGE_ROUNDING * float(np.ptp(inside) if inside.size else 0.0)
 
 
-def _ends(known: Known, objective: Floats, visits: Sequence[Ints]) -> Floats:
+def _ends(points: Points, objective: Floats, visits: Sequence[Ints]) -> Floats:
     """The smallest objective that each start found; nan where that is not feasible."""
-    merit = np.where(known.feasible, known.merit(objective), np.inf)
+    merit = np.where(points.feasible, points.merit(objective), np.inf)
     ends = np.array([merit[rows].min(initial=np.inf) for rows in visits])
     return np.where(np.isfinite(ends), ends, np.nan)
 
 
-def _reached(known: Known, objective: Floats, visits: Sequence[Ints]) -> bool:
+def _reached(points: Points, objective: Floats, visits: Sequence[Ints]) -> bool:
     """Whether `CONFIRMATIONS` starts, and half of all, came to the best value of an objective.
 
     Where no point is feasible, twice as many starts have to come to the least violation of the conditions.
     """
-    if known.feasible.any():
-        ends, needed = _ends(known, objective, visits), CONFIRMATIONS
-        least = float(known.merit(objective).min())
-        same = max(SAME_OPTIMUM * abs(least), _rounding(known, known.merit(objective), least))
+    if points.feasible.any():
+        ends, needed = _ends(points, objective, visits), CONFIRMATIONS
+        least = float(points.merit(objective).min())
+        same = max(SAME_OPTIMUM * abs(least), _rounding(points, points.merit(objective), least))
     else:
-        merit, needed = known.merit(objective), 2 * CONFIRMATIONS
+        merit, needed = points.merit(objective), 2 * CONFIRMATIONS
         ends = np.array([merit[rows].min(initial=np.inf) for rows in visits]) / CONDITION_MISSED - 1
         least = float(ends.min())
         same = SAME_OPTIMUM * least
@@ -282,11 +282,11 @@ def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> 
     return np.concatenate([vertices, u])
 
 
-def _weighted(known: Known, signs: Floats, row: Sequence[float]) -> Floats:
+def _weighted(points: Points, signs: Floats, row: Sequence[float]) -> Floats:
     """Factors of the goals in their weighted sum [S1, eq. 28], less being better; of a single goal its sign."""
     if np.count_nonzero(row) == 1:
         return np.asarray(signs * np.sign(row))
-    values = known.values[known.feasible if known.feasible.any() else known.valid]
+    values = points.values[points.feasible if points.feasible.any() else points.valid]
     span = np.ptp(values, axis=0) if len(values) else np.ones(len(row))
     return np.asarray(np.asarray(row) * signs / np.where(span > 0, span, np.inf))
 
@@ -306,10 +306,10 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, most
     if most < size:
         return
     rows = explorer.visited
-    order = rows[np.argsort(explorer.known.merit(objective)[rows], kind="stable")]
+    order = rows[np.argsort(explorer.points.merit(objective)[rows], kind="stable")]
     best, others = order[: size // 2], order[size // 2 :]
     chosen = np.concatenate([best, rng.permutation(others)[: size - len(best)]])
-    population = explorer.known.u[chosen]
+    population = explorer.points.u[chosen]
     if len(population) < size:
         population = np.concatenate([population, rng.random((size - len(population), explorer.dimensions))])
     lowest: list[float] = []
@@ -317,15 +317,15 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, most
 
     def energies(u: Floats) -> Floats:
         rows = explorer(u.T)
-        merit = explorer.known.merit(objective)[rows]
+        merit = explorer.points.merit(objective)[rows]
         lowest.append(min([float(merit.min()), *lowest[-1:]]))
         return np.asarray(np.where(np.isfinite(merit), merit, UNKNOWN))
 
     def stalls(x: Floats, convergence: float) -> bool:
         if len(lowest) <= most_stalled:
             return False
-        known = explorer.known
-        inside = known.merit(objective)[known.feasible]
+        points = explorer.points
+        inside = points.merit(objective)[points.feasible]
         gained = lowest[-1 - most_stalled] - lowest[-1]
         return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(lowest[-1])))
 

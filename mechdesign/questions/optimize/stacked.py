@@ -29,7 +29,7 @@ from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness import analysis as stiffness
 from mechdesign.questions.stiffness.body import ask
 from mechdesign.results import Result, Scope
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.poses import Poses
@@ -81,8 +81,8 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
     if remeasured(study, names):
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
-    asked = [section for section in (getattr(study, command), study.kinematics) if section is not None]
-    return not any(section.at_nodes for section in asked) and not any(
+    sections = [section for section in (getattr(study, command), study.kinematics) if section is not None]
+    return not any(section.at_nodes for section in sections) and not any(
         study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     )
 
@@ -110,8 +110,8 @@ def grouped(
 
 
 def tables(
-    study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None,
-    asked: Collection[Asked] = (),
+    study: Study, command: str, names: Collection[str], poses: Poses, outputs: Collection[str] | None = None,
+    requests: Collection[Request] = (),
 ) -> Stack:  # fmt: skip
     """Answers of a command for the poses of several designs.
 
@@ -121,7 +121,7 @@ def tables(
         Names of tables.
     outputs : collection of str, optional
         Of the extremes; all where left out.
-    asked : collection of Asked
+    requests : collection of Request
         Columns that are followed between the poses.
     """
     solved: list[SolvedPoses] = []
@@ -130,32 +130,32 @@ def tables(
     if command == "kinematics":
         motion = move(motion_question(study, poses), also=solved.append)
         question, absent = motion.question, motion.question.absent
-        loops = four_bars(study.mechanism) if "loops" in wanted else ()
-        errors = question.errors if "targets" in wanted else ()
-        along = along_of(question, outputs, loops, also=errors, requests=asked)
+        loops = four_bars(study.mechanism) if "loops" in names else ()
+        errors = question.errors if "targets" in names else ()
+        along = along_of(question, outputs, loops, also=errors, requests=requests)
         scope = Scope(course=partial(course_of, along)) if along is not None else None
-        found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}
-        if "extremes" in wanted:
-            found["extremes"] = extremes(motion, along, outputs)
+        built = {name: replace(table, scope=scope) for name, table in pose_tables(motion, names).items()}
+        if "extremes" in names:
+            built["extremes"] = extremes(motion, along, outputs)
         if loops:
-            found["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
-        if motion.errors and "targets" in wanted:
-            found["targets"] = targets_table(motion, along)
+            built["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
+        if motion.errors and "targets" in names:
+            built["targets"] = targets_table(motion, along)
         reason = motion.reason
     elif command == "dynamics":
         motion = move(force_question(study, poses), also=solved.append)
-        found, along = dynamics.tables(motion, motion.question, wanted, outputs, asked)
+        built, along = dynamics.tables(motion, motion.question, names, outputs, requests)
         scope = Scope(course=partial(course_of, along)) if along is not None else None
-        found = {name: replace(table, scope=scope) for name, table in found.items()}
+        built = {name: replace(table, scope=scope) for name, table in built.items()}
         reason = motion.reason
     elif command == "reliability":
-        found, reason, solved = reliability.first_order_tables(study, poses, wanted)
+        built, reason, solved = reliability.first_order_tables(study, poses, names)
     else:
         body, solved = ask(study), list(solve_poses(study, poses))
-        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(wanted))
-        found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
+        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(names))
+        built, reason = stiffness.tables(study, body, poses, held, names), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
-    return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
+    return Stack(Result(command, built, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:
@@ -176,17 +176,17 @@ def shortfall(margins: Floats) -> Floats:
 def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
     """Margins of some poses, shape (poses, margins)."""
     configuration, size = solved.configuration, mechanism.size
-    found: list[Value] = [closure / size**2 for closure in configuration.closures]
+    margins: list[Value] = [closure / size**2 for closure in configuration.closures]
     if mechanism.plan(solved.names).iterative:
         assembled = (configuration.reason == Reason.OK) | (configuration.reason == Reason.LIMIT)
-        found.append(np.where(assembled, 1.0, -1.0))
-    found += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]
+        margins.append(np.where(assembled, 1.0, -1.0))
+    margins += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]
     places = {**mechanism.nominal, **configuration.places}
     with np.errstate(all="ignore"):
-        found += [
+        margins += [
             margin / bound.scale(size)
             for bound in mechanism.bounds
             for _, margin in bound.margins(configuration, places)
         ]
-    columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in found]
+    columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in margins]
     return np.stack(columns, axis=1) if columns else np.empty((*configuration.shape, 0))

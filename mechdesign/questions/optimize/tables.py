@@ -63,12 +63,12 @@ def designs_table(designs: Designs) -> Table:
 def nearest_table(designs: Designs, row: int) -> Table:
     """The value of each condition of an infeasible design, and by how much it misses the bound."""
     if word := designs.words[designs.codes[row]]:
-        found = [(word, np.nan, np.nan, designs.shortfall[row], "")]
+        rows = [(word, np.nan, np.nan, designs.shortfall[row], "")]
     else:
-        found = [
+        rows = [
             (
                 condition.name,
-                value := designs.found[condition][row],
+                value := designs.results[condition][row],
                 condition.bound,
                 max(0.0, -condition.margin(value)),
                 unit,
@@ -77,7 +77,7 @@ def nearest_table(designs: Designs, row: int) -> Table:
                 designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True
             )
         ]
-    names, values, bounds_of, missing, units = zip(*found, strict=True)
+    names, values, bounds_of, missing, units = zip(*rows, strict=True)
     return NEAREST.table(NEAREST.columns(
         {}, condition=np.array(names, dtype=object), value=np.array(values), bound=np.array(bounds_of),
         missing=np.array(missing), unit=np.array(units, dtype=object),
@@ -143,7 +143,7 @@ def _active(designs: Designs) -> NDArray[np.object_]:
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
             words += [f"{name} {' and '.join(sides)}"] if sides else []
     for condition in designs.conditions:
-        values = designs.found[condition]
+        values = designs.results[condition]
         far = AT_BOUND * max(abs(condition.bound), np.ptp(values[designs.feasible]))
         for words, value in zip(held, values[rows].tolist(), strict=True):
             words += [condition.name] if abs(value - condition.bound) <= far else []
@@ -163,13 +163,13 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
     neighbours = dict(zip(variables, moved.reshape(-1, len(variables)).T, strict=True))
     inside = _inside(study, neighbours).reshape(moved.shape[:-1])
     inside &= (moved != optima[:, None, None]).any(axis=-1)
-    asked, back = np.unique(moved[inside], axis=0, return_inverse=True)
-    judge.progress.start(len(asked), "neighbours of the optimum")
-    found, layout = judge.evaluate(dict(zip(variables, asked.T, strict=True))), judge.layout
-    values, feasible = found[:, layout.values], found[:, layout.code] == 0
+    candidates, back = np.unique(moved[inside], axis=0, return_inverse=True)
+    judge.progress.start(len(candidates), "neighbours of the optimum")
+    results, layout = judge.evaluate(dict(zip(variables, candidates.T, strict=True))), judge.layout
+    values, feasible = results[:, layout.values], results[:, layout.code] == 0
     for condition in judge.conditions:
         feasible &= condition.met(values[:, layout.column[condition]])
-    which = np.full(inside.shape, len(asked))
+    which = np.full(inside.shape, len(candidates))
     which[inside] = back.ravel()
     changes = np.empty(inside.shape)
     for row, (weights, winner) in enumerate(zip(designs.weights, designs.winners, strict=True)):
@@ -185,10 +185,10 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
 
 def _inside(study: Study, designs: Batch) -> Flags:
     """Which designs lie inside all bounds."""
-    found = np.ones(len(next(iter(designs.values()))), dtype=bool)
+    inside = np.ones(len(next(iter(designs.values()))), dtype=bool)
     for name in ranges(study):
         values = designs[name]
         low, high = bounds(study, designs, name, len(values))
         slack = BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
-        found &= (low - slack <= values) & (values <= high + slack)
-    return found
+        inside &= (low - slack <= values) & (values <= high + slack)
+    return inside

@@ -144,23 +144,23 @@ def grid(study: Study) -> dict[str, Floats]:
             if total:
                 message = f"the grid has {total} designs; {MAX_DESIGNS} is the limit: take larger steps"
             raise StudyError((study.problem(message, "optimize", "variables", name),))
-        each = counts.astype(int)
-        index = np.arange(total) - np.repeat(np.cumsum(each) - each, each)
-        columns = {key: np.repeat(values, each) for key, values in columns.items()}
-        columns[name] = _valued(variable, np.repeat(low, each) + index * np.repeat(step, each))
+        repeats = counts.astype(int)
+        index = np.arange(total) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        columns = {key: np.repeat(values, repeats) for key, values in columns.items()}
+        columns[name] = _valued(variable, np.repeat(low, repeats) + index * np.repeat(step, repeats))
     return columns
 
 
 def steps(study: Study, at: Batch) -> dict[str, Floats]:
     """The step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range."""
-    found = {}
+    widths = {}
     for name in ranges(study):
         variable = variables_of(study)[name]
         low, high = bounds(study, at, name, len(at[name]))
         intervals = 100 if variable.number is None else max(variable.number - 1, 1)
         fixed = variable.step or float(variable.integer)
-        found[name] = np.full(len(low), fixed) if fixed else (high - low) / intervals
-    return found
+        widths[name] = np.full(len(low), fixed) if fixed else (high - low) / intervals
+    return widths
 
 
 def shown(study: Study, name: str, values: Floats) -> NDArray[Any]:
@@ -197,9 +197,9 @@ def parted(study: Study, design: Design) -> tuple[Study, dict[str, float]]:
     StudyError
         If the entries make no study.
     """
-    known = study.parameters.names()
-    changes = [entry_of(study, name, value) for name, value in design.items() if name not in known]
-    numbers = {name: float(value) for name, value in design.items() if name in known}
+    parameters = study.parameters.names()
+    changes = [entry_of(study, name, value) for name, value in design.items() if name not in parameters]
+    numbers = {name: float(value) for name, value in design.items() if name in parameters}
     return with_entries(study, changes) if changes else study, numbers
 
 

@@ -341,7 +341,7 @@ def _unreachable(last: _Round) -> str:
 
 
 def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst: int) -> str:
-    """How to have held clearances and loads allocated too, where that reaches the target; else empty."""
+    """Advice to allocate the held clearances and loads too, if that reaches the target; else empty."""
     section, tolerances = ReliabilitySection.of(model.task.study), model.tolerances
     free = [k for k in held if tolerances[k].kind != "measured"]
     names = [tolerances[k].name for k in free]

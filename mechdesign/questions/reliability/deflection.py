@@ -186,7 +186,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     # A point named without its link is the ground's where the ground has it, else that of the first link.
     pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
     if stiffness.at == stiffness.point:
-        pins[graph.node(stiffness.at)] = (network.asked,)
+        pins[graph.node(stiffness.at)] = (network.target,)
     for point, owners in links_meant(section, stiffness, graph).items():
         node = graph.node(point)
         if point in stiffness.bearings and (len(owners) == 1 or point != stiffness.at):

@@ -280,9 +280,9 @@ class _Cautions:
 
     def __init__(self, study: Study, poses: Poses, body: Body, held: Held) -> None:
         self.study, self.poses, self.margin = study, poses, held.margin
-        known = (held.rank > 0) | np.isfinite(held.stiffness).all(axis=(1, 2))
-        self.loose = known & (held.rank < body.size)
-        self.near = known & (held.rank == body.size) & (held.margin < NEAR_SINGULAR)
+        finite = (held.rank > 0) | np.isfinite(held.stiffness).all(axis=(1, 2))
+        self.loose = finite & (held.rank < body.size)
+        self.near = finite & (held.rank == body.size) & (held.margin < NEAR_SINGULAR)
         self.points, self.legs = _without_beam(study, body), _without_joint(body)
 
     def of(self, rows: slice) -> list[Caution]:

@@ -173,13 +173,13 @@ def by_forces(body: Body, configuration: Configuration, *, loads: bool = False) 
 
 def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[complex, complex, float]]]:
     """By the number of each load elsewhere but that of dynamics, its places, forces and moments in a single pose."""
-    found: dict[int, list[tuple[complex, complex, float]]] = {}
+    forces: dict[int, list[tuple[complex, complex, float]]] = {}
     for _, wrench in _applied(body, configuration).vertices if body.others else ():
         k = body.others[wrench.case]
         if k < len(body.given.loads):
             fx, fy, mz = wrench.about(wrench.place)[:, 0].tolist()
-            found.setdefault(k, []).append((complex(wrench.place[0]), complex(fx, fy), mz))
-    return found
+            forces.setdefault(k, []).append((complex(wrench.place[0]), complex(fx, fy), mz))
+    return forces
 
 
 @quiet

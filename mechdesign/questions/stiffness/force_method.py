@@ -298,7 +298,7 @@ def _strained(compliance: Floats, bears: Floats, initial: Floats | None) -> Floa
 def _ways(network: Network) -> tuple[Floats, Floats]:
     """Directions of the edges around each loop, shape (loops, edges), and on the path to the asked body, (edges,)."""
     loops = np.array([network.signs(loop) for loop in network.loops]).reshape(-1, len(network.edges))
-    return loops, network.signs(network.paths[network.asked])
+    return loops, network.signs(network.paths[network.target])
 
 
 @dataclass(frozen=True, eq=False)
@@ -488,6 +488,6 @@ def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configu
         dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
         effects.places[:, row] = configuration.point(point)
         effects.moves[:, row] = dx + 1j * dy + 1j * turn * (effects.places[:, row] - origin)[:, None]
-    others = loaded.displacements[network.asked][:, :size, size:] @ applied[:, size:]
+    others = loaded.displacements[network.target][:, :size, size:] @ applied[:, size:]
     effects.moved[:] = others.swapaxes(1, 2)
     return effects

@@ -45,11 +45,11 @@ class Leg:
 def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
     """The legs that carry the asked body, in the order of their `links`; None where they are not serial."""
     legs: list[tuple[int, Leg]] = []
-    for piece in _pieces(bodies.carrying, bodies.asked):
+    for piece in _pieces(bodies.carrying, bodies.target):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
-        if not {GROUND, bodies.asked} <= ends:
+        if not {GROUND, bodies.target} <= ends:
             continue
-        path = _path(piece, bodies.asked)
+        path = _path(piece, bodies.target)
         if path is None or any(isinstance(element, Shift) for edge in piece for element in edge.elements):
             return None
         names = [name for end in path[1:-1] if (name := link_of(end.split("@")[0]))]
@@ -59,13 +59,13 @@ def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
     return tuple(leg for _, leg in sorted(legs, key=lambda numbered: numbered[0]))
 
 
-def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEdge]]:
-    """Edges by the pieces into which the network falls without the ground and the asked body."""
+def _pieces(edges: Sequence[NetworkEdge], body: str) -> Iterator[list[NetworkEdge]]:
+    """Edges by the pieces into which the network falls without the ground and the body."""
     remaining = list(edges)
     while remaining:
         piece, reached = [remaining.pop(0)], set[str]()
         while True:
-            reached |= {end for edge in piece for end in (edge.a, edge.b)} - {GROUND, asked}
+            reached |= {end for edge in piece for end in (edge.a, edge.b)} - {GROUND, body}
             touching = [edge for edge in remaining if edge.a in reached or edge.b in reached]
             if not touching:
                 break
@@ -74,11 +74,11 @@ def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEd
         yield piece
 
 
-def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
-    """Vertices from the ground to the asked body; None where they are no plain path. Sorts `piece` in this order."""
+def _path(piece: list[NetworkEdge], body: str) -> list[str] | None:
+    """Vertices from the ground to the body; None unless they are a plain path. Sorts `piece` in this order."""
     path, remaining = [GROUND], list(piece)
     piece.clear()
-    while path[-1] != asked:
+    while path[-1] != body:
         onward = [edge for edge in remaining if path[-1] in (edge.a, edge.b)]
         if len(onward) != 1:
             return None

@@ -27,7 +27,7 @@ from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
-ASKED = ":asked"
+TARGET = ":asked"
 # Edges along a path, each with its direction: 1 from `a` to `b`, -1 from `b` to `a`.
 EdgePath = tuple[tuple[int, int], ...]
 
@@ -62,8 +62,8 @@ class Bodies:
 
     Parameters
     ----------
-    asked : str
-        The body whose stiffness is computed: that of the `link`, or `ASKED` for a pin or the end of an elastic link.
+    target : str
+        The body whose stiffness is computed: that of the `link`, or `TARGET` for a pin or the end of an elastic link.
     link : str or None
         None for a pin.
     points : mapping of str to tuple of (str, str)
@@ -73,7 +73,7 @@ class Bodies:
     """
 
     edges: tuple[NetworkEdge, ...]
-    asked: str
+    target: str
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str]
@@ -84,7 +84,7 @@ class Bodies:
         edges = list(self.edges)
         while True:
             degree = Counter(end for edge in edges for end in (edge.a, edge.b))
-            loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, self.asked)}
+            loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, self.target)}
             if not loose:
                 return edges
             edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
@@ -92,7 +92,7 @@ class Bodies:
 
 def link_of(body: str) -> str:
     """The link to which a body belongs; empty for a massless body."""
-    return "" if body.startswith((PIN, "slot:", ASKED)) else body.removesuffix(":rod")
+    return "" if body.startswith((PIN, "slot:", TARGET)) else body.removesuffix(":rod")
 
 
 def is_pin(body: str) -> bool:
@@ -111,8 +111,8 @@ def build_bodies(
     graph, description = mechanism.graph, mechanism.description
 
     holder = graph.holder
-    asked = ASKED if link is None or link in section.elastic else holder(link, at)
-    builder = _Builder(mechanism, section, asked, loaded)
+    target = TARGET if link is None or link in section.elastic else holder(link, at)
+    builder = _Builder(mechanism, section, target, loaded)
     holders: dict[str, list[str]] = {}
     for body, point in graph.points:
         if ":" not in point:
@@ -133,10 +133,10 @@ def build_bodies(
             other = f"slot:{name}"
             holders[joint.point].append(other)
         builder.slide(name, holder(line.link, through), other, joint.point)
-    if asked == ASKED:
-        holders[at].append(ASKED)
+    if target == TARGET:
+        holders[at].append(TARGET)
         if link is not None:
-            clamps.append((holder(link, at), ASKED, at))
+            clamps.append((holder(link, at), TARGET, at))
     for a, b, point in clamps:
         builder.join(a, b, (), point, point)
     pins = {point: _clusters(point, bodies, clamps) for point, bodies in holders.items()}
@@ -149,7 +149,7 @@ def build_bodies(
         builder.spring(spring, holders)
     for name in section.elastic:
         builder.beams(name)
-    return Bodies(tuple(builder.edges), asked, link, builder.points(), builder.pins)
+    return Bodies(tuple(builder.edges), target, link, builder.points(), builder.pins)
 
 
 @dataclass
@@ -162,7 +162,7 @@ class _Builder:
 
     mechanism: Mechanism
     section: StiffnessSection
-    asked: str
+    target: str
     loaded: Collection[str]
     edges: list[NetworkEdge] = field(default_factory=list)
     riding: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -193,12 +193,12 @@ class _Builder:
                 self.pins[point] = self._vertex(self._hinged_body(cluster), point)
             return
         fixed = next((cluster for cluster in clusters if GROUND in cluster), None)
-        hub = fixed or next((cluster for cluster in clusters if self.asked in cluster), None)
+        hub = fixed or next((cluster for cluster in clusters if self.target in cluster), None)
         # The ground and the asked body hold each cluster directly; an asked pin lies midway between two links.
-        if hub is None or not (fixed or hub == [ASKED] or len(clusters) == 2 or point not in self.section.bearings):
+        if hub is None or not (fixed or hub == [TARGET] or len(clusters) == 2 or point not in self.section.bearings):
             hub = clusters[0] if len(clusters) == 2 and point not in self.loaded else [PIN + point]
         give = 0.5 if len(clusters) == 2 and is_pin(hub[0]) else 1.0
-        if hub == [ASKED]:
+        if hub == [TARGET]:
             give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0)
         self.pins[point] = self._vertex(self._hinged_body(hub), point)
         for cluster in clusters:
@@ -296,7 +296,7 @@ class _Builder:
 
     def _hinged_body(self, cluster: list[str]) -> str:
         """The body of a cluster to which others are hinged: the ground or the asked body, or else the first."""
-        return next((body for body in (GROUND, self.asked) if body in cluster), cluster[0])
+        return next((body for body in (GROUND, self.target) if body in cluster), cluster[0])
 
 
 def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
@@ -311,7 +311,7 @@ def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]])
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Vertices, edges and loops that carry the `asked` body.
+    """Vertices, edges and loops that carry the `target` body.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ class Network:
     """
 
     edges: tuple[NetworkEdge, ...]
-    asked: str
+    target: str
     paths: Mapping[str, EdgePath]
     loops: tuple[EdgePath, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
@@ -373,12 +373,12 @@ def build_network(bodies: Bodies, *, whole: bool = False) -> Network:
 
 def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:
     """Edges with each massless pin clamped to the first link that it joins, so that the pin cannot turn freely."""
-    pinned, seen = list[NetworkEdge](), set[str]()
+    pinned, done = list[NetworkEdge](), set[str]()
     for edge in edges:
-        pins = {end for end in (edge.a, edge.b) if is_pin(end) or (end == ASKED and bodies.link is None)}
-        if pins - seen:
+        pins = {end for end in (edge.a, edge.b) if is_pin(end) or (end == TARGET and bodies.link is None)}
+        if pins - done:
             edge = replace(edge, elements=tuple(element for element in edge.elements if not isinstance(element, Hinge)))
-        seen |= pins
+        done |= pins
         pinned.append(edge)
     return pinned
 
@@ -417,4 +417,4 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
                 for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
-    return Network(edges, bodies.asked, paths, tuple(loops), bodies.points, bodies.pins)
+    return Network(edges, bodies.target, paths, tuple(loops), bodies.points, bodies.pins)

@@ -110,7 +110,7 @@ class Bearing(fields.Model):
 
 def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
-    parts = {f"k{number}": read_number(each, context) for number, each in enumerate(fields.as_list(raw))}
+    parts = {f"k{number}": read_number(entry, context) for number, entry in enumerate(fields.as_list(raw))}
     if not parts:
         raise failure("expected a stiffness, or a list of those in series, [1e6, 2e6]")
     for part in parts.values():

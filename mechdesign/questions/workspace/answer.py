@@ -54,8 +54,10 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     designs = question.rays_through(question.field, places, count, question.about, question.scan, effort)
     panels, pieces = counted(designs, tuple(sorted(set(question.counted) - set(question.scan))))
     if not panels.closes.any():
-        nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
-        errors = {name: np.maximum(panels.seen, panels.unseen) * (name == "area") for name in question.wanted}
+        nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.columns}
+        errors = {
+            name: np.maximum(panels.raster_area, panels.undecided) * (name == "area") for name in question.columns
+        }
         return Evaluation(nothing, errors, panels, pieces)
     gauss = question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
@@ -76,9 +78,9 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         means[some] = simple_means(panels, finite, question.rule, question.nodes, question.rays, question.counted)
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
-    missing = np.where(every, panels.seen - integral.area, 0.0)
-    results = {"area": (integral.area, np.maximum(integral.area_error + panels.unseen, missing))}
-    if {"SUI", "box_area"} & set(question.wanted):
+    missing = np.where(every, panels.raster_area - integral.area, 0.0)
+    results = {"area": (integral.area, np.maximum(integral.area_error + panels.undecided, missing))}
+    if {"SUI", "box_area"} & set(question.columns):
         box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = integral.area / box
@@ -91,7 +93,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
             results[column] = peaks.of(name, kind)
         else:
             results[column] = (_mean if kind == "mean" else _spread)(integrands, means, doubts, name)
-    values, errors = ({name: results[name][k] for name in question.wanted} for k in (0, 1))
+    values, errors = ({name: results[name][k] for name in question.columns} for k in (0, 1))
     return Evaluation(values, errors, panels, pieces)
 
 
@@ -103,7 +105,7 @@ def area_in_any_assembly(question: Question) -> float:
     if not any(name.startswith("assembly ") for _, name in question.field.labels):
         return 0.0
     both = replace(question.field, same_assembly=False)
-    every = replace(question, field=both, indices=(), wanted=("area",), rule="gauss", tolerance=LOOSE)
+    every = replace(question, field=both, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
     try:
         return float(answer(every, {}, 1, BATCH).values["area"][0])
     except AssemblyError:

@@ -71,9 +71,9 @@ class Prepared:
     @quiet
     def values(self, local: Local) -> Value:
         """Values at points, computed once."""
-        if self.name not in local.known:
-            local.known[self.name] = self.evaluate(local)
-        return local.known[self.name]
+        if self.name not in local.values:
+            local.values[self.name] = self.evaluate(local)
+        return local.values[self.name]
 
 
 def prepare(study: Study, names: Sequence[str]) -> tuple[Prepared, ...]:

@@ -16,10 +16,10 @@ from mechdesign.region.rays import Designs
 
 @dataclass(frozen=True, eq=False)
 class Local(Jacobian):
-    """The Jacobian of a field's outputs at a batch of points; `known` holds the indices computed so far."""
+    """The Jacobian of a field's outputs at a batch of points; `values` holds the indices computed so far."""
 
     configuration: Configuration
-    known: dict[str, Value] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
 
     @staticmethod
     def at(field: Field, z: Complexes, places: Places) -> Local:

@@ -39,8 +39,8 @@ class Question(Region):
     counted : (float, float)
         Range of angle that the means are taken over (radians).
     indices : tuple of Prepared
-        Local indices that `wanted` needs.
-    wanted : tuple of str
+        Local indices that the columns need.
+    columns : tuple of str
         Columns of the answer.
     shown : tuple of Prepared
         Local indices of the table of nodes: those of `MEANS`, then the others.
@@ -53,14 +53,14 @@ class Question(Region):
     tolerance: float
     nodes: int | None
     indices: tuple[Prepared, ...]
-    wanted: tuple[str, ...]
+    columns: tuple[str, ...]
     shown: tuple[Prepared, ...]
     rays_through: type[Designs] = Designs
 
     @cached_property
     def statistics(self) -> dict[str, tuple[str, str]]:
-        """Local index and statistic of the wanted columns that have them."""
-        return {column: both for column in self.wanted if any(both := split(column))}
+        """Local index and statistic of the columns that have them."""
+        return {column: both for column in self.columns if any(both := split(column))}
 
     @property
     def where(self) -> str:
@@ -70,7 +70,7 @@ class Question(Region):
 
     @property
     def integrands(self) -> list[Integrand]:
-        """What the wanted means and standard deviations need: the indices, and their squares."""
+        """What the means and standard deviations need: the indices, and their squares."""
         statistics = self.statistics.values()
         return [
             Integrand(index, power)
@@ -81,14 +81,14 @@ class Question(Region):
 
     @property
     def extremes(self) -> Flags:
-        """Whether the infimum, and the supremum of each index is wanted, shape (2, indices)."""
+        """Whether the infimum, and the supremum of each index is needed, shape (2, indices)."""
         statistics = self.statistics.values()
         return np.array([[(index.name, kind) in statistics for index in self.indices] for kind in ("min", "max")])
 
 
-def columns(names: Iterable[str]) -> tuple[str, ...]:
+def columns_of(indices: Iterable[str]) -> tuple[str, ...]:
     """Columns of a workspace with these local indices."""
-    return (*COLUMNS, *(f"{name}_{kind}" for name in names for kind in STATISTICS))
+    return (*COLUMNS, *(f"{name}_{kind}" for name in indices for kind in STATISTICS))
 
 
 def split(column: str) -> tuple[str, str]:
@@ -115,14 +115,14 @@ def batched(column: str) -> bool:
     return column in COLUMNS or bool(name and needed_section(name) is None)
 
 
-def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
+def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str] | None = None) -> list[Question]:
     """One question a value of ``at``; over a range of one of them one for all its values.
 
     Parameters
     ----------
     tolerance : float
         Of the integrals where the study says none.
-    wanted : sequence of str, optional
+    columns : sequence of str, optional
         Columns of the answer; left out, all of those indices that the study asks for, over a range `OF_RANGE`.
 
     Raises
@@ -133,34 +133,34 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     section = study.workspace
     over = {} if section is None else {name: values for name, values in section.at.items() if isinstance(values, Over)}
     for name, values in over.items():
-        return list(_over_range(study, name, values, tolerance, OF_RANGE if wanted is None else wanted))
-    if section is not None and wanted is None:
-        wanted = columns(USUAL if section.indices is None else section.indices)
+        return list(_over_range(study, name, values, tolerance, OF_RANGE if columns is None else columns))
+    if section is not None and columns is None:
+        columns = columns_of(USUAL if section.indices is None else section.indices)
     all_regions = regions(study)
     assert section is not None
-    assert wanted is not None
+    assert columns is not None
     (start, stop), margin = all_regions[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
         raise problem(study, "margin", "the margin leaves nothing of the scan; give a smaller one")
     integrate_by = section.integrate
     if "tolerance" in integrate_by.model_fields_set:
         tolerance = integrate_by.tolerance
-    names = [name for name in dict.fromkeys(split(column)[0] for column in wanted) if name]
+    names = [name for name in dict.fromkeys(split(column)[0] for column in columns) if name]
     ready = {index.name: index for index in prepare(study, list(dict.fromkeys([*MEANS.values(), *names])))}
     counted, indices = (start + margin, stop - margin), tuple(ready[name] for name in names)
     return [
         Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
-                 nodes=integrate_by.nodes, indices=indices, wanted=tuple(wanted), shown=tuple(ready.values()))
+                 nodes=integrate_by.nodes, indices=indices, columns=tuple(columns), shown=tuple(ready.values()))
         for region in all_regions
     ]  # fmt: skip
 
 
 def _over_range(
-    study: Study, name: str, over: Over, tolerance: float, wanted: Sequence[str]
+    study: Study, name: str, over: Over, tolerance: float, columns: Sequence[str]
 ) -> Iterator[Question]:  # fmt: skip
     """One question a value of the other held coordinates."""
     section = WorkspaceSection.of(study)
-    for column in wanted:
+    for column in columns:
         if column not in OF_RANGE:
             only = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
             raise problem(study, "at", f"{column} has no value: {only}; ask for single values: at: {{{name}: [...]}}")
@@ -170,7 +170,7 @@ def _over_range(
     coordinate = study.mechanism.coordinate(name)
     low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
     single = replace(study, workspace=section.model_copy(update=update))
-    for question in questions(single, tolerance, wanted):
+    for question in questions(single, tolerance, columns):
         base = question.field
         if base.plan.iterative:
             message = (

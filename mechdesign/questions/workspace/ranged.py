@@ -132,7 +132,7 @@ class Ranged(Field):
         every, (lane, low, high, singular) = isinstance(self, Every), self._stretches(z)
         samples, places, z = _Samples.of(low, high, singular), np.arange(len(z)), z[lane]
         margins = self.at(np.broadcast_to(z, (SAMPLES, len(z))), samples.value(np.arange(SAMPLES)[:, None]))
-        height = _known(-margins) if every else _smallest(margins)[None]
+        height = _without_nan(-margins) if every else _smallest(margins)[None]
         node = height.argmax(axis=1)
         extreme, value = height.max(axis=1), samples.value(node)
         lowest = np.where(np.isnan(margins), np.inf, margins)[:, node[0], np.arange(len(z))].argmin(axis=0)
@@ -168,7 +168,7 @@ class Ranged(Field):
         place, _, names = highest(near, np.maximum(first, -2), np.minimum(last, 2))
         at = own.value(np.where(place <= first, 0, np.where(place >= last, SAMPLES - 1, centre + CLOSE * place)))
         there = self.at(z[lane], at)
-        top = _known(-there[row, peak]) if every else _smallest(there)
+        top = _without_nan(-there[row, peak]) if every else _smallest(there)
         return row, lane, top, at, names
 
 
@@ -277,7 +277,7 @@ class Sliced(Field):
         return Field.look(field, z, sizes, assembly)
 
 
-def _known(values: Floats) -> Floats:
+def _without_nan(values: Floats) -> Floats:
     """Values, and -inf where they are unknown."""
     return np.where(np.isnan(values), -np.inf, values)
 
@@ -285,7 +285,7 @@ def _known(values: Floats) -> Floats:
 def _smallest(margins: Floats) -> Floats:
     """The smallest margin, never positive where one is unknown."""
     least: Floats = np.fmin.reduce(margins)
-    return _known(np.where(np.isnan(margins).any(axis=0), np.minimum(least, 0.0), least))
+    return _without_nan(np.where(np.isnan(margins).any(axis=0), np.minimum(least, 0.0), least))
 
 
 def _peaks(height: Floats, far: float) -> tuple[Ints, Ints, Ints]:

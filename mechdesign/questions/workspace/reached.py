@@ -70,8 +70,8 @@ def reach(question: Question) -> Reached:
     singular = not ranged and question.field.singular_everywhere
     if singular:
         question = replace(question, field=replace(question.field, same_assembly=False))
-        evaluation = answer(replace(question, indices=(), wanted=OF_RANGE), {}, 1, SINGLE)
-        nothing = {name: np.full(1, np.nan) for name in question.wanted}
+        evaluation = answer(replace(question, indices=(), columns=OF_RANGE), {}, 1, SINGLE)
+        nothing = {name: np.full(1, np.nan) for name in question.columns}
         evaluation = replace(evaluation, values=nothing | evaluation.values, errors=nothing | evaluation.errors)
     else:
         evaluation = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)

@@ -1,4 +1,4 @@
-"""What is to be known of regions: pieces and areas left out, errors, singularities; why nothing is reached."""
+"""Warnings about regions: pieces and areas left out, errors, singularities; and why nothing is reached."""
 
 from __future__ import annotations
 

@@ -94,11 +94,6 @@ class Strips:
         """The first segment of each strip."""
         return self.segments[self.first]
 
-    def sums(self, designs: int) -> Floats:
-        """Integrals of each design, shape (integrands, designs)."""
-        by, of = self.segments["weight"], self.segments["design"]
-        return np.stack([np.bincount(of, row * by, designs) for row in self.value])
-
     def of_cells(self, keep: Flags) -> Strips:
         """Those of some cells only; `keep` is of shape (cells,)."""
         if keep.all():

@@ -64,7 +64,7 @@ def index_columns(study: Study, question: Question) -> dict[str, Column]:
     """The columns of the answer, without values."""
     words = study.units.labels | {"as resistivity": index("resistivity").unit(study, question.field)}
     kinds = {column.name: column for column in INDICES.columns(words, **dict.fromkeys(COLUMNS, ()))}
-    for name in (name for name in question.wanted if name not in COLUMNS):
+    for name in (name for name in question.columns if name not in COLUMNS):
         local, kind = split(name)
         words = {"index": local, "meaning of the index": index(local).meaning}
         kinds[name] = INDICES[f"<index>_{kind}"].column((), index(local).unit(study, question.field), **words)
@@ -100,7 +100,7 @@ def _indices(study: Study, regions: Sequence[Reached]) -> Iterator[Column]:
         return INDICES["<statistic>_error"].column(values, kinds[name].unit, statistic=name)
 
     estimated = question.rule == "gauss"
-    statistics = [name for name in question.wanted if name not in COLUMNS]
+    statistics = [name for name in question.columns if name not in COLUMNS]
     yield from (column(name) for name in COLUMNS)
     yield from (error(name) for name in COLUMNS[:4] if estimated)
     yield from (column(name) for name in statistics)

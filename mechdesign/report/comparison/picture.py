@@ -62,5 +62,5 @@ def differences_figure(moved: Sequence[Difference]) -> Figure:
 def _alike(old: Floats, new: Floats) -> bool:
     """Whether two curves lie over each other, so that only their difference is seen."""
     apart, both = np.abs(new - old), np.concatenate([old, new])
-    known = both[np.isfinite(both)]
-    return bool(len(known) and np.nanmax(apart, initial=0.0) < _ALIKE * np.ptp(known))
+    finite = both[np.isfinite(both)]
+    return bool(len(finite) and np.nanmax(apart, initial=0.0) < _ALIKE * np.ptp(finite))

@@ -35,9 +35,9 @@ def largest(vectors: Iterable[Vectors]) -> dict[str, float]:
     sizes: dict[str, float] = {}
     peaks: dict[str, list[Floats]] = {}
     for kind in vectors:
-        peaks.setdefault(kind.unit, []).extend(np.abs(vector) for *_, vector in kind.each)
-    for unit, each in peaks.items():
-        tops = np.nanmax(np.nan_to_num(np.array(each), posinf=0.0), axis=0)
+        peaks.setdefault(kind.unit, []).extend(np.abs(vector) for *_, vector in kind.arrows)
+    for unit, peak in peaks.items():
+        tops = np.nanmax(np.nan_to_num(np.array(peak), posinf=0.0), axis=0)
         sizes[unit] = float(min(tops.max(), _BOUND * np.quantile(tops, _COMMON)))
     return {unit: size for unit, size in sizes.items() if size > 0}
 
@@ -127,7 +127,7 @@ def _ways(
         shown, motion = _solved(drawn, along, places)
         ways = [_paths(shown.configuration, points)]
         for kind in drawn.vectors(motion, shown) if sizes else ():
-            values = np.array([vector for *_, vector in kind.each]) / sizes[kind.unit]
+            values = np.array([vector for *_, vector in kind.arrows]) / sizes[kind.unit]
             ways.append(np.where(np.abs(values) <= 1, _ARROW * along.curve.mechanism.size * values, np.nan))
         return np.concatenate(ways)
 

@@ -19,7 +19,7 @@ from mechdesign.report.figures.style import printed, raised
 from mechdesign.report.requirements import DrawnCases
 from mechdesign.results import VARIED, Column, KeyNumber, Result, Table
 from mechdesign.rows import unit_of
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 
 # Largest number of headlines of a question.
 MOST = 8
@@ -191,7 +191,7 @@ def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pos
     """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table."""
     if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
         return None
-    course = table.scope.course(Asked(column.name))
+    course = table.scope.course(Request(column.name))
     if course is None:
         return None
     value, place = course.worst(-1 if rule.row == "smallest" else 1, absolute=rule.row == "size")

@@ -234,7 +234,7 @@ def _arrows(drawn: DrawnPoses, motion: Motion, sweep: Sweep, sheet: Sheet) -> li
             if kind.unit == unit:
                 title, color = _ARROWS[kind.kind]
                 shafts = [[words, at if isinstance(at, str) else _track(sheet.all(at)), _track(np.conj(vector * scale))]
-                          for words, at, vector in kind.each]  # fmt: skip
+                          for words, at, vector in kind.arrows]  # fmt: skip
                 layers.append({"title": title, "color": color, "on": kind.kind != "velocity", "shafts": shafts})
         groups.append(
             {"key": [round(length * scale, 1), f"{length:g} {style.printed(unit)}".rstrip()], "layers": layers}

@@ -262,14 +262,14 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     rows: list[tuple[bool, int, dict[str, Any]]] = []
     rules = [
         *map(_in_words, study.requirements),
-        *({"what": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
+        *({"result": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for answer in answers:
         meanings = _meanings(answer.section)
         for k, verdict in zip_longest([*judged_by(study, answer.command), *of_warnings], answer.verdicts):
             about = {"command": answer.command, "verdict": verdict, "met": verdict is not None and verdict.met}
-            about |= {"meaning": meanings.get(rules[k]["what"].strip("|"), ""), **rules[k]}
+            about |= {"meaning": meanings.get(rules[k]["result"].strip("|"), ""), **rules[k]}
             rows.append((answer.command == SWEEP.name, k, about))
     return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
 
@@ -285,7 +285,7 @@ def _in_words(requirement: Requirement) -> dict[str, str]:
     path = path_of(requirement.result)
     bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
-        "what": f"|{path}|" if requirement.abs else path,
+        "result": f"|{path}|" if requirement.abs else path,
         "where": ", ".join(f"{column} {value}" for column, value in requirement.where.items()),
         "limit": ", ".join(f"{sign} {text_of(bound) or shown(bound)}" for sign, bound in bounds if bound is not None),
     }
@@ -314,7 +314,7 @@ def _about(study: Study) -> dict[str, Any]:
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": listed,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "described": listed,
         "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip

@@ -39,7 +39,7 @@ _NAMED_POSES = 12  # in which names keep off the links
 _LINE = 17.0  # height of a line of the legend, in the drawing's units
 _ENTRY = 170.0  # width of an entry
 _COLORS = 24  # of the map
-_SEEN = 128  # opacity from which on a pixel belongs to the map
+_OPAQUE = 128  # opacity from which on a pixel belongs to the map
 _AROUND = 6.0  # left free around a region in a small map
 
 
@@ -179,7 +179,7 @@ def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: Boundar
     # Beyond the region, where the ground of the drawing shows, one more colour.
     palette = few.getpalette() or []
     few.putpalette([*palette[: 3 * _COLORS], *[255] * (3 * (_COLORS + 1) - len(palette[: 3 * _COLORS]))])
-    few.paste(_COLORS, mask=pixels.getchannel("A").point(lambda alpha: 255 * (alpha < _SEEN)))
+    few.paste(_COLORS, mask=pixels.getchannel("A").point(lambda alpha: 255 * (alpha < _OPAQUE)))
     packed = io.BytesIO()
     few.save(packed, format="png", optimize=True, transparency=_COLORS)
     data = f"data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}"

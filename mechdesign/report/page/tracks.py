@@ -163,7 +163,7 @@ def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     These are taken straight between the poses of the other.
     """
     data, more = part["data"], other["data"]
-    at, own = (_values(each["rows"], each["poses"]) for each in (data, more))
+    at, own = (_values(drawing["rows"], drawing["poses"]) for drawing in (data, more))
     same = np.minimum(np.searchsorted(own, at), len(own) - 1)
 
     def along(track: str, factor: float = 1.0, begin: float = 0.0) -> str:
@@ -180,12 +180,12 @@ def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
             return place
         return [along(track, factor, begin) for track, begin in zip(place, shift, strict=True)]
 
-    known = {kind["title"] for group in data["arrows"] for kind in group["layers"]}
+    titles = {kind["title"] for group in data["arrows"] for kind in group["layers"]}
     groups = []
     for group in more["arrows"]:
         layers = [
             layer | {"shafts": [[words, placed(at), [*map(along, way)]] for words, at, way in layer["shafts"]]}
-            for layer in group["layers"] if layer["title"] not in known
+            for layer in group["layers"] if layer["title"] not in titles
         ]  # fmt: skip
         groups += [group | {"layers": layers}] if layers else []
     numbers = [[decimals, along(track)] for decimals, track in more["numbers"]]
@@ -201,8 +201,8 @@ def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 
 def _values(track: str, count: int) -> Floats:
     """The integers of `deltas`, nan where there is no value, shape (count,)."""
-    known = np.array([letter == _NOTHING for letter in track if _LETTERS.find(letter) < _BASE], dtype=bool)
-    gone = np.append(known, np.zeros(count - len(known), dtype=bool))
+    given = np.array([letter == _NOTHING for letter in track if _LETTERS.find(letter) < _BASE], dtype=bool)
+    gone = np.append(given, np.zeros(count - len(given), dtype=bool))
     return np.where(gone, np.nan, steps(track, count))
 
 

@@ -409,11 +409,11 @@ def _named_limits(raw: Any) -> Any:
 # Most links of a mechanism; to solve it takes time in proportion to their square.
 MAX_LINKS = 1000
 
-Wanted = Expression | tuple[tuple[float, ...], ...] | str
+WrittenTarget = Expression | tuple[tuple[float, ...], ...] | str
 """A target as it was written: an expression (a number is one without names), rows, or the name of a file."""
 
 
-def _target(raw: Any, context: Context) -> Wanted:
+def _target(raw: Any, context: Context) -> WrittenTarget:
     file = file_of(raw)
     if file is not None and (raw is file or len(raw) == 1):
         return file
@@ -426,7 +426,7 @@ def _target(raw: Any, context: Context) -> Wanted:
 
 
 TargetValue = Annotated[
-    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "title": TARGET_FORMS})
+    WrittenTarget, fields.Read(_target, {"type": ["number", "string", "array", "object"], "title": TARGET_FORMS})
 ]
 
 

@@ -12,7 +12,7 @@ from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.building.section import Wanted
+from mechdesign.study.building.section import WrittenTarget
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import read_table
@@ -50,7 +50,7 @@ class Target:
         return tuple(sorted(self.expression.names)) if self.expression is not None else ()
 
 
-def check(checker: Checker, written: Mapping[str, Wanted]) -> dict[str, Target]:
+def check(checker: Checker, written: Mapping[str, WrittenTarget]) -> dict[str, Target]:
     """Targets without mistakes; the mistakes of the others are reported."""
     targets: dict[str, Target] = {}
     owners: dict[str, str] = {}

@@ -114,7 +114,7 @@ watt = joule / second = W
 
 
 # Units as other languages and programs write them.
-_MEANT = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
+_SYNONYMS = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
 
 
 def listed() -> dict[str, tuple[str, tuple[str, ...]]]:
@@ -387,7 +387,7 @@ def _unit(unit: str) -> tuple[Powers, float]:
         base = registry.Quantity(1.0, parsed).to_base_units()
     except Exception:  # pint raises errors of many classes
         defined = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
-        near = _MEANT.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *defined))
+        near = _SYNONYMS.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *defined))
         raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None)) from None
     dimensions = {str(name): power for name, power in base.dimensionality.items()}
     mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)

@@ -61,7 +61,7 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     scene = None if index is None else pose(mechanism, drawn.shown.configuration, index)
     if index is None or scene is None:
         return None
-    acting = [each.at(0) for each in actions_on(drawn.motion, drawn.shown.take(np.array([index])))]
+    acting = [own.at(0) for own in actions_on(drawn.motion, drawn.shown.take(np.array([index])))]
     largest = max(action.size for action in acting)
     turning = max(abs(action.moment) for action in acting)
     least = max(LEAST * turning, NOTHING * largest * mechanism.size)

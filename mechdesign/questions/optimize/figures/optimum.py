@@ -1,4 +1,4 @@
-"""A design that an optimisation chose: its mechanism, what was wanted of it, what it reaches, and the error."""
+"""A chosen design: its mechanism, its targets, what it reaches, and the errors."""
 
 from __future__ import annotations
 
@@ -78,13 +78,13 @@ def reached(table: Table) -> list[Reached]:
     for column in table.columns:
         output = column.name.removesuffix("_error")
         if output != column.name and np.isfinite(column.values).any():
-            known = output in table
-            outputs.append(Reached(output, column.unit, table[output] if known else None, column.values))
-    return [each for each in outputs if each.values is not None] or outputs
+            placed = output in table
+            outputs.append(Reached(output, column.unit, table[output] if placed else None, column.values))
+    return [curve for curve in outputs if curve.values is not None] or outputs
 
 
 def design_figure(study: Study, motion: Result, words: str) -> Figure:
-    """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
+    """The mechanism in motion or at its listed poses, with target places; below, target curves and those reached."""
     sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
     shown = reached(table)
     title = style.folded(words, 11.0, style.width() - LEFT)
@@ -96,10 +96,10 @@ def design_figure(study: Study, motion: Result, words: str) -> Figure:
         title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
         title = style.folded(title.replace("\n", " "), 11.0, style.width() - LEFT)
         above = _TITLE + _TITLE_LINE * title.count("\n")
-        figure = _posed(sweep, worst, _wanted(table, shown), above)
+        figure = _posed(sweep, worst, _targets(table, shown), above)
     axes = figure.axes[0]
     axes.set_title(title, loc="left", fontsize=10.5)
-    _draw_wanted(axes, table, shown)
+    _draw_targets(axes, table, shown)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
     if shown:
@@ -132,7 +132,7 @@ def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
             draw_paths(axes, sweep, width=0.8)
         if motion is not None:
             table = motion.tables["motion"]
-            _draw_wanted(axes, table, reached(table))
+            _draw_targets(axes, table, reached(table))
         draw_mechanism(
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
             travel=sweep.travel, size=_SMALL_SYMBOLS,
@@ -146,36 +146,36 @@ def _worst(shown: Sequence[Reached], valid: Ints) -> int:
     """The valid pose with the largest error relative to the worst of its output; the first pose without targets."""
     if not shown:
         return int(valid[0])
-    far = np.nanmax([np.abs(each.error) / (each.worst or 1.0) for each in shown], axis=0)
+    far = np.nanmax([np.abs(curve.error) / (curve.worst or 1.0) for curve in shown], axis=0)
     return int(valid[np.nanargmax(np.nan_to_num(far[valid], nan=-1.0))])
 
 
-def _wanted(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
+def _targets(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
     """Places where points should be at the poses, by point: what they reach less the error."""
-    errors = {each.output: each.error for each in shown}
-    wanted: dict[str, Complexes] = {}
+    errors = {curve.output: curve.error for curve in shown}
+    targets: dict[str, Complexes] = {}
     for point in dict.fromkeys(output.removesuffix(f".{axis}") for output in errors for axis in "xy"):
         names = [f"{point}.{axis}" for axis in "xy"]
         if all(name in table for name in names) and any(name in errors for name in names):
             x, y = (table[name] - errors.get(name, 0.0) for name in names)
-            wanted[point] = x + 1j * y
-    return wanted
+            targets[point] = x + 1j * y
+    return targets
 
 
-def _draw_wanted(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
+def _draw_targets(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
     """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
-    for point, wanted in _wanted(table, shown).items():
+    for point, targets in _targets(table, shown).items():
         x, y = (table[f"{point}.{axis}"] for axis in "xy")
-        few = len(wanted) <= _MAX_DOTS
-        axes.plot(wanted.real, wanted.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
+        few = len(targets) <= _MAX_DOTS
+        axes.plot(targets.real, targets.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
         axes.plot(x, y, color=style.INK, label=f"{point} reached", **_LOOKS["reached", few])
 
 
-def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float) -> Figure:
+def _posed(sweep: Sweep, index: int, targets: dict[str, Complexes], above: float) -> Figure:
     """The mechanism in one of its listed poses, pale in the others, and the curves of its points between them."""
     between = _between(sweep)
-    curves = {point: between[point] for point in wanted if point in between}
-    places = np.concatenate([sweep.extent, *wanted.values(), *curves.values()])
+    curves = {point: between[point] for point in targets if point in between}
+    places = np.concatenate([sweep.extent, *targets.values(), *curves.values()])
     figure, axes = framed(places, sweep.study.units.label("length"), height=_HEIGHT, above=above)
     for other in sweep.valid:
         if other != index:
@@ -203,38 +203,38 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     return paths
 
 
-def _missed(each: Reached) -> str:
+def _error_title(curve: Reached) -> str:
     """An output and its largest error."""
-    words = f"{each.output}: reached less wanted, at most {each.worst:.3g} {each.unit}".rstrip()
+    words = f"{curve.output}: reached less wanted, at most {curve.worst:.3g} {curve.unit}".rstrip()
     return style.folded(words, 9.5, style.width() - LEFT)
 
 
 def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
     """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
-    titles = {each.output: _missed(each) for each in shown}
+    titles = {curve.output: _error_title(curve) for curve in shown}
     gap = _PANEL_GAP + style.line(9.5) * max(title.count("\n") for title in titles.values())
-    rows = [(each, part) for each in shown for part in ("curve", "error")
-            if part == "error" or (each.values is not None and each.output[-2:] not in (".x", ".y"))]  # fmt: skip
+    rows = [(curve, part) for curve in shown for part in ("curve", "error")
+            if part == "error" or (curve.values is not None and curve.output[-2:] not in (".x", ".y"))]  # fmt: skip
     room = len(rows) * (_PANEL + gap) + _BELOW
     style.grow(figure, below=room)
     height = figure.get_figheight()
     left, wide = LEFT / style.width(), 1 - (LEFT + RIGHT) / style.width()
     look: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
-    for k, (each, part) in enumerate(rows):
+    for k, (curve, part) in enumerate(rows):
         low = _BELOW + (len(rows) - 1 - k) * (_PANEL + gap)
         axes = figure.add_axes((left, low / height, wide, _PANEL / height))
-        if part == "curve" and each.values is not None:
-            axes.plot(over.values, each.values - each.error, color=style.VERMILION, linestyle=(0, (5, 2)),
+        if part == "curve" and curve.values is not None:
+            axes.plot(over.values, curve.values - curve.error, color=style.VERMILION, linestyle=(0, (5, 2)),
                       linewidth=2.4, label="wanted")  # fmt: skip
-            axes.plot(over.values, each.values, color=style.BLUE, linewidth=1.2, label="reached", **look)
+            axes.plot(over.values, curve.values, color=style.BLUE, linewidth=1.2, label="reached", **look)
             axes.legend(loc="best", ncols=2)
-            axes.set_title(each.output, loc="left", fontsize=9.5)
-            axes.set_ylabel(style.axis_label("value", each.unit))
+            axes.set_title(curve.output, loc="left", fontsize=9.5)
+            axes.set_ylabel(style.axis_label("value", curve.unit))
         else:
             axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
-            axes.plot(over.values, each.error, color=style.BLUE, **look)
-            axes.set_title(titles[each.output], loc="left", fontsize=9.5)
-            axes.set_ylabel(style.axis_label("error", each.unit))
+            axes.plot(over.values, curve.error, color=style.BLUE, **look)
+            axes.set_title(titles[curve.output], loc="left", fontsize=9.5)
+            axes.set_ylabel(style.axis_label("error", curve.unit))
         axes.locator_params(axis="y", nbins=5)
         tick_abscissa(axes, over)
         axes.margins(x=0.02)

@@ -79,9 +79,9 @@ def score_curves(designs: Designs, front: Table | None = None) -> Figure:
     better = "" if many else f", {'less' if one.smallest else 'more'} is better"
     if not (steep or near.all()):
         better += f"; {outside(near)}"
-    what = f"Composite performance index of ({', '.join(goal.name for goal in designs.goals)})" if many else one.name
+    axis = f"Composite performance index of ({', '.join(goal.name for goal in designs.goals)})" if many else one.name
     figure, panels = sheet(
-        count, across, (min(2.2, 5.2 / down) if across == 1 else 1.75), f"{what}{among}{better}",
+        count, across, (min(2.2, 5.2 / down) if across == 1 else 1.75), f"{axis}{among}{better}",
         left=_NUMBERS + style.line(10.0) * (1 + folded(score_label).count("\n")), above=0.65,
         across=0.3, down=0.85, sharey=True,
     )  # fmt: skip
@@ -171,10 +171,10 @@ def score_surface(designs: Designs) -> Figure:
     figure, (axes,) = sheet(1, 1, 3.6, title, right=_BAR + 0.1)
     smallest = not many and designs.goals[0].smallest
     filled, extend = _fill(axes, designs, designs.cpi if many else designs.values[:, 0], smallest=smallest)
-    what = "composite performance index CPI" if many else label(designs, goals[0])
+    axis = "composite performance index CPI" if many else label(designs, goals[0])
     digits = FuncFormatter(lambda value, _: f"{value:.3g}")
     bar = axes.inset_axes((1.02, 0, 0.03, 1))
-    style.color_bar(figure, filled, what, cax=bar, format=digits, extend=extend).minorticks_off()
+    style.color_bar(figure, filled, axis, cax=bar, format=digits, extend=extend).minorticks_off()
     shown = [*dict.fromkeys(designs.winners.tolist())]
     for k, row in enumerate(shown):
         merits = designs.merits(row) if many else "best"
@@ -299,8 +299,8 @@ def parallel_axes(designs: Designs) -> Figure:
     axes.set_yticks([])
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.grid(visible=False)
-    what = "sum of the normalised goals" if len(designs.goals) > 1 else "normalised goal"
-    style.color_bar(figure, drawn, what, cax=axes.inset_axes((1.01, 0, 0.03, 1)))
+    axis = "sum of the normalised goals" if len(designs.goals) > 1 else "normalised goal"
+    style.color_bar(figure, drawn, axis, cax=axes.inset_axes((1.01, 0, 0.03, 1)))
     return figure
 
 
@@ -314,33 +314,33 @@ def convergence_figure(view: DesignsView) -> Figure | None:
 def convergence(designs: Designs) -> Figure:
     """The best score found so far over the number of designs evaluated, a line a row of weights."""
     beside = 2.2 if len(designs.goals) > 1 and not style.narrow() else 0.2
-    what = "" if len(designs.goals) > 1 else folded(label(designs, designs.goals[0].name))
-    left = _NUMBERS + style.line(10.0) * (1 + what.count("\n"))
+    axis = "" if len(designs.goals) > 1 else folded(label(designs, designs.goals[0].name))
+    left = _NUMBERS + style.line(10.0) * (1 + axis.count("\n"))
     figure, (axes,) = sheet(1, 1, 2.6, "Convergence of the search", left=left, right=beside)
     count = np.arange(1, len(designs) + 1)
     if len(designs.goals) > 1:
         for row, dashes in zip(designs.weights, cycle(style.DASHES), strict=False):
             so_far = np.maximum.accumulate(np.nan_to_num(designs.score(row), nan=-np.inf))
-            known = np.isfinite(so_far)
+            finite = np.isfinite(so_far)
             weights = ", ".join(f"{weight:g}" for weight in row)
-            axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})", linestyle=dashes)
+            axes.step(count[finite], so_far[finite] / so_far[-1], where="post", label=f"({weights})", linestyle=dashes)
         axes.set_ylabel("best score so far / best")
-        goals = ", ".join(each.name for each in designs.goals)
+        goals = ", ".join(own.name for own in designs.goals)
         place = {"loc": "lower right"} if style.narrow() else {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
         axes.legend(title=style.folded(f"weights of ({goals})", 9.0, 2.0), title_fontsize=9, alignment="left", **place)
     else:
         (goal,) = designs.goals
         values = np.where(designs.feasible, designs.values[:, 0], np.inf if goal.smallest else -np.inf)
         so_far = (np.minimum if goal.smallest else np.maximum).accumulate(values)
-        known = np.isfinite(so_far)
+        finite = np.isfinite(so_far)
         axes.plot(count[designs.feasible], values[designs.feasible], ".", color=style.FAINT, markersize=3,
                   markeredgewidth=0, label="designs")  # fmt: skip
-        axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
+        axes.step(count[finite], so_far[finite], where="post", color=style.BLUE, label="best so far")
         enlarge_dots(axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none"))
-        best_values = so_far[known]
+        best_values = so_far[finite]
         if (best_values > 0).all() and best_values.max() > 20 * best_values.min():
             axes.set_yscale("log")
-        axes.set_ylabel(what)
+        axes.set_ylabel(axis)
     axes.set_xlabel("designs evaluated")
     axes.margins(x=0.01)
     return figure

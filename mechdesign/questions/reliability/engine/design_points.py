@@ -49,7 +49,7 @@ _NO_TURN = 0.02
 # Design points farther than the nearest one by this many standard deviations are neglected.
 _FARTHEST = 4.0
 # Points, limits, normals and pulls as in `DesignPoints`, the points and normals of shape (dimension, points).
-_Found = tuple[Floats, Ints, Floats, Floats]
+_PointArrays = tuple[Floats, Ints, Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def _explained(points: DesignPoints, u: Floats) -> Flags:
     return np.asarray((points.normal @ u >= _NEARLY * points.distance[:, None]).any(axis=0))
 
 
-def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _Found:
+def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _PointArrays:
     """Design points on edges where margins end, moved nearer to the mean without a slope."""
     ends = _nearer(problem, ends, rng)
     at = np.where(problem.is_normal[:, None], ends, 0.0)
@@ -221,7 +221,7 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     return u[:, chosen]
 
 
-def _distinct(problem: Problem, parts: Sequence[_Found], failures: Floats, lost: Ints) -> DesignPoints:
+def _distinct(problem: Problem, parts: Sequence[_PointArrays], failures: Floats, lost: Ints) -> DesignPoints:
     """Design points, the nearest first and each once; `lost` are limits that every explored sample breaks."""
     u, normal = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 2))
     limit, pull = (np.concatenate([part[k] for part in parts]) for k in (1, 3))
@@ -249,7 +249,7 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
     return np.asarray(len(SPREADS) * np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
 
-def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
+def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _PointArrays:
     """Descend with fixed directions and turn these towards failure, in turns until they settle.
 
     Arguments are those of `descend`, results those of `DesignPoints`, but `u` and `normal` of shape (dimension,

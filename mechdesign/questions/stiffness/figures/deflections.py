@@ -63,11 +63,11 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
     study, poses, drawn = view.study, view.poses, view.drawn.first
     if drawn is None:
         return None
-    scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
+    scene, body = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
-    shapes, at = _shapes(drawn, scene), scene.points[asked.section.point]
-    loads = asked.loads[0, :MAX_LOADS, : asked.size]
+    shapes, at = _shapes(drawn, scene), scene.points[body.section.point]
+    loads = body.loads[0, :MAX_LOADS, : body.size]
     words = cases_in_words(study)
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
@@ -79,7 +79,7 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
     figure, panels = _panels(
         study, places, len(loads), f"deflections, drawn {scale:g} times as large, at {where}", lines=2
     )
-    name, length = asked.section.at, study.units.label("length")
+    name, length = body.section.at, study.units.label("length")
     for k, (axes, lines, load) in enumerate(zip(panels, bent, loads.tolist(), strict=True)):
         axes.locator_params(axis="x", nbins=_MAX_TICKS)
         draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
@@ -141,7 +141,7 @@ def _shapes(drawn: DrawnPose, scene: Scene) -> list[tuple[Complexes, Complexes]]
         dx, dy, turn = moved[vertex]
         return np.asarray(dx + 1j * dy + 1j * turn * (place - at))
 
-    shapes = [(np.array([at]), shift(network.asked, at)[None])]
+    shapes = [(np.array([at]), shift(network.target, at)[None])]
     bent = set()
     for ways in network.edges_along_beams:
         bent.add(network.edges[ways[0]].name)
@@ -245,17 +245,17 @@ def directions_figure(view: StiffnessView) -> Figure | None:
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
         axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
         angle, title_lines = float(table["k_angle"][row]) * study.units.angle_factor, []
-        for name, what, turn, color, dashes in _MAIN_AXES:
+        for name, adjective, turn, color, dashes in _MAIN_AXES:
             stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
             line = at + scale / stiff * way * np.array([-1, 1])
             axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
-            title_lines.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
+            title_lines.append(f"{adjective} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
         title_lines = [words, *title_lines, f"drawn {scale / force:g} times as large"]
         axes.set_title("\n".join(title_lines), loc="left", fontsize=8.5)
-    handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
-               for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
+    handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{adjective} direction, {name}")
+               for name, adjective, _, color, dashes in _MAIN_AXES]  # fmt: skip
     legend_at_left(figure, handles, len(handles))
     return figure
 

@@ -40,9 +40,9 @@ def _curves(study: Study, table: Table, over: Along) -> Figure | None:
     panels = []
     for about, kind, looks in (("stiffness to a force", "stiffness", forces),
                                ("to a moment", "rotational_stiffness", moments)):  # fmt: skip
-        known = [name for name in looks if name in table and np.isfinite(table[name]).any()]
-        flat = [name for name in known if _constant(table[name])]
-        panels.append((about, units.label(kind), looks, [name for name in known if name not in flat], flat))
+        names = [name for name in looks if name in table and np.isfinite(table[name]).any()]
+        flat = [name for name in names if _constant(table[name])]
+        panels.append((about, units.label(kind), looks, [name for name in names if name not in flat], flat))
     if not any(curves or flat for *_, curves, flat in panels):
         return None
     notes = [f"{name} = {quantity(float(np.nanmean(table[name])), unit)}"
@@ -55,9 +55,9 @@ def _curves(study: Study, table: Table, over: Along) -> Figure | None:
         for k, name in enumerate(curves or flat):
             values = np.where(np.isfinite(table[name]), table[name], np.nan)
             dashes, color, marker = looks[name]
-            each = max(1, len(values) // 12)
+            step = max(1, len(values) // 12)
             axis.plot(over.values, values, dashes, label=name, color=color, marker=marker, markersize=5,
-                      markevery=(k * each // 2, each), linewidth=2.4 if marker else 1.4)  # fmt: skip
+                      markevery=(k * step // 2, step), linewidth=2.4 if marker else 1.4)  # fmt: skip
         axis.set_ylabel(style.axis_label(about, unit))
         low, high = axis.dataLim.intervaly
         if high > _LOGARITHMIC * low > 0:
@@ -86,8 +86,8 @@ def _curves(study: Study, table: Table, over: Along) -> Figure | None:
 
 
 def _constant(values: Floats) -> bool:
-    known = values[np.isfinite(values)]
-    return len(known) == len(values) and float(np.ptp(known)) <= _FLAT * float(np.abs(known).max())
+    finite = values[np.isfinite(values)]
+    return len(finite) == len(values) and float(np.ptp(finite)) <= _FLAT * float(np.abs(finite).max())
 
 
 def _map(study: Study, table: Table, over: Plane) -> Figure:

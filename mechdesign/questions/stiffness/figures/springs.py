@@ -172,10 +172,10 @@ def free_motion_figure(view: StiffnessView) -> Figure | None:
 
 
 def posed(
-    study: Study, poses: Poses, drawn: DrawnPose, places: Complexes, what: str, **look: Any
+    study: Study, poses: Poses, drawn: DrawnPose, places: Complexes, heading: str, **look: Any
 ) -> tuple[Figure, Axes]:
     """The mechanism in a pose, in a window that holds these places, too."""
-    title = style.folded(f"{what} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
+    title = style.folded(f"{heading} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
     above = TITLE + style.line(11.0) * title.count("\n")
     figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=above)
     axes.set_title(title, loc="left")

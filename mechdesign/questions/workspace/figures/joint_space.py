@@ -123,16 +123,16 @@ def _unrolled(study: Study, name: str, values: Floats, region: Region, patches: 
     turn, z, mechanism = _turn(study, name), places(region.local), study.mechanism
     if not turn:
         return values
-    unrolled, known = values.copy(), np.zeros(len(values), dtype=bool)
+    unrolled, done = values.copy(), np.zeros(len(values), dtype=bool)
     for rows in patches:
         half = rows.shape[1] // 2
         middle = np.unwrap(values[rows[:, half]], period=turn)
-        if known.any():
-            gaps = np.abs(z[rows[[0, -1], half], None] - z[known])
+        if done.any():
+            gaps = np.abs(z[rows[[0, -1], half], None] - z[done])
             end, node = np.unravel_index(int(gaps.argmin()), gaps.shape)
-            middle += turn * np.round((unrolled[known][node] - middle[[0, -1][end]]) / turn)
+            middle += turn * np.round((unrolled[done][node] - middle[[0, -1][end]]) / turn)
         unrolled[rows] = values[rows] - turn * np.round((values[rows] - middle[:, None]) / turn)
-        known[rows] = True
+        done[rows] = True
     sketch = mechanism.sketch_configuration
     drawn = float(
         np.asarray(in_study_units(study, mechanism.coordinate(name), sketch.value(mechanism.coordinate(name))))

@@ -15,16 +15,16 @@
     const values = new Array(count);
     let last = 0, at = 0;
     for (let k = 0; k < count; k++) {
-      const known = text[at] !== ".";
+      const given = text[at] !== ".";
       let number = 0, power = 1, digit = 0;
-      if (!known) at++;
+      if (!given) at++;
       else if (at < text.length) do {
         digit = LETTERS.indexOf(text[at++]);
         number += (digit % 32) * power;
         power *= 32;
       } while (digit >= 32);
       last += number % 2 ? -(number + 1) / 2 : number / 2;
-      values[k] = known ? last / unit : NaN;
+      values[k] = given ? last / unit : NaN;
     }
     return values;
   }
@@ -61,21 +61,21 @@
 
   // Calls back with the places over which the pointer is drawn.
   function follow(drawing, hovering, call) {
-    const told = event => {
+    const report = event => {
       if (event.type === "pointerdown") drawing.setPointerCapture(event.pointerId);
       const begins = event.type === "pointerdown";
       if (begins || event.buttons || (hovering && event.pointerType === "mouse")) call(...within(drawing, event), begins);
     };
-    drawing.addEventListener("pointerdown", told);
-    drawing.addEventListener("pointermove", told);
+    drawing.addEventListener("pointerdown", report);
+    drawing.addEventListener("pointermove", report);
   }
 
   // The drawing of a mechanism: shows it at a pose, or between two.
   function linkage(drawing, data) {
     const track = (group, unit) => {
-      const found = {};
-      for (const name in group) found[name] = decode(group[name], data.poses, unit);
-      return found;
+      const tracks = {};
+      for (const name in group) tracks[name] = decode(group[name], data.poses, unit);
+      return tracks;
     };
     const x = track(data.x, PLACES), y = track(data.y, PLACES), turn = track(data.turn, TURNS);
     const parts = [...drawing.querySelectorAll("[data-at]")].map(group => {
@@ -91,9 +91,9 @@
       show(at) {
         for (const [group, x, y, turn, offset] of parts) {
           let px = between(x, at), py = between(y, at);
-          const known = isFinite(px), angle = turn ? between(turn, at, 360) : 0;
-          group.classList.toggle("moving-gone", !known);
-          if (!known) continue;
+          const finite = isFinite(px), angle = turn ? between(turn, at, 360) : 0;
+          group.classList.toggle("moving-gone", !finite);
+          if (!finite) continue;
           if (offset) {
             const [cos, sin] = [Math.cos(angle * Math.PI / 180), Math.sin(angle * Math.PI / 180)];
             px += cos * offset[0] - sin * offset[1];
@@ -104,9 +104,9 @@
         }
         for (const [path, x1, y1, x2, y2, lines] of struts) {
           const [px, py] = [between(x1, at), between(y1, at)], [wx, wy] = [between(x2, at) - px, between(y2, at) - py];
-          const known = isFinite(px + wx), length = Math.hypot(wx, wy) || 1;
-          path.classList.toggle("moving-gone", !known);
-          if (!known) continue;
+          const finite = isFinite(px + wx), length = Math.hypot(wx, wy) || 1;
+          path.classList.toggle("moving-gone", !finite);
+          if (!finite) continue;
           const corner = ([share, left]) =>
             `${(px + share * wx + left * wy / length).toFixed(2)} ${(py + share * wy - left * wx / length).toFixed(2)}`;
           path.setAttribute("d", lines.map(line => `M${line.map(corner).join("L")}`).join(""));
@@ -137,7 +137,7 @@
         `m${(back * 0.9 * y).toFixed(1)} ${(-back * 0.9 * x).toFixed(1)}L`;
     };
     const track = parts => parts.map(part => decode(part, data.poses, PLACES));
-    const size = drawing.viewBox.baseVal, found = [], boxes = [];
+    const size = drawing.viewBox.baseVal, paths = [], boxes = [];
     (data.arrows || []).forEach(({key: [length, words], layers}, row) => {
       const y = size.height - 10 - 24 * row, group = make("g", {"stroke-width": 2}, drawing);
       const key = make("g", {stroke: "#222222"}, group);
@@ -149,7 +149,7 @@
         for (const [words, at, parts] of shafts) {
           const path = make("path", {}, layer);
           make("title", {}, path).textContent = `${title}: ${words}`;
-          found.push([...(at.map ? track(at) : [moved.x[at], moved.y[at]]), ...track(parts), path]);
+          paths.push([...(at.map ? track(at) : [moved.x[at], moved.y[at]]), ...track(parts), path]);
         }
         return [title, layer, on, color];
       });
@@ -159,11 +159,11 @@
     return {
       boxes,
       show(at) {
-        for (const [...parts] of found) {
+        for (const [...parts] of paths) {
           const path = parts.pop(), [px, py, x, y] = parts.map(values => between(values, at));
-          const known = isFinite(x + y + px + py);
-          path.classList.toggle("moving-gone", !known);
-          if (known) path.setAttribute("d", `M${px} ${py}${way(x, y)}${px + x} ${py + y}`);
+          const finite = isFinite(x + y + px + py);
+          path.classList.toggle("moving-gone", !finite);
+          if (finite) path.setAttribute("d", `M${px} ${py}${way(x, y)}${px + x} ${py + y}`);
         }
       },
     };
@@ -178,9 +178,9 @@
 
   // The pictures that follow a motion: a cursor where they are over what moves, dots where they show places. Pointing at
   // one chooses a pose.
-  function pictures(figure, data, told, moved, choose) {
+  function pictures(figure, data, readout, moved, choose) {
     const [label, track, power, coordinate] = data.over, own = figure.id.replace(/-moving$/, ""), marks = [];
-    const over = told.tracks[track][1].map(value => value * 10 ** power);
+    const over = readout.tracks[track][1].map(value => value * 10 ** power);
     const inStudy = (point, k) => [data.corner[0] + between(moved.x[point], k) / data.scale,
       data.corner[1] - between(moved.y[point], k) / data.scale];
 
@@ -189,7 +189,7 @@
       const at = value => left + (right - left) * (value - low) / (high - low);
       const cursor = make("line", {y1: top, y2: bottom, stroke: "#222222", "stroke-width": 1, class: "moving-cursor"}, drawing);
       const drawn = dots.map(([, which, slope, start, color]) =>
-        [told.tracks[which][1], slope, start, make("circle", {r: 3.6, fill: color, stroke: "white"}, drawing)]);
+        [readout.tracks[which][1], slope, start, make("circle", {r: 3.6, fill: color, stroke: "white"}, drawing)]);
       marks.push(pose => {
         const x = at(between(over, pose));
         const inside = x >= Math.min(left, right) - 1 && x <= Math.max(left, right) + 1;
@@ -197,9 +197,9 @@
         cursor.setAttribute("x1", x);
         cursor.setAttribute("x2", x);
         for (const [values, slope, start, dot] of drawn) {
-          const y = start + slope * between(values, pose), known = inside && y >= top - 0.5 && y <= bottom + 0.5;
-          dot.classList.toggle("moving-gone", !known);
-          if (known) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
+          const y = start + slope * between(values, pose), visible = inside && y >= top - 0.5 && y <= bottom + 0.5;
+          dot.classList.toggle("moving-gone", !visible);
+          if (visible) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
         }
       });
       return place => least(over.map(value => Math.abs(at(value) - place)));
@@ -212,9 +212,9 @@
         const dot = make("circle", {r: 4, fill: color, stroke: "white", "stroke-width": 1.4, class: "moving-dot"}, drawing);
         marks.push(pose => {
           const [x, y] = at(inStudy(point, pose));
-          const known = x >= left && x <= right && y >= top && y <= bottom;
-          dot.classList.toggle("moving-gone", !known);
-          if (known) { dot.setAttribute("cx", x.toFixed(2)); dot.setAttribute("cy", y.toFixed(2)); }
+          const inside = x >= left && x <= right && y >= top && y <= bottom;
+          dot.classList.toggle("moving-gone", !inside);
+          if (inside) { dot.setAttribute("cx", x.toFixed(2)); dot.setAttribute("cy", y.toFixed(2)); }
         });
       }
     }
@@ -253,10 +253,10 @@
 
   // A motion: a slider, play and pause, speed, and what may be shown. Links with a pose that it passes bring it there.
   function motion(figure, data) {
-    const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), told = numbers(figure, data);
+    const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), readout = numbers(figure, data);
     const vectors = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
     const choose = pose => { stop(); show(pose); };
-    const {marks, inStudy} = pictures(figure, data, told, moved, choose);
+    const {marks, inStudy} = pictures(figure, data, readout, moved, choose);
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
     slider.setAttribute("aria-label", "pose of the motion");
     const button = html("button", {type: "button", textContent: "Play"});
@@ -280,9 +280,9 @@
       at = pose;
       // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
       const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
-      moved.show(pose); told.show(counted); vectors.show(pose);
+      moved.show(pose); readout.show(counted); vectors.show(pose);
       marks.forEach(mark => mark(Math.min(pose, last)));
-      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, counted), unit)).join(", ") +
+      const text = data.given.map(([name, unit, which]) => said(name, readout.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
@@ -333,16 +333,16 @@
     }
 
     // The place of the motion where it passes a pose, between two where it is between two; null where it does not.
-    function passing(wanted) {
-      const key = data.keys.find(each => each.every(([name]) => name in wanted));
+    function passing(pose) {
+      const key = data.keys.find(names => names.every(([name]) => name in pose));
       const ways = key.map(([name, which, power]) => {
-        const [decimals, values] = told.tracks[which], range = Math.max(...values) - Math.min(...values) || 1;
-        const value = Number((wanted[name] / 10 ** power).toFixed(decimals));
-        return values.map(each => (each - value) / range);
+        const [decimals, values] = readout.tracks[which], range = Math.max(...values) - Math.min(...values) || 1;
+        const value = Number((pose[name] / 10 ** power).toFixed(decimals));
+        return values.map(number => (number - value) / range);
       });
       let best = null, least = NEAR;
       for (let k = 0; k < last; k++) {
-        const steps = ways.map(way => way[k + 1] - way[k]), dot = (a, b) => a.reduce((sum, each, j) => sum + each * b[j], 0);
+        const steps = ways.map(way => way[k + 1] - way[k]), dot = (a, b) => a.reduce((sum, value, j) => sum + value * b[j], 0);
         const length = dot(steps, steps), share = length && Math.min(1, Math.max(0, -dot(ways.map(way => way[k]), steps) / length));
         const far = Math.hypot(...ways.map((way, j) => way[k] + share * steps[j]));
         if (far < least) { least = far; best = k + share; }
@@ -382,16 +382,16 @@
   function workspace(figure, data) {
     const drawing = figure.querySelector("svg"), words = figure.querySelector(".moving-words");
     const map = drawing.querySelector(".moving-region"), legends = [...drawing.querySelectorAll(".moving-legend")];
-    const choices = data.choices.map(each => ({...each, moved: linkage(drawing, each), told: numbers(figure, each)}));
+    const choices = data.choices.map(choice => ({...choice, moved: linkage(drawing, choice), readout: numbers(figure, choice)}));
     const controls = figure.querySelector(".moving-controls");
     let chosen = choices[0], at = chosen.first;
 
     function show(pose) {
       at = pose;
       chosen.moved.show(at);
-      chosen.told.show(at);
+      chosen.readout.show(at);
       words.textContent = [chosen.title, ...["x", "y"].map((axis, k) =>
-        said(`${data.point}.${axis}`, chosen.told.text(k, at), data.unit))].filter(Boolean).join(", ");
+        said(`${data.point}.${axis}`, chosen.readout.text(k, at), data.unit))].filter(Boolean).join(", ");
     }
 
     // The nearest pose to a place; with a direction the nearest on that side.
@@ -447,9 +447,9 @@
     if (!points[data.point]) return;
     const dot = make("circle", {r: 5, fill: "#D55E00", stroke: "white", "stroke-width": 1.6, class: "moving-dot"}, drawing);
     marks.push(pose => {
-      const [x, y] = inStudy(data.point, pose), known = isFinite(x);
-      dot.classList.toggle("moving-gone", !known);
-      if (!known) return;
+      const [x, y] = inStudy(data.point, pose), finite = isFinite(x);
+      dot.classList.toggle("moving-gone", !finite);
+      if (!finite) return;
       dot.setAttribute("cx", ((x - alike.corner[0]) * alike.scale).toFixed(2));
       dot.setAttribute("cy", ((alike.corner[1] - y) * alike.scale).toFixed(2));
     });
@@ -460,7 +460,7 @@
   function front(figure, data) {
     const drawing = figure.querySelector("svg"), picture = document.querySelector(`[data-beside="${figure.id}"] svg`);
     const words = figure.querySelector(".moving-words");
-    const layer = drawing.querySelector(".moving-design"), told = numbers(figure, data);
+    const layer = drawing.querySelector(".moving-design"), readout = numbers(figure, data);
     const controls = figure.querySelector(".moving-controls");
     const slider = html("input", {type: "range", min: 0, step: "any"});
     slider.setAttribute("aria-label", "pose of the motion");
@@ -468,8 +468,8 @@
     const paths = html("input", {type: "checkbox", checked: true});
     const select = html("select", {}, ...data.choices.map(({number, mark}, k) =>
       html("option", {value: k, textContent: [number, mark].filter(Boolean).join(", ")})));
-    for (const [x, y] of data.front) x.forEach((place, each) => data.choices[each].mark ||
-      make("circle", {cx: place, cy: y[each], r: 2.6, fill: "#0072B2", stroke: "white", "stroke-width": 0.6}, picture));
+    for (const [x, y] of data.front) x.forEach((place, k) => data.choices[k].mark ||
+      make("circle", {cx: place, cy: y[k], r: 2.6, fill: "#0072B2", stroke: "white", "stroke-width": 0.6}, picture));
     const rings = data.front.map(() => make("circle", {r: 8, fill: "none", stroke: "#222222", "stroke-width": 2,
       class: "moving-chosen"}, picture));
     let k = -1, chosen, moved, times, tracks, share = 0, forward = 1, playing = 0, clock = 0;
@@ -489,7 +489,7 @@
       });
       slider.max = chosen.poses - 1;
       select.value = k;
-      told.show(k);
+      readout.show(k);
       show(place());
     }
 
@@ -551,9 +551,9 @@
     picture.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys choose a design`);
     follow(picture, false, (x, y) => {
       let best = 0, least = Infinity;
-      for (const [xs, ys] of data.front) xs.forEach((place, each) => {
-        const far = Math.hypot(place - x, ys[each] - y);
-        if (far < least) { least = far; best = each; }
+      for (const [xs, ys] of data.front) xs.forEach((place, index) => {
+        const far = Math.hypot(place - x, ys[index] - y);
+        if (far < least) { least = far; best = index; }
       });
       if (best !== k) choose(best);
     });
@@ -567,10 +567,10 @@
     });
     // Key numbers lead to the design with their variables.
     for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
-      const wanted = JSON.parse(link.dataset.pose);
-      const far = data.choices.map((_, each) => Math.hypot(...data.given.map(([name, , which, power]) => {
-        const values = told.tracks[which][1], range = Math.max(...values) - Math.min(...values) || 1;
-        return (values[each] - wanted[name] / 10 ** power) / range;
+      const design = JSON.parse(link.dataset.pose);
+      const far = data.choices.map((_, k) => Math.hypot(...data.given.map(([name, , which, power]) => {
+        const values = readout.tracks[which][1], range = Math.max(...values) - Math.min(...values) || 1;
+        return (values[k] - design[name] / 10 ** power) / range;
       })));
       link.addEventListener("click", () => choose(far.indexOf(Math.min(...far))));
     }
@@ -583,10 +583,10 @@
   function start() {
     const figures = [...document.querySelectorAll("figure.moving")].map(figure =>
       [figure, JSON.parse(figure.querySelector("script").textContent)]);
-    figures.filter(([, data]) => data.front).forEach(each => front(...each));
-    const motions = figures.filter(([, data]) => !data.choices).map(each => motion(...each));
-    const maps = figures.filter(([, data]) => data.choices && !data.front).map(each => workspace(...each));
-    if (motions.length) maps.forEach(each => mark(motions[0], each));
+    figures.filter(([, data]) => data.front).forEach(part => front(...part));
+    const motions = figures.filter(([, data]) => !data.choices).map(part => motion(...part));
+    const maps = figures.filter(([, data]) => data.choices && !data.front).map(part => workspace(...part));
+    if (motions.length) maps.forEach(map => mark(motions[0], map));
   }
 
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);

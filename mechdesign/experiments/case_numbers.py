@@ -36,7 +36,7 @@ class Judged(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class CaseNumber:
     """A number of a case by the name of a result.
 
     Parameters
@@ -79,11 +79,12 @@ class Wanted:
         return Numbers(terms.numbers(len(group.ends)), terms.unit)
 
 
-def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:
+def numbers_in(section: str, results: Iterable[Named]) -> list[CaseNumber]:
     """The numbers that a section of the study lists as its results."""
     return [
-        Wanted(result.result, tuple(result.where.items()), (section, "results", k)) for k, result in enumerate(results)
-    ]  # fmt: skip
+        CaseNumber(result.result, tuple(result.where.items()), (section, "results", k))
+        for k, result in enumerate(results)
+    ]
 
 
 def judged(group: Group, required: Sequence[Requirement]) -> Judged:
@@ -97,7 +98,7 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
     Raises
     ------
     UnknownColumnError
-        See `Wanted.find`.
+        See `CaseNumber.find`.
     """
     (one, *_), pairs = required, []
     limits = zip(*(bounds_of(requirement) for requirement in required), strict=True)
