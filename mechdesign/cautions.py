@@ -23,6 +23,11 @@ KINDS = {
         "digits or have no bound; nothing is wrong with a dead centre where the output shall turn back",
         "theory/kinematics",
     ),
+    "jammed": Kind("poses that friction lets no effort of the drives move on", "howto/friction"),
+    "self_locking": Kind(
+        "poses in which friction holds what the loads would move, as it shall in a screw, a wedge or a clamp",
+        "howto/friction",
+    ),
     "disagree": Kind(
         "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
     ),

@@ -39,6 +39,8 @@ class Forces:
         Force on the pin at each node.
     bodies : dict
         By body, the force on it at its base, and the moment about that.
+    slides : dict
+        By slide, the force along it on its slider, and against that on its guide.
     parts : list of (str, Vector, Value, Vector)
         What these add up: the body, the force, the moment about where it acts, and the arm from the base to there.
     """
@@ -46,6 +48,7 @@ class Forces:
     configuration: Configuration
     nodes: list[Vector] = field(default_factory=list)
     bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
+    slides: dict[int, Value] = field(default_factory=dict)
     parts: list[tuple[str, Vector, Value, Vector]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -61,6 +64,10 @@ class Forces:
         self.parts.append((body, force, moment, arm))
         before = self.bodies.get(body, (0.0, 0.0))
         self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
+
+    def on_slide(self, slide: int, force: Value) -> None:
+        """Add a force along a slide, on its slider and against that on its guide."""
+        self.slides[slide] = self.slides.get(slide, 0.0) + force
 
     def at(self, point: str, force: Vector) -> None:
         """Add a force at a point: on the pin there, or as ``rod.B`` on the link alone."""
@@ -90,6 +97,9 @@ class Forces:
         both.nodes = [plus(one, 1, more) for one, more in zip(self.nodes, other.nodes, strict=True)]
         for part in (*self.parts, *other.parts):
             both.on_body(*part)
+        both.slides = dict(self.slides)
+        for slide, along in other.slides.items():
+            both.on_slide(slide, along)
         return both
 
     @property

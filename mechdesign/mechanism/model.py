@@ -86,6 +86,16 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class Friction:
+    """Coulomb friction of a joint: of a pin with its `radius`, of a slide with the `length` of its guide, if given."""
+
+    joint: str
+    coefficient: Term
+    radius: Term | None = None
+    length: Term | None = None
+
+
+@dataclass(frozen=True)
 class Line:
     """A line fixed in a link: through a point, at an angle to the link's x axis or towards a second point."""
 
@@ -210,3 +220,4 @@ class Description:
     masses: Mapping[str, Mass] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
     couplings: Mapping[str, Coupling] = field(default_factory=dict)
+    friction: Mapping[str, Friction] = field(default_factory=dict)

@@ -54,40 +54,48 @@ class Balance:
 
 
 @quiet
-def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) -> Balance:
+def balance(
+    linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = (), *, pressed: Sequence[Value] | None = None
+) -> Balance:  # fmt: skip
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth.
+    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth. These are
+    pressed apart whichever way they drive; as those of the `pressed` efforts where these are given, which makes all
+    that they bear linear in the forces.
     """
     held = _balance(linear, forces)
     if not meshes:
         return held
     # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
     teeth = Forces(linear.configuration)
-    pressing = {mesh.coupling: engage(teeth, mesh, held.couplings[mesh.index]) for mesh in meshes}
+    pressing = {}
+    for mesh in meshes:
+        effort = held.couplings[mesh.index]
+        apart = 1.0 if pressed is None else np.sign(effort * pressed[mesh.index])
+        pressing[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
     return replace(_balance(linear, forces.plus(teeth)), teeth=pressing)
 
 
-def engage(teeth: Forces, mesh: Mesh, effort: Value) -> Vector:
+def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Value) -> Vector:
     """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
 
-    Teeth press each other apart by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt only
-    pulls, and its pretension is not known.
+    Teeth press each other `apart` by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt
+    only pulls, and its pretension is not known.
     """
     configuration = teeth.configuration
     radius = mesh.radii(configuration)[0]
     if mesh.belt:
         # Its tight part pulls.
-        place, _, along = mesh.strand(configuration, np.where(effort > 0, -1.0, 1.0))
-        force: Vector = along * np.abs(effort / radius)
+        place, _, along = mesh.strand(configuration, np.where(pressed > 0, -1.0, 1.0))
+        force: Vector = along * (apart * np.abs(effort / radius))
     else:
         place, along = mesh.contact(configuration)
         force = along * (effort if mesh.slide >= 0 else effort / radius)
         inside = np.logical_and(mesh.slide < 0, mesh.ratio(configuration) > 1)
         outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
-        apart = 1j * along * np.where(outwards != inside, 1.0, -1.0)
-        force = force + np.abs(force) * np.tan(mesh.pressure_angle) * apart
+        away = 1j * along * np.where(outwards != inside, 1.0, -1.0)
+        force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * away
     for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
         teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
     return force
@@ -98,7 +106,7 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
     structure, bodies = linear.structure, linear.graph.bodies
     nodes = list(forces.nodes)
     frames: list[Value] = [0.0] * linear.graph.classes
-    slides: list[Value] = [0.0] * len(linear.slides)
+    slides: list[Value] = [forces.slides.get(slide, 0.0) for slide in range(len(linear.slides))]
     edges: list[Vector] = [0.0] * len(structure.edges)
     for body, (force, moment) in forces.bodies.items():
         base = forces.bases[body]
@@ -179,7 +187,7 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
                 transmit(k, sign * force)
     efforts: list[Value] = [plus(0.0, -1, along(k)) for k in range(len(structure.given))]
     acting = replace(forces)
-    acting.nodes, acting.bodies = on_pins, forces.bodies
+    acting.nodes, acting.bodies, acting.slides = on_pins, forces.bodies, forces.slides
     return Balance(linear, acting, efforts, edges, [couplings[k] for k in structure.numbers])
 
 

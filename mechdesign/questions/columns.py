@@ -11,6 +11,13 @@ from mechdesign.study import Units
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")
 TIMED = ColumnKind("time", "time from the begin of the motion", "time")
 GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
+EFFICIENCY = (
+    ColumnKind("friction_power", "power that friction takes, never positive", "power",
+               "-sum of coefficient * radius * |joint force| * |relative rate|"),
+    ColumnKind("efficiency", "power that comes out over power that goes in, of drives or of loads, weights, springs "
+               "and inertia; 0 where friction takes all: self-locking"),
+    ColumnKind("back_efficiency", "the same while the mechanism moves backwards under the same forces"),
+)  # fmt: skip
 VALID = ColumnKind("valid", "1 where the pose is assembled and within its limits")
 
 

@@ -113,9 +113,14 @@ dynamics:
 mechanism: {links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 1}}, drives: [arm]}
 dynamics: {gravity: [0, -9.81 m/s^2], rates: {arm: 10}, flywheel: {fluctuation: 0.1}, modes: true}
 """)
+    rubbed = study_of(
+        FOUR_BAR, "mechanism.friction={B: {coefficient: 0.1, radius: 2}}",
+        "kinematics={poses: [{crank: 30}], outputs: [B], loads: [{at: B, force: [1, 0]}]}",
+    )  # fmt: skip
     return (
         ("motion in time", mechdesign.dynamics(fall), fall),
         ("flywheel and modes", mechdesign.dynamics(turn), turn),
+        ("friction", mechdesign.kinematics(rubbed), rubbed),
         ("pieces", mechdesign.workspace(bar), bar),
         ("time and centres", mechdesign.kinematics(crank), crank),
         ("errors over time", mechdesign.reliability(crank), crank),

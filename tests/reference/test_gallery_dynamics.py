@@ -95,3 +95,13 @@ def test_pendulum_passes_its_lowest_place_every_half_of_its_period() -> None:
     assert len(times) == 6
     energy = result.main["kinetic_energy"] + result.main["potential_energy"]
     assert np.ptp(energy) < 1e-9 * result.main["kinetic_energy"].max()
+
+
+def test_push_of_the_wedge_press_is_that_of_a_slope_steeper_by_two_angles_of_friction() -> None:
+    result = result_of("wedge_press")
+    angle = np.arctan(0.1)
+    assert result.main["push_effort"] == pytest.approx(1000 * np.tan(np.radians(8) + 2 * angle), rel=1e-12)
+    smooth = 1000 * np.tan(np.radians(8))
+    assert result.main["efficiency"] == pytest.approx(smooth / result.main["push_effort"], rel=1e-12)
+    assert not result.main["back_efficiency"].any()
+    assert "self_locking" in [warning.kind for warning in result.warnings]

@@ -22,6 +22,7 @@ from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import force_question
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import Courses
@@ -99,7 +100,12 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
     (effort, *_) = (static.name for static in question_of(motion).statics)
     unknown = ~np.isfinite(sum(motion.arrays[name] for name in (effort, "shaking", "shaking_moment")))
     regular = motion.arrays["conditioning"] >= STALLED
-    return {"singular": motion.valid & unknown & ~regular, "undefined": motion.valid & unknown & regular}
+    marks: dict[str, Flags] = {}
+    if (friction := question_of(motion).friction) is not None:
+        marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
+        unknown &= ~friction.jammed(motion.arrays)
+    singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
+    return {"singular": singular, "undefined": undefined, **marks}
 
 
 def tables(
@@ -111,8 +117,9 @@ def tables(
     Of the extremes those of some `outputs`, or all; the columns of `requests` are followed besides.
     """
     names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
-    integrals = [Request(name, integral=True) for name in names] if "extremes" in chosen else []
-    along = along_of(question, names, requests=[*requests, *integrals])
+    followed = [name for name in names if name not in EFFICIENCIES]
+    integrals = [Request(name, integral=True) for name in followed] if "extremes" in chosen else []
+    along = along_of(question, followed, requests=[*requests, *integrals])
     parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
     if "extremes" in chosen:
         parts["extremes"] = extremes_table(motion, along, names)
@@ -157,6 +164,9 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if mark.number:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    friction = question_of(passage.motion).friction
+    if friction is not None:
+        warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
     if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
         message = (

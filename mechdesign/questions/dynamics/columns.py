@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, VALID
+from mechdesign.questions.columns import DRIVE, EFFICIENCY, GIVEN, TIMED, VALID
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.results import KeyNumber, TableKind
 
@@ -16,7 +16,7 @@ DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies 
     ("shaking_moment", "moment of the mechanism on its frame about the origin", "moment"),
     ("kinetic_energy", "energy of the motion", "moment", "sum of m v^2/2 + J omega^2/2"),
     ("potential_energy", "energy of weights, 0 at the origin, and of springs, 0 at their free lengths", "moment",
-     "-sum of m g x + sum of k s^2/2 + preload s"), VALID)  # fmt: skip
+     "-sum of m g x + sum of k s^2/2 + preload s"), *EFFICIENCY, VALID)  # fmt: skip
 JOINT_FORCES = TableKind.of("joint_forces", "what the joints bear, a row a pose and joint",
     TIMED, DRIVE, GIVEN, ("joint", "point or joint"),
     ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
@@ -64,6 +64,7 @@ MODES = TableKind.of("modes", "natural frequencies of small motion about each po
 KEY_NUMBERS = (
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
     KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),
+    KeyNumber(DYNAMICS, "efficiency", "smallest efficiency", "smallest"),
     KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
     KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
 )  # fmt: skip

@@ -21,6 +21,7 @@ from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, rea
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
+from mechdesign.questions.friction import Friction, Slipping
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
@@ -52,6 +53,12 @@ class ForceQuestion:
         section = DynamicsSection.of(study)
         return cls(study, section, section.joints(study.mechanism), moves, tempo)
 
+    @cached_property
+    def friction(self) -> Friction | None:
+        """Friction in the joints, if the study gives any."""
+        mechanism = self.study.mechanism
+        return Friction(mechanism, self.joints) if mechanism.description.friction else None
+
     @property
     def forces(self) -> list[str]:
         """Names of the contacts' forces."""
@@ -61,8 +68,8 @@ class ForceQuestion:
     def statics(self) -> list[Static]:
         """Columns of a row a pose, and of the size of each joint's force."""
         mechanism, label = self.study.mechanism, self.study.units.label
-        moment = self.size * mechanism.size
-        sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo}
+        moment = self.size * (mechanism.size or 1.0)
+        sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo, "none": 1.0}
         of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
                     for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip
         kinds = column_kinds(mechanism, self.joints, moving=self.moves)
@@ -105,8 +112,8 @@ class ForceQuestion:
         """
         columns, held = self._held(poses, linear, rows, moving)
         if self.subset is None or not self.subset.isdisjoint(self.forces):
-            borne, stiffness = reactions(self.joints, held), self.study.stiffness
-            if self.subset is None and self.joints.open and stiffness is not None:
+            borne, stiffness = self._borne(held), self.study.stiffness
+            if self.subset is None and self.joints.open and stiffness is not None and self.friction is None:
                 section = poses.section(stiffness, rows)
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
                 self.apply(applied, 0, poses, rows, moving)
@@ -117,12 +124,17 @@ class ForceQuestion:
 
     def _held(
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
-    ) -> tuple[dict[str, Value], Balance]:
+    ) -> tuple[dict[str, Value], Balance | Slipping]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         mechanism = self.study.mechanism
         forces, energy = self.acting(poses, linear.configuration, rows, moving)
-        held = balance(linear, forces, mechanism.pressing)
         columns: dict[str, Value] = {}
+        if self.friction is None:
+            held: Balance | Slipping = balance(linear, forces, mechanism.pressing)
+        else:
+            back = self.subset is None or "back_efficiency" in self.subset
+            held = self.friction.solve(linear, forces, moving.velocity, back=back)
+            columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
             if moving.velocity is not None:
@@ -139,6 +151,9 @@ class ForceQuestion:
     ) -> tuple[Forces, Energy]:
         """Loads, springs, weights and inertia forces of all masses at some rows of poses, and the energies."""
         return self.forces_at(poses, configuration, rows, moving, self.masses(poses, rows, configuration.places))
+
+    def _borne(self, held: Balance | Slipping) -> list[Reaction]:
+        return held.reactions if isinstance(held, Slipping) else reactions(self.joints, held)
 
     def forces_at(
         self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving, masses: Mapping[str, Mass]

@@ -11,7 +11,16 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints
 from mechdesign.study.schema.checker import ORDERS, Checker
-from mechdesign.study.schema.loads import VELOCITY, Load, Quantity, check_loads, check_name, read_quantity
+from mechdesign.study.schema.loads import (
+    VELOCITY,
+    Load,
+    Quantity,
+    check_friction,
+    check_loads,
+    check_name,
+    joints_of,
+    read_quantity,
+)
 from mechdesign.study.schema.motions import Time
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
@@ -20,6 +29,8 @@ from mechdesign.study.text.fields import failure
 from mechdesign.study.text.units import Amount
 
 HELP_PAGE = "theory/dynamics"
+# Columns of a mechanism with friction, without units.
+EFFICIENCIES = ("efficiency", "back_efficiency")
 
 ROWS = 201  # of the table, where none are asked for
 MAX_ROWS = 100_000
@@ -140,18 +151,16 @@ class DynamicsSection(MotionSection):
                     f"'forward' and {key!r} are both given; what efforts bring about has poses and rates of its own"
                 )
                 checker.report((self.command, key), message, at_key=True)
+            if checker.mechanism.friction:
+                message = "a motion in time knows no friction yet; leave 'forward' out, or mechanism.friction"
+                checker.report((self.command, "forward"), message, at_key=True)
         check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=timed)
+        check_friction(checker)
         return super().checked(checker)
 
     def joints(self, mechanism: Mechanism) -> Joints:
         """The joints of a mechanism, where loads and springs act on some pins."""
-        springs = [spring for spring in mechanism.description.springs.values() if not spring.turning]
-        points = [load.at for load in self.loads if load.at is not None]
-        points += [point for load in self.loads for point in load.between or ()]
-        points += [point for spring in springs for point in spring.between]
-        graph = mechanism.graph
-        loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
-        return Joints(mechanism.description, graph, loaded, mechanism.pressing)
+        return joints_of(mechanism, self.loads, mechanism.description.springs.values())
 
     @property
     def moves(self) -> bool:
@@ -160,11 +169,15 @@ class DynamicsSection(MotionSection):
 
 
 def column_kinds(mechanism: Mechanism, joints: Joints, *, moving: bool) -> dict[str, str]:
-    """Kind of quantity of each number of a pose: efforts, shaking forces, energies, and the size of joint forces."""
+    """Kind of quantity of each number of a pose: efforts, shaking forces, energies, sizes of joint forces."""
     kinds: dict[str, str] = {}
     for drive in mechanism.drives:
         kinds[f"{drive}_effort"] = "moment" if mechanism.quantity(drive) == "angle" else "force"
         kinds |= {f"{drive}_power": "power"} if moving else {}
     kinds |= {"shaking.x": "force", "shaking.y": "force", "shaking": "force", "shaking_moment": "moment"}
     kinds |= {"kinetic_energy": "moment"} if moving else {}
-    return kinds | {"potential_energy": "moment"} | dict.fromkeys(joints.names, "force")
+    kinds |= {"potential_energy": "moment"}
+    if mechanism.description.friction:
+        kinds |= {"friction_power": "power"} if moving else {}
+        kinds |= dict.fromkeys(EFFICIENCIES, "none")
+    return kinds | dict.fromkeys(joints.names, "force")

@@ -74,7 +74,7 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
     for k, static in enumerate(statics):
         values = motion.arrays[static.name].reshape(poses.designs, -1)
         numbers[k] = _of_poses(np.where(valid, values, np.nan), at)
-        if along is not None:
+        if along is not None and static.name in along.columns:
             numbers[k] = np.where(along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k]))
     low, low_at, high, high_at, peak, peak_at, mean, rms = numbers.transpose(2, 1, 0).reshape(8, -1)
     names, units = ([getattr(static, key) for static in statics] * poses.designs for key in ("name", "unit"))

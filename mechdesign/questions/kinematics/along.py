@@ -18,6 +18,8 @@ from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.columns import GIVEN
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
+from mechdesign.questions.friction import APART
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.motion import Motion, rates_of_advantage
@@ -67,7 +69,8 @@ class Along:
         mechanism, sizes = question.study.mechanism, question.sizes
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
         columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
-        columns |= {static.name: static.size for static in question.statics}
+        # Efficiencies lose all digits where no power flows: they are those of the poses.
+        columns |= {s.name: s.size for s in question.statics if s.name not in EFFICIENCIES}
         self._requests, self._within = requests, dict[Part, Along]()
         whole = [request for request in requests if not request.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
@@ -191,7 +194,7 @@ class Along:
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
-        return table, motion.arrays["conditioning"]
+        return table, np.minimum(motion.arrays["conditioning"], motion.arrays.get(APART, 1.0))
 
     @cached_property
     def present(self) -> Floats:

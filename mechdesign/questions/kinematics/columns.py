@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, VALID
+from mechdesign.questions.columns import DRIVE, EFFICIENCY, GIVEN, TIMED, VALID
 from mechdesign.results import KeyNumber, TableKind
 
 # Place in the meaning of a table of numbers of whole motions, see `mechdesign.questions.kinematics.along.over`.
@@ -20,7 +20,7 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
     ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle between "
      "two links that meet"),
     ("<drive>_effort", "drive effort that balances the loads", "force or moment",
-     "-sum over the loads of F d(place)/d(drive)"),
+     "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
      "as the input's length over the output's", "rate of the input/rate of the output"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",

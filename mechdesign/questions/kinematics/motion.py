@@ -198,8 +198,12 @@ def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving:
     if section.loads:
         forces = Forces(linear.configuration)
         Loading(question.study, section.loads, question.poses, rows).add(forces, moving)
-        efforts = balance(linear, forces).efforts
-        columns = {f"{drive.name}_effort": effort for drive, effort in zip(question.drives, efforts, strict=True)}
+        if question.friction is None:
+            efforts = balance(linear, forces).efforts
+        else:
+            slipping = question.friction.solve(linear, forces, moving.velocity)
+            efforts, columns = slipping.efforts, dict(slipping.columns)
+        columns |= {f"{drive.name}_effort": effort for drive, effort in zip(question.drives, efforts, strict=True)}
     for name, input_name in section.mechanical_advantage.items():
         columns[f"{name}_advantage"] = _advantage(question, linear, name, input_name)
     return columns

@@ -17,6 +17,8 @@ from mechdesign.mechanism.derivatives import Linearization, mixes
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
+from mechdesign.questions.friction import Friction
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.kinematics.targets import followed, needed
@@ -26,6 +28,7 @@ from mechdesign.questions.poses import followed_angles
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS
+from mechdesign.study.schema.loads import joints_of
 
 
 def characteristic_length(study: Study) -> float | None:
@@ -122,6 +125,7 @@ class MotionQuestion:
         for drive in self.drives if self.section.loads else ():
             unit = label("moment" if drive.quantity == "angle" else "force")
             statics.append(Static(f"{drive.name}_effort", unit, "<drive>_effort", {"drive": drive.name}))
+        statics += [Static(name, "", name, {}) for name in EFFICIENCIES if self.friction is not None]
         for name, input_name in self.section.mechanical_advantage.items():
             units = {"length": label("length"), "angle": ""}
             above, below = (units[self.study.mechanism.quantity(coordinate)] for coordinate in (input_name, name))
@@ -129,6 +133,14 @@ class MotionQuestion:
             words = {"output": name, "input": input_name}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
+
+    @cached_property
+    def friction(self) -> Friction | None:
+        """Friction in the joints under the loads, if the study gives any."""
+        mechanism, loads = self.study.mechanism, self.section.loads
+        if not loads or not mechanism.description.friction:
+            return None
+        return Friction(mechanism, joints_of(mechanism, loads))
 
     @property
     def rated(self) -> dict[str, Coordinate]:
@@ -190,7 +202,8 @@ class MotionQuestion:
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
         needed = self.borne is not None and any(static.name in names for static in self.borne.statics)
         borne = self.borne.lean(names) if self.borne is not None and needed else None
-        if not rates and borne is None and not coordinates_in(self.study, section.loads):
+        directed = self.friction is not None and any(static.name in names for static in self.statics)
+        if not (rates or directed) and borne is None and not coordinates_in(self.study, section.loads):
             unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}
         if not any(static.name in names for static in self.statics):
             unasked |= {"loads": (), "mechanical_advantage": {}}

@@ -42,6 +42,8 @@ TURNED, BEFORE_CORNER = 1e-6, 1e-9
 def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """Warnings about the poses of one design, and about its rates."""
     cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
+    if question.friction is not None:
+        cautions += question.friction.cautions(question.study, question.poses, marks, _TABLE)
     return cautions + _untargeted(question, marks)
 
 
@@ -98,6 +100,8 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     if "inverse_condition" in arrays:
         marks[_REGULAR] = valid & steady
         marks[_NEAR] = valid & steady & _near(motion)
+    if question.friction is not None:
+        marks |= {name: valid & where for name, where in question.friction.marks(arrays).items()}
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
     for centre in question.centres:

@@ -10,7 +10,7 @@ from mechdesign.errors import counted
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.loads import Load, check_loads
+from mechdesign.study.schema.loads import Load, check_friction, check_loads
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
@@ -66,6 +66,8 @@ class KinematicsSection(MotionSection):
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
             text = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
             checker.report(("kinematics", "jacobian"), f"{text}; a Jacobian has as many outputs as drives", at_key=True)
+        if self.loads:
+            check_friction(checker)
         check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 

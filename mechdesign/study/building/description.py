@@ -20,6 +20,7 @@ from mechdesign.mechanism.model import (
     Description,
     Drive,
     Fixed,
+    Friction,
     Joint,
     Limit,
     Line,
@@ -59,7 +60,7 @@ def build(builder: Builder) -> Description:
     couplings = _couplings(builder)
     description = Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
-        builder.units.angle_factor, builder.masses, springs, couplings,
+        builder.units.angle_factor, builder.masses, springs, couplings, _friction(builder),
     )  # fmt: skip
     return _with_phases(builder, description)
 
@@ -333,6 +334,49 @@ def _springs(builder: Builder) -> dict[str, Spring]:
             terms.get("force", 0.0), terms.get("damping", 0.0),
         )  # fmt: skip
     return springs
+
+
+def _friction(builder: Builder) -> dict[str, Friction]:
+    """Friction of joints without mistakes in their names; its numbers become places."""
+    section, friction = builder.section, dict[str, Friction]()
+    names = [*section.owners, *section.slides, *section.legs]
+    for name, given in section.friction.items():
+        path: KeyPath = ("friction", name)
+        joint = section.joints.get(name)
+        if joint is not None and joint.fixed is not None:
+            builder.report(path, f"{name!r} is a clamp, in which nothing moves: leave it out", at_key=True)
+            continue
+        if not builder.reporter.check_name(name, names, "pin, slide or telescopic link", (*ROOT, *path), at_key=True):
+            continue
+        if name in section.owners:
+            clamps = [clamp for clamp in section.joints.values() if clamp.fixed and _clamped_at(builder, clamp, name)]
+            if len(section.owners[name]) - len(clamps) < 2:
+                slots = [slot for slot, other in section.joints.items() if other.slot and other.point == name]
+                mend = f"; it slides in {slots[0]!r}: give the friction of that" if slots else "; leave it out"
+                builder.report(path, f"no pin turns at {name!r}{mend}", at_key=True)
+            if given.radius is None:
+                builder.report(path, f"friction of the pin {name!r} turns against its radius: give 'radius'")
+            if given.length is not None:
+                builder.report((*path, "length"), "a pin has no 'length'; give its 'radius'", at_key=True)
+        else:
+            if given.radius is not None:
+                message = f"{name!r} slides: its friction has no 'radius'"
+                builder.report((*path, "radius"), message, at_key=True)
+            if given.length is not None and joint is not None and joint.slot:
+                message = "the pin in a slot bears no moment: its friction has no 'length'"
+                builder.report((*path, "length"), message, at_key=True)
+        kinds: dict[str, Quantity] = {"coefficient": "none", "radius": "length", "length": "length"}
+        terms = {
+            key: builder.place(f"friction.{name}.{key}", getattr(given, key), kinds[key]) for key in given.given(*kinds)
+        }
+        friction[name] = Friction(name, terms["coefficient"], terms.get("radius"), terms.get("length"))
+    return friction
+
+
+def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
+    assert clamp.fixed is not None
+    one, other = (builder.section.points_of(link) for link in clamp.fixed)
+    return point == (clamp.point or next((shared for shared in one if shared in other), None))
 
 
 def _couplings(builder: Builder) -> dict[str, Coupling]:

@@ -349,6 +349,20 @@ class Coupling(fields.Model):
         return self
 
 
+class Friction(fields.Model):
+    """Coulomb friction of a pin, a slide, a slot or a telescopic link."""
+
+    coefficient: fields.NonNegativePurePlace
+    """Coefficient of friction. Example: 0.1"""
+    radius: fields.NonNegativeLengthPlace | None = None
+    """Radius of the pin: friction turns against coefficient times radius times joint force. Example: 5"""
+    length: fields.PositiveLengthPlace | None = None
+    """Of a slide whose slider does not turn, the distance of the ends of the guide that bear it, from one side of its
+    point to the other: the force across it and its moment press on both. Left out: the force across alone counts.
+    Example: 40
+    """
+
+
 class Limit(fields.Model):
     """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
 
@@ -449,6 +463,10 @@ class MechanismSection(fields.Model):
     couplings: dict[fields.CouplingName, Coupling] = Field(default_factory=dict)
     """Coordinates that follow others, by name; each takes one drive's place. Example: {mesh: {set: planet.angle, of:
     sun.angle, ratio: -2.5}} Example: {cam: {set: follower, to: 12 + 5*(1 - cos(2*crank))}}
+    """
+    friction: dict[fields.JointName, Friction] = Field(default_factory=dict)
+    """Friction of joints by the name of a point whose pin turns, a slide, a slot or a telescopic link. Example: {A:
+    {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Spring
+from mechdesign.mechanism.statics import Joints
 from mechdesign.study.poses import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
@@ -84,6 +87,32 @@ class Load(fields.Model):
             yield ("force", k) if self.at is not None else ("force",), part, "force"
         if self.moment is not None:
             yield ("moment",), self.moment, "moment"
+
+
+def joints_of(mechanism: Mechanism, loads: Iterable[Load], springs: Iterable[Spring] = ()) -> Joints:
+    """The joints of a mechanism, where loads and springs act on some pins."""
+    loads = tuple(loads)
+    points = [load.at for load in loads if load.at is not None]
+    points += [point for load in loads for point in load.between or ()]
+    points += [point for spring in springs if not spring.turning for point in spring.between]
+    graph = mechanism.graph
+    loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
+    return Joints(mechanism.description, graph, loaded, mechanism.pressing)
+
+
+def check_friction(checker: Checker) -> None:
+    """Check that equilibrium tells the moments of slides that bear them by the length of their guide."""
+    mechanism = checker.compiled
+    frictions = {} if mechanism is None else mechanism.description.friction
+    if mechanism is None or not frictions:
+        return
+    for name in sorted(joints_of(mechanism, ()).open):
+        if name in frictions and frictions[name].length is not None:
+            message = (
+                f"equilibrium leaves open which moment {name!r} bears in its chain of slides and clamps: leave out "
+                "'length', and the force across it counts alone"
+            )
+            checker.report(("mechanism", "friction", name, "length"), message, at_key=True)
 
 
 def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, moving: bool, timed: bool) -> None:

@@ -1,4 +1,4 @@
-"""Paths of a coordinate or a point as the study file gives them, and files of numbers.
+"""Paths of a coordinate or a point as the study file gives them.
 
 A path is points or numbers one after another, a circle, an arc, or a line.
 """
@@ -6,6 +6,7 @@ A path is points or numbers one after another, a circle, an arc, or a line.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator

@@ -536,6 +536,7 @@ NonNegativeLengthPlace = Annotated[Amount, number("length", 0.0, place=True)]
 NonNegativeMassPlace = Annotated[Amount, number("mass", 0.0, place=True)]
 NonNegativeInertiaPlace = Annotated[Amount, number("moment_of_inertia", 0.0, place=True)]
 AnyPlace = Annotated[Amount, number(place=True)]
+NonNegativePurePlace = Annotated[Amount, number("none", 0.0, place=True)]
 NonNegativePlace = Annotated[Amount, number(None, 0.0, place=True)]
 Bound = Annotated[Expression, Read(read_expression, NUMBER_FORM)]
 

@@ -1,0 +1,143 @@
+"""Friction at solved poses: the equilibrium with it, efficiencies, and what is to be said of poses that jam."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value, largest, quiet
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.forces import Forces
+from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
+from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.statics import Balance, Joints, Reaction
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
+_JAMS, _HOLDS = "jams in", "is held by"
+# Another: how far a pose is from jamming, from 0 to 1; forces lose so many digits.
+APART = "apart from jamming"
+# A slide bears a moment of note from this part of the largest joint force times the size of the mechanism.
+NOTABLE_MOMENT = 0.01
+# The mechanism is called self-locking where friction holds it in at least this part of the poses: at a dead centre, and
+# against inertia, friction holds every mechanism.
+OFTEN = 0.5
+_MOMENT = "moment without length"
+
+
+@dataclass(frozen=True, eq=False)
+class Slipping:
+    """Poses in equilibrium with friction: `columns` are efficiencies, power, and marks."""
+
+    balance: Balance
+    reactions: list[Reaction]
+    columns: Mapping[str, Value]
+
+    @property
+    def efforts(self) -> list[Value]:
+        """Efforts of the drives."""
+        return self.balance.efforts
+
+
+class Friction:
+    """Friction in the joints of a mechanism, compiled once."""
+
+    def __init__(self, mechanism: Mechanism, joints: Joints) -> None:
+        self.mechanism, self.joints = mechanism, joints
+        self.contacts: list[Rubbing] = rubbings(joints, mechanism.description.friction)
+        #: Joints with friction, by which marks count.
+        self.names = list(dict.fromkeys(contact.joint for contact in self.contacts))
+        self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])
+
+    @quiet
+    def solve(self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True) -> Slipping:
+        """Equilibrium under forces while the mechanism moves; where it stands still, as if all drives moved up.
+
+        With `back` also what it does on its way back.
+        """
+        mechanism, moves = self.mechanism, velocity is not None
+        drives = [mechanism.coordinate(name) for name in mechanism.drives]
+        if velocity is None:
+            velocity = linear.velocity([1.0 if c.quantity == "angle" else mechanism.size for c in drives])
+        rates = [first(linear.configuration, drive, velocity) for drive in drives]
+        rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.pressing, mechanism.size)
+        ahead = rubs.solve(velocity)
+        ways = [ahead, rubs.solve(velocity, back=True)] if back else [ahead]
+        columns: dict[str, Value] = {}
+        holds: Value = 0.0
+        for name, rubbed, sign in zip(EFFICIENCIES, ways, (1.0, -1.0), strict=False):
+            lost = np.sum(rubbed.power, axis=0)
+            ratio = efficiency(rubbed.balance.efforts, [sign * rate for rate in rates], lost)
+            columns[name] = ratio.value
+            holds = np.where(ratio.holds, self._number[np.nan_to_num(-rubbed.power).argmax(axis=0)], holds)
+        if moves:
+            columns["friction_power"] = np.sum(ahead.power, axis=0)
+        columns |= {_JAMS: np.where(ahead.jams < 0, 0, self._number[ahead.jams]), _HOLDS: holds}
+        columns[APART] = np.min([np.where(way.jams < 0, way.apart, 1.0) for way in ways], axis=0)
+        whole = rubs.reactions(ahead)
+        columns[_MOMENT] = self._moments_without_length(whole)
+        return Slipping(ahead.balance, whole, columns)
+
+    def _moments_without_length(self, whole: Sequence[Reaction]) -> Value:
+        """One more than the number of a slide that bears a moment, which its friction leaves out; else 0."""
+        number: Value = 0.0
+        force = largest(np.abs(reaction.force) for reaction in whole)
+        for contact, own in zip(self.contacts, self._number.tolist(), strict=True):
+            joint, reaction = self.joints.contacts[contact.contact], whole[contact.contact]
+            if joint.slides and contact.friction.length is None:
+                large = np.abs(reaction.moment) > NOTABLE_MOMENT * force * self.mechanism.size
+                number = np.where(large, own, number)
+        return number
+
+    def marks(self, arrays: Mapping[str, Floats]) -> dict[str, Flags]:
+        """Poses of which something is to be said."""
+        return {
+            f"{what} {name}": np.equal(arrays[what], k)
+            for what in (_JAMS, _HOLDS, _MOMENT)
+            for k, name in enumerate(self.names, 1)
+        }
+
+    def jammed(self, arrays: Mapping[str, Floats]) -> Flags:
+        """Poses in which the mechanism jams."""
+        return np.asarray(arrays[_JAMS] > 0)
+
+    def cautions(
+        self, study: Study, poses: Poses, marks: Mapping[str, tuple[int, int]], table: str
+    ) -> list[Caution]:  # fmt: skip
+        """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
+        warnings, count = [], poses.count // poses.designs
+
+        def told(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
+            number, row = marks[f"{what} {name}"]
+            where = pose_in_words(study, poses, row) if number >= least else ""
+            words = f"in {number} of {count} poses {text}; the first: {where}"
+            return (words, table, row, where) if number >= least else None
+
+        for name in self.names:
+            text = (
+                f"friction in {name} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
+                "forces are nan; a longer guide, a smaller offset or coefficient frees it"
+            )
+            if jams := told(_JAMS, name, 1, text):
+                warnings.append(Caution("jammed", *jams))
+            text = (
+                f"friction holds what the loads would move, most of it in {name}: the mechanism is self-locking there, "
+                "and the drives must push in either direction"
+            )
+            if holds := told(_HOLDS, name, max(OFTEN * count, 1), text):
+                warnings.append(Caution("self_locking", *holds))
+            text = (
+                f"{name} bears a moment, which presses on both ends of its guide, and its friction counts the force "
+                "across alone; give its 'length'"
+            )
+            if turns := told(_MOMENT, name, 1, text):
+                warnings.append(Caution("incomplete", *turns))
+        return warnings
