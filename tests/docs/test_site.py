@@ -29,7 +29,7 @@ WORDS = {
     "stroke": "howto/stroke_and_timing", "swing": "howto/swing_tolerance", "baseline": "howto/batch",
     "dead centre": "theory/kinematics", "dead center": "theory/kinematics", "toggle": "theory/kinematics",
     "mechanical advantage": "theory/kinematics", "Grashof": "theory/kinematics", "Jacobian": "theory/kinematics",
-    "manipulability": "theory/workspace", "friction": "theory/limits", "Cpk": "howto/standard_grades",
+    "manipulability": "theory/workspace", "friction": "howto/friction", "Cpk": "howto/standard_grades",
 }  # fmt: skip
 
 
@@ -99,5 +99,6 @@ def test_thumbnails_are_small(site: Path) -> None:
         path.name: path.stat().st_size for path in (site / "_images").glob("*.svg") if "@keyframes" in path.read_text()
     }
     assert len(sizes) > 40
-    assert max(sizes.values()) < 17_000
+    # The largest shows two linkages, a geared five-bar and its four-bar.
+    assert max(sizes.values()) < 22_000
     assert sum(sizes.values()) < 450_000
