@@ -119,7 +119,10 @@ def tables(
     names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
     followed = [name for name in names if name not in EFFICIENCIES]
     integrals = [Request(name, integral=True) for name in followed] if "extremes" in chosen else []
-    along = along_of(question, followed, requests=[*requests, *integrals])
+    friction = question_of(motion).friction
+    # Towards a pose in which the mechanism jams forces grow without end: nothing is said between the poses.
+    jams = friction is not None and bool(friction.jammed(motion.arrays).any())
+    along = None if jams else along_of(question, followed, requests=[*requests, *integrals])
     parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
     if "extremes" in chosen:
         parts["extremes"] = extremes_table(motion, along, names)
