@@ -103,6 +103,7 @@ dynamics:
     assert table["theta"] == pytest.approx(alone["theta"], abs=1e-7)
 
 
+@pytest.mark.nightly
 def test_a_slider_crank_is_driven_through_its_dead_centres_by_its_slider() -> None:
     # The crank turns through the dead centres of the slider, which is the drive; without friction it turns on for ever.
     text = f"""{UNITS}
