@@ -262,7 +262,8 @@ def test_many_designs_at_once_are_those_one_by_one(case: Sprung, seed: int) -> N
     But for the condition of the mechanism drawn, which magnifies the last digit of a number. Not the eigen-stiffnesses:
     twists of two that are alike, such as rigid ones, are any in their plane.
     """
-    data = yaml.safe_load(case.text(loads=[[30.0, -20.0, 8.0 if case.link else 0.0]], direction=25.0))
+    load = [30.0, -20.0, 8.0] if case.link else [30.0, -20.0]
+    data = yaml.safe_load(case.text(loads=[load], direction=25.0))
     section, rng = data["stiffness"], np.random.default_rng(seed)
     parameters: dict[str, float] = {}
 
