@@ -84,6 +84,11 @@ class Configuration:
         turn = self.rotations[frame]
         return turn if isinstance(offset, float) else turn * offset
 
+    def direction(self, edge: int) -> Vector:
+        """Unit vector of an edge's slide in the world."""
+        along: Vector = self.vectors.d[edge] * self.rotations[self.graph.edges[edge].frame]
+        return along
+
     @quiet
     def value(self, coordinate: Coordinate) -> Value:
         """Value of a coordinate; angles in radians, in the turn that `near` tells."""

@@ -132,7 +132,7 @@ class FourBar:
         offset = nothing
         if self.slide >= 0:
             span = poses.nodes[joints[(self.slide + 1) % 4].node] - poses.nodes[joints[self.slide - 1].node]
-            offset = np.abs(cross(np.asarray(_along(poses, joints[self.slide])), np.asarray(span)))
+            offset = np.abs(cross(np.asarray(poses.direction(joints[self.slide].edge)), np.asarray(span)))
             offset = np.where(offset > EQUAL_LENGTHS * size, offset, 0.0)
         table = np.stack([np.broadcast_to(part, poses.shape) for part in (*lengths, offset)], axis=1)
         return [replace(self, lengths=(*row[:4],), offset=row[4]) for row in table.tolist()]
@@ -152,7 +152,7 @@ class FourBar:
     def _vector(self, configuration: Configuration, end: int | None) -> Vector:
         tail, head = (self.joints[k] for k in self._line(end))
         if tail is head:
-            return 1j * _along(configuration, tail)
+            return 1j * configuration.direction(tail.edge)
         return configuration.nodes[head.node] - configuration.nodes[tail.node]
 
     def squareness(self, configuration: Configuration, end: int) -> tuple[Value, Value]:
@@ -274,11 +274,6 @@ class _Bodies:
             if (edges[joint.edge].slide in group.slides) if joint.edge >= 0 else (root in group.angles):
                 return index
         return -1
-
-
-def _along(configuration: Configuration, slide: Joint) -> Vector:
-    """Unit vector along a slide."""
-    return configuration.vectors.d[slide.edge] * configuration.rotations[configuration.graph.edges[slide.edge].frame]
 
 
 def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[Joint]]]:

@@ -125,9 +125,7 @@ class Margins:
         structure = self.plan.structure
         group = structure.groups[index]
         one, two = (
-            configuration.vectors.d[k] * configuration.rotations[structure.edges[k].frame]
-            for k, _ in group.loops[0].edges
-            if structure.edges[k].slide in group.slides
+            configuration.direction(k) for k, _ in group.loops[0].edges if structure.edges[k].slide in group.slides
         )
         return cross(np.asarray(one), np.asarray(two))
 

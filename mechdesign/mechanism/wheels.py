@@ -90,8 +90,9 @@ class Mesh:
         """Where the pitch circles touch, and the unit vector in which the link that follows moves there by its rate."""
         centre, ratio = configuration.nodes[self.axes[1]], self.ratio(configuration)
         if self.slide >= 0:
-            k, edge = next((k, e) for k, e in enumerate(configuration.graph.edges) if e.slide == self.slide)
-            along: Vector = configuration.rotations[edge.frame] * configuration.vectors.d[k]
+            along = configuration.direction(
+                next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == self.slide)
+            )
             return centre - 1j * along * ratio, along
         driven = configuration.nodes[self.axes[0]]
         way = (driven - centre) / np.abs(driven - centre)
@@ -116,21 +117,23 @@ class Mesh:
 
 def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled], drawn: Configuration) -> list[Mesh]:
     """The wheels of all couplings that wheels can make: those linear in angles about axes on one carrier."""
-    found = []
+    wheels = []
     for index, coupling in enumerate(couplings):
         given = description.couplings[coupling.name]
         if given.wheels == "none":
             continue
-        axes = _rack(description, graph, coupling) if coupling.follower.kind == "slide" else None
-        axes = axes or _wheels(description, graph, coupling, drawn)
+        if coupling.follower.kind == "slide":
+            axes = _rack(description, graph, coupling)
+        else:
+            axes = _wheels(description, graph, coupling, drawn)
         if axes is not None:
             links, carrier, nodes = axes
             slide = coupling.follower.slide
             equal = slide < 0 and abs(float(_ratio(_rates(coupling.gap, drawn), links[1], carrier)) - 1.0) < SAME_RATE
             belt = given.wheels == "belt" or equal
             looks = belt, given.pressure_angle, given.radius
-            found.append(Mesh(coupling.name, index, coupling.gap, links, carrier, nodes, slide, *looks))
-    return found
+            wheels.append(Mesh(coupling.name, index, coupling.gap, links, carrier, nodes, slide, *looks))
+    return wheels
 
 
 def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:

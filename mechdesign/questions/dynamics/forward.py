@@ -43,13 +43,13 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     course = Integration(equations).run(progress)
     motion, shown = _forces(study, course)
     names = [static.name for static in question_of(motion).statics]
-    found = {
+    tables = {
         "forward": _forward_table(motion, course, outputs), "events": _events_table(study, course),
         "dynamics": dynamics_table(motion), "joint_forces": joint_table(motion),
         "extremes": extremes_table(motion, None, names),
     }  # fmt: skip
     scope = Scope(poses_only=True)
-    found = {name: table if name == "events" else replace(table, scope=scope) for name, table in found.items()}
+    tables = {name: table if name == "events" else replace(table, scope=scope) for name, table in tables.items()}
     warnings = []
     if course.ended:
         kind, words = ("unconverged", "ended early") if course.failed else ("incomplete", "ended")
@@ -57,7 +57,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
             Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward")
         )
     counts = {"instants": len(course.times), "steps": course.steps}
-    return Result("dynamics", found, warnings, counts), motion, shown
+    return Result("dynamics", tables, warnings, counts), motion, shown
 
 
 def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:

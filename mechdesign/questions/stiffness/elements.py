@@ -241,7 +241,7 @@ def _bearing_freedoms(
 def _slide_direction(slide: int, configuration: Configuration) -> Complexes:
     """Unit vector of a slide of the graph in each pose, shape (n,)."""
     k = next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == slide)
-    direction = configuration.vectors.d[k] * configuration.rotations[configuration.graph.edges[k].frame]
+    direction = configuration.direction(k)
     return np.broadcast_to(np.asarray(direction, dtype=complex), configuration.shape)
 
 

@@ -164,7 +164,7 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
             continue
         k = edges[graph.slides.index(name)]
         origin = pick(configuration.nodes[graph.edges[k].tail])
-        along = pick(configuration.rotations[graph.edges[k].frame] * configuration.vectors.d[k])
+        along = pick(configuration.direction(k))
         slider = None if isinstance(joint, Slot) else joint.slider
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
     drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])
