@@ -41,48 +41,67 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class _Function:
-    """A function of the language: its meaning, its value and its partial derivatives, on floats and arrays."""
+    """A function of the language: its meaning, its value, and its first and second partial derivatives.
+
+    The second ones are those by x, and of two arguments those by x and x, x and y, y and y.
+    """
 
     meaning: str
     value: Callable[..., Any]
     partials: Callable[..., tuple[Any, ...]]
+    seconds: Callable[..., tuple[Any, ...]] = lambda *_: (0.0, 0.0, 0.0)
     angles: Literal["", "takes", "gives"] = ""
 
 
 _FUNCTIONS: dict[str, _Function] = {
-    "sqrt": _Function("square root", np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
-    "exp": _Function("exponential function", np.exp, lambda x: (np.exp(x),)),
-    "log": _Function("natural logarithm", np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
+    "sqrt": _Function("square root", np.sqrt, lambda x: (0.5 / np.sqrt(x),), lambda x: (-0.25 / (x * np.sqrt(x)),)),
+    "exp": _Function("exponential function", np.exp, lambda x: (np.exp(x),), lambda x: (np.exp(x),)),
+    "log": _Function(
+        "natural logarithm", np.log, lambda x: (1.0 / np.asarray(x, dtype=float),), lambda x: (-1.0 / np.square(x),)
+    ),
     "abs": _Function("absolute value", np.abs, lambda x: (np.sign(x),)),
-    "sin": _Function("sine of an angle", np.sin, lambda x: (np.cos(x),), "takes"),
-    "cos": _Function("cosine of an angle", np.cos, lambda x: (-np.sin(x),), "takes"),
-    "tan": _Function("tangent of an angle", np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
+    "sin": _Function("sine of an angle", np.sin, lambda x: (np.cos(x),), lambda x: (-np.sin(x),), "takes"),
+    "cos": _Function("cosine of an angle", np.cos, lambda x: (-np.sin(x),), lambda x: (-np.cos(x),), "takes"),
+    "tan": _Function(
+        "tangent of an angle",
+        np.tan,
+        lambda x: (1.0 + np.tan(x) ** 2,),
+        lambda x: (2.0 * np.tan(x) * (1.0 + np.tan(x) ** 2),),
+        "takes",
+    ),
     "asin": _Function(
         "angle whose sine it is, within a quarter turn of 0",
         np.arcsin,
         lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),),
+        lambda x: (x / ((1.0 - x) * (1.0 + x)) ** 1.5,),
         "gives",
     ),
     "acos": _Function(
         "angle whose cosine it is, from 0 to half a turn",
         np.arccos,
         lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),),
+        lambda x: (-x / ((1.0 - x) * (1.0 + x)) ** 1.5,),
         "gives",
     ),
     "atan": _Function(
         "angle whose tangent it is, within a quarter turn of 0",
         np.arctan,
         lambda x: (1.0 / (1.0 + np.square(x)),),
+        lambda x: (-2.0 * x / np.square(1.0 + np.square(x)),),
         "gives",
     ),
     "atan2": _Function(
         "angle from the x axis to the place (x, y)",
         np.arctan2,
         lambda y, x: (x / (np.square(x) + np.square(y)), -y / (np.square(x) + np.square(y))),
+        lambda y, x: np.array([-2 * x * y, y * y - x * x, 2 * x * y]) / np.square(np.square(x) + np.square(y)),
         "gives",
     ),
     "hypot": _Function(
-        "square root of the sum of squares", np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))
+        "square root of the sum of squares",
+        np.hypot,
+        lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y)),
+        lambda x, y: np.array([y * y, -x * y, x * x]) / np.hypot(x, y) ** 3,
     ),
     "min": _Function(
         "the smallest of two numbers or more",
@@ -96,12 +115,22 @@ _FUNCTIONS: dict[str, _Function] = {
     ),
     "+": _Function("sum", np.add, lambda x, y: (1.0, 1.0)),
     "-": _Function("difference", np.subtract, lambda x, y: (1.0, -1.0)),
-    "*": _Function("product", np.multiply, lambda x, y: (y, x)),
-    "/": _Function("quotient", np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
+    "*": _Function("product", np.multiply, lambda x, y: (y, x), lambda *_: (0.0, 1.0, 0.0)),
+    "/": _Function(
+        "quotient",
+        np.true_divide,
+        lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y))),
+        lambda x, y: (0.0, -1.0 / np.square(y), 2.0 * x / (y * np.square(y))),
+    ),
     "**": _Function(
         "power; groups to the right and binds more tightly than a sign",
         np.float_power,
         lambda x, y: (y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)),
+        lambda x, y: (
+            y * np.subtract(y, 1.0) * np.float_power(x, np.subtract(y, 2.0)),
+            np.float_power(x, np.subtract(y, 1.0)) * (1.0 + y * np.log(x)),
+            np.float_power(x, y) * np.square(np.log(x)),
+        ),
     ),
     "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
@@ -149,6 +178,10 @@ class Tabulated:
     def partials(self, x: Any) -> tuple[Any]:
         """Its derivative."""
         return (self._at(x, 1),)
+
+    def seconds(self, x: Any) -> tuple[Any]:
+        """Its second derivative."""
+        return (self._at(x, 2),)
 
 
 # What an expression calls: a function by its name, or a table.
@@ -198,6 +231,15 @@ class Expression:
             lambda value: (value, {}), lambda name: (self._variable(env, name), {name: 1.0}), self._differentiate
         )
         return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
+
+    def bends(self, env: Mapping[str, ArrayLike], rates: Mapping[str, Number]) -> dict[str, Number]:
+        """Exact rates of these partial derivatives while the variables change with some `rates`."""
+        result: tuple[Any, dict[str, Any], dict[str, Any]] = self._run(
+            lambda value: (value, {}, {}),
+            lambda name: (self._variable(env, name), {name: 1.0}, {name: 0.0}),
+            lambda name, arguments: self._bend(name, arguments, rates),
+        )
+        return {name: np.asarray(value, dtype=float)[()] for name, value in result[2].items()}
 
     @classmethod
     def of_table(cls, text: str, table: Tabulated, name: str, angle_unit: float) -> Expression:
@@ -329,6 +371,29 @@ class Expression:
             for variable, seed in seeds.items():
                 total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
         return function.value(*values) * outer, total
+
+    def _bend(
+        self, name: Called, arguments: list[tuple[Any, dict[str, Any], dict[str, Any]]], rates: Mapping[str, Number]
+    ) -> tuple[Any, dict[str, Any], dict[str, Any]]:
+        function = _function(name)
+        inner, outer = self._angle_factors(function)
+        values = [np.asarray(value) * inner for value, _, _ in arguments]
+        slopes: dict[str, Any] = {}
+        bends: dict[str, Any] = {}
+        # Only what varies has a rate: by an exponent that is constant a power of a negative number has no derivative.
+        moving = {
+            k: inner * sum(seed * rates[variable] for variable, seed in seeds.items())
+            for k, (_, seeds, _) in enumerate(arguments) if seeds
+        }  # fmt: skip
+        partials, seconds = function.partials(*values), function.seconds(*values)
+        for k in moving:
+            _, seeds, bent = arguments[k]
+            turn = sum(seconds[k + other] * rate for other, rate in moving.items())
+            for variable, seed in seeds.items():
+                slopes[variable] = slopes.get(variable, 0.0) + seed * partials[k] * inner * outer
+                bend = (bent[variable] * partials[k] + seed * turn) * inner * outer
+                bends[variable] = bends.get(variable, 0.0) + bend
+        return function.value(*values) * outer, slopes, bends
 
     def _angle_factors(self, function: _Function | Tabulated) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0

@@ -198,6 +198,16 @@ class Linearization(Loops):
         count = len(self.structure.given)
         return [self.velocity([float(j == k) for j in range(count)]) for k in range(count)]
 
+    def parted(self, coupling: int) -> Rates:
+        """Derivatives of all positions by the gap of a coupling that is let go; drives and other couplings hold."""
+        number = self.structure.numbers[coupling]
+        value, sign = self.structure.values[number], 1.0 if number in self.structure.coupled else -1.0
+
+        def derived(pose: Configuration, coordinate: Coordinate, rates: Rates) -> Value:
+            return first(pose, coordinate, rates) + (sign if coordinate is value else 0.0)
+
+        return self._solve([0.0] * len(self.structure.given), [0.0] * len(self.structure.edges), derived=derived)
+
     @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""

@@ -9,12 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, Vector, dot, largest, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-
-# Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
-GRADIENT_STEP = 1e-6
 
 
 class Pulls(NamedTuple):
@@ -114,7 +111,10 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
         )
         mixed = [_user(part, second(configuration, part, one, other, both), coordinate) for part in coordinate.parts]
         values = configuration.user_values(coordinate)
-        gradient, curved = _gradient(coordinate, values), _directional(coordinate, values, along_one)
+        assert coordinate.expression is not None
+        rates = {part.name: rate for part, rate in zip(coordinate.parts, along_one, strict=True)}
+        bends = coordinate.expression.bends(values, rates)
+        gradient, curved = _gradient(coordinate, values), [bends.get(part.name, 0.0) for part in coordinate.parts]
         terms = zip(gradient, mixed, curved, along_other, strict=True)
         return _radians(coordinate, sum(g * m + c * b for g, m, c, b in terms))
     return first(configuration, coordinate, both)
@@ -173,18 +173,3 @@ def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
     assert coordinate.expression is not None
     partials = coordinate.expression.derivatives(values)
     return [partials.get(part.name, 0.0) for part in coordinate.parts]
-
-
-def _directional(coordinate: Coordinate, values: dict[str, Value], direction: list[Value]) -> list[Value]:
-    """Derivative of an expression's gradient along a direction, by a central difference of the exact gradient."""
-    fastest = largest(direction)
-    scale = largest(values.values(), 1.0)
-    # A pose that does not move takes any step: both sides are the same.
-    step = GRADIENT_STEP * scale / np.where(fastest > 0, fastest, 1.0)
-    sides = [
-        _gradient(
-            coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}
-        )
-        for h in (step, -step)
-    ]
-    return [(a - b) / (2 * step) for a, b in zip(*sides, strict=True)]

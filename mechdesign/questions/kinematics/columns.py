@@ -22,7 +22,11 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
     ("<drive>_effort", "drive effort that balances the loads", "force or moment",
      "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
-     "as the input's length over the output's", "rate of the input/rate of the output"), VALID)  # fmt: skip
+     "as the input's length over the output's", "rate of the input/rate of the output"),
+    ("<coupling>_pressure_angle", "pressure angle of cam <coupling>: from its follower's velocity to the normal of the "
+     "profile", "angle"),
+    ("<coupling>_curvature_radius", "radius of curvature of cam <coupling> where it is touched; negative where it is "
+     "hollow", "length"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",
     TIMED, DRIVE, GIVEN,
     ("<a>.<b>.x, <a>.<b>.y", "place of the instant centre of <a> and <b>; inf where one translates against the other",
@@ -64,6 +68,14 @@ TARGETS = TableKind.of("targets", f"errors of the outputs against their targets 
     ("rms", "root of the mean square of the error (of a point: of its distance), in `unit`", "", "sqrt(mean(e^2))"),
     ("mean", "mean error, in `unit`"), ("max_abs", "largest absolute error, in `unit`"),
     ("at", "<swept> at the largest error", "as what is swept"), ("unit", "unit of its errors"))  # fmt: skip
+CAM = TableKind.of("cam", "profiles of cams in their frames",
+    ("coupling", "coupling of the cam"), ("side", "side of the profile: outer, or inner of a ring or a groove"),
+    ("<coordinate>", "coordinate that a cam's follower follows, or that of the follower", "as the coordinate"),
+    ("x, y", "place of the profile in the frame of the cam", "length"),
+    ("pressure_angle", "from the follower's velocity to the normal of the profile", "angle",
+     "atan((v x n)/(v . n))"),
+    ("curvature_radius", "radius of curvature of the profile, negative where it is hollow", "length"),
+    ("face", "place of the contact along a flat face, from its point", "length"))  # fmt: skip
 MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
