@@ -232,7 +232,7 @@ class Expression:
         )
         return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
 
-    def bends(self, env: Mapping[str, ArrayLike], rates: Mapping[str, Number]) -> dict[str, Number]:
+    def bends(self, env: Mapping[str, ArrayLike], rates: Mapping[str, Any]) -> dict[str, Number]:
         """Exact rates of these partial derivatives while the variables change with some `rates`."""
         result: tuple[Any, dict[str, Any], dict[str, Any]] = self._run(
             lambda value: (value, {}, {}),
@@ -373,7 +373,7 @@ class Expression:
         return function.value(*values) * outer, total
 
     def _bend(
-        self, name: Called, arguments: list[tuple[Any, dict[str, Any], dict[str, Any]]], rates: Mapping[str, Number]
+        self, name: Called, arguments: list[tuple[Any, dict[str, Any], dict[str, Any]]], rates: Mapping[str, Any]
     ) -> tuple[Any, dict[str, Any], dict[str, Any]]:
         function = _function(name)
         inner, outer = self._angle_factors(function)

@@ -37,6 +37,8 @@ from mechdesign.numerics.arrays import Complexes, Floats
 
 # A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
 UNMOVED = 1e-9
+# The ends of a profile that closes meet within this part of its size.
+CLOSED = 1e-6
 
 
 class Touch(NamedTuple):
@@ -141,17 +143,39 @@ class Cam:
         return np.linspace(*self.given.span, self.given.steps + 1)
 
     @cached_property
+    def _whole(self) -> Configuration:
+        """Poses over the whole profile, at the nominal dimensions."""
+        return self.along(self.values)
+
+    @cached_property
     def outlines(self) -> list[Complexes]:
         """The profile in the cam's frame, of each of its sides."""
-        configuration = self.along(self.values)
-        touches = (self.touch(configuration, side) for side in self.sides)
-        return [np.asarray(self.local(configuration, touch.place)) for touch in touches]
+        touches = (self.touch(self._whole, side) for side in self.sides)
+        return [np.asarray(self.local(self._whole, touch.place)) for touch in touches]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the profile ends where it begins."""
+        outline = self.outlines[0]
+        return bool(abs(outline[-1] - outline[0]) <= CLOSED * (np.ptp(outline.real) + np.ptp(outline.imag)))
+
+    @cached_property
+    def face(self) -> tuple[float, float]:
+        """First and last place along a flat face that the cam touches, from the face's point; 0 of a roller."""
+        places = np.asarray(self.touch(self._whole).face)
+        return (0.0, 0.0) if np.isnan(places).all() else (float(np.nanmin(places)), float(np.nanmax(places)))
+
+    def along_face(self, configuration: Configuration) -> Vector:
+        """Unit vector of a flat face in the world."""
+        turned = rotation(self._geometry.angle(self.turns, configuration.places))
+        along: Vector = configuration.body_rotation(self.links[0]) * turned
+        return along
 
     @cached_property
     @quiet
     def _out(self) -> float:
         """Sign by which the normal leads out of the cam: the origin of its frame lies inside of the outer profile."""
-        return 1.0 if np.nansum(self._touch(self.along(self.values), 1.0).swept) >= 0 else -1.0
+        return 1.0 if np.nansum(self._touch(self._whole, 1.0).swept) >= 0 else -1.0
 
     def touch(self, configuration: Configuration, side: str = "") -> Touch:
         """Where the follower touches the cam; of a groove on its outer profile, if not on the other `side`."""
@@ -175,9 +199,7 @@ class Cam:
         curved = fall - 1j * bend * arm - 2j * turn * relative - turn * turn * arm
         face: Value = np.nan
         if self.flat:
-            along = configuration.body_rotation(self.links[0]) * rotation(
-                self._geometry.angle(self.turns, configuration.places)
-            )
+            along = self.along_face(configuration)
             spin = velocity.angles[frames[0]] - turn
             face = -cross(along, moved) / spin
             place = touched = center + face * along

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.mechanism.algebra import TURN, Vector
+from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import Cam
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM
@@ -22,8 +22,6 @@ from mechdesign.study.poses import Poses
 # Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks recommend [R. L.
 # Norton, Cam Design and Manufacturing Handbook; H. A. Rothbart, Cams].
 SLIDING, TURNING = 30.0, 45.0
-# The ends of a profile over a turn meet within this part of its size.
-CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ def profiles(study: Study, poses: Poses) -> list[Profile]:
         configuration = cam.along(cam.values, places)
         shape = poses.designs, len(cam.values)
 
-        def whole(values: Vector, shape: tuple[int, int] = shape) -> Floats:
+        def whole(values: ArrayLike, shape: tuple[int, int] = shape) -> Floats:
             return np.array(np.broadcast_to(np.real(values), shape))
 
         coordinates = {
@@ -97,14 +95,10 @@ def cam_table(study: Study, sides: Sequence[Profile]) -> Table:
         "pressure_angle": column(lambda side: side.pressure_angle),
         "curvature_radius": column(lambda side: side.radius), "face": column(lambda side: side.face),
     }  # fmt: skip
-    followed = [
-        CAM["<coordinate>"].column(
-            column(lambda side, name=name: side.coordinates.get(name, np.nan)), study.units.label(c.quantity),
-            coordinate=name,
-        )
-        for name, c in coordinates.items()
-    ]  # fmt: skip
-    labels = study.units.labels
+    labels, followed = study.units.labels, []
+    for name, coordinate in coordinates.items():
+        values = column(lambda side, own=name: side.coordinates.get(own, np.nan))  # type: ignore[misc]
+        followed.append(CAM["<coordinate>"].column(values, study.units.label(coordinate.quantity), coordinate=name))
     return CAM.table([*CAM.columns(labels, **words), *followed, *CAM.columns(labels, **numbers)])
 
 
@@ -118,16 +112,13 @@ def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Ca
         yield from side.caution(study, design, "unassembled", lost, "the profile cannot be assembled")
         cure = "a larger base circle helps" if cam.flat else "a larger base circle helps, or a smaller roller"
         text = f"the profile is undercut, and the follower leaves its law; {cure}"
-        yield from side.caution(study, design, "infeasible", side.undercut[design], text)
+        yield from side.caution(study, design, "cam", side.undercut[design], text)
         if steep.any():
             text = (
                 f"the pressure angle is above {limit:.3g} {angle}, at most {np.nanmax(pressure):.4g}: the follower may "
                 "jam; a larger base circle or another offset helps"
             )
-            yield from side.caution(study, design, "suspect", steep, text)
-        x, y = side.x[design], side.y[design]
-        whole = cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN)
-        if whole and np.hypot(x[-1] - x[0], y[-1] - y[0]) > CLOSED * study.mechanism.size:
-            opened = np.arange(len(x)) == len(x) - 1
-            text = "the profile does not close after a turn"
-            yield from side.caution(study, design, "suspect", opened, text)
+            yield from side.caution(study, design, "cam", steep, text)
+        if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN):
+            end = np.arange(side.x.shape[1]) == cam.given.steps
+            yield from side.caution(study, design, "cam", end, "the profile does not close after a turn")

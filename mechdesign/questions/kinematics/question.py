@@ -32,7 +32,7 @@ from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.loads import joints_of
 
 # Columns of a cam behind the name of its coupling, and their kinds of quantity.
-CAM_COLUMNS = {"pressure_angle": "angle", "curvature_radius": "length"}
+CAM_COLUMNS: Mapping[str, Quantity] = {"pressure_angle": "angle", "curvature_radius": "length"}
 
 
 def characteristic_length(study: Study) -> float | None:
@@ -140,10 +140,10 @@ class MotionQuestion:
             words = {"output": name, "input": input_name}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
         for cam in self.cams:
-            statics += [
-                Static(f"{cam.coupling}_{word}", label(kind), f"<coupling>_{word}", {"coupling": cam.coupling})
-                for word, kind in CAM_COLUMNS.items()
-            ]
+            for word, kind in CAM_COLUMNS.items():
+                words = {"coupling": cam.coupling}
+                name = f"{cam.coupling}_{word}"
+                statics.append(Static(name, label(kind), f"<coupling>_{word}", words, self.sizes[kind]))
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
 
     @property
