@@ -23,7 +23,7 @@ GROUPS = {
                           "scissor_lift", "excavator"),
     "Straight lines": ("chebyshev", "hoeken", "hart", "peaucellier", "watt_parallel_motion", "pantograph"),
     "Gears, belts and cams": ("geared_five_bar", "planetary", "differential", "one_tooth_difference", "cycloidal_crank",
-                              "rack_slider", "parallel_gripper", "cam_dwell", "belt_scara"),
+                              "rack_slider", "parallel_gripper", "cam_dwell", "cam_arm", "belt_scara"),
     "Robots": ("five_bar", "two_rpr", "two_rrr", "two_rpr_printed", "two_rrr_printed", "robot_arm", "scara",
                "rrr_platform", "rrr_orientations"),
     "Reliability": ("two_link_arm", "two_link_arm_uniform", "slider_crank_tolerances", "function_generator_made",

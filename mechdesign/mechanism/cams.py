@@ -3,10 +3,10 @@
 Against the cam the centre c of a roller of radius r, or a point c of a flat face along the unit vector u, moves with
 the rates c' and c'' of the loop equations, and the face turns with the rates t' and t''. With the unit normal n out of
 the cam, the profile is the envelope of the roller or of the face, and rho its radius of curvature, positive where the
-cam is convex [R. L. Norton, Cam Design and Manufacturing Handbook, chapter on cam contours]:
+cam is convex:
 
     roller:  c' . n = 0,   p = c - r n,   rho = -|c'|^2/(n . c'') - r
-    face:    p = c + q u,  q = -(u x c')/t',  rho = -+(2 u . c' - (u x c'')/t' - q t''/t')/t',  - for n = i u
+    face:    p = c + q u,  q = -(u x c')/t',  rho = -(n . i u) (2 u . c' - (u x c'')/t' - q t''/t')/t'
 
 The pressure angle is that from the velocity v of the follower where it is touched, the cam held, to n. By virtual work
 an effort Q on the coordinate that follows, which moves the follower with v for each unit, is a force Q/(v . n) along n.

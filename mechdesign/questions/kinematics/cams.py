@@ -19,8 +19,7 @@ from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-# Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks recommend [R. L.
-# Norton, Cam Design and Manufacturing Handbook; H. A. Rothbart, Cams].
+# Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.
 SLIDING, TURNING = 30.0, 45.0
 
 
