@@ -236,9 +236,8 @@ def test_a_follower_that_is_pulled_lifts_off() -> None:
 
 def test_a_design_may_be_chosen_by_its_pressure_angle() -> None:
     """The largest is asin(10/(base + 10)) of a harmonic law."""
-    goal = (
-        "optimize: {variables: {base: {from: 15, to: 55, number: 3}}, minimize: kinematics.lift_pressure_angle.peak}\n"
-    )
+    variables = "variables: {base: {from: 15, to: 55, number: 3}}"
+    goal = f"optimize: {{{variables}, minimize: kinematics.lift_pressure_angle.peak}}\n"
     designs = optimize(study_of(ROLLER + goal)).tables["designs"]
     np.testing.assert_allclose(
         designs["kinematics.lift_pressure_angle.peak"], np.degrees(np.arcsin(10 / (designs["base"] + 10))), rtol=1e-9

@@ -23,10 +23,10 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
      "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
      "as the input's length over the output's", "rate of the input/rate of the output"),
-    ("<coupling>_pressure_angle", "pressure angle of cam <coupling>: from its follower's velocity to the normal of the "
-     "profile", "angle"),
-    ("<coupling>_curvature_radius", "radius of curvature of cam <coupling> where it is touched; negative where it is "
-     "hollow", "length"), VALID)  # fmt: skip
+    ("<coupling>_pressure_angle", "pressure angle of cam <coupling>", "angle",
+     "from the follower's velocity to the normal of the profile"),
+    ("<coupling>_curvature_radius", "radius of curvature of cam <coupling>", "length",
+     "negative where the cam is hollow"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",
     TIMED, DRIVE, GIVEN,
     ("<a>.<b>.x, <a>.<b>.y", "place of the instant centre of <a> and <b>; inf where one translates against the other",
@@ -82,6 +82,8 @@ MODES = TableKind.of("modes", "the motion of every assembly mode",
 KEY_NUMBERS = (
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
     KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
+    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
+    KeyNumber(MOTION, "<coupling>_curvature_radius", "smallest {meaning}", "least"),
     KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
     KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
 )  # fmt: skip

@@ -125,7 +125,8 @@ class Scene:
     @property
     def round(self) -> list[complex]:
         """Places that wheels, cams and rollers reach."""
-        return [end for pair in (*self.wheels, *self.cams) for end in pair.ends]
+        wheels = (end for wheels in self.wheels for end in wheels.ends)
+        return [*wheels, *(end for pair in self.cams for end in pair.ends)]
 
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
