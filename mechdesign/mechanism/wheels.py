@@ -10,7 +10,8 @@ rack:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.outputs import pulled
+
+if TYPE_CHECKING:
+    from mechdesign.mechanism.core import Core
 
 # Links of a mesh, its carrier and the nodes of its axes.
 Axes = tuple[tuple[str, str], str, tuple[int, int]]
@@ -134,6 +138,25 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
             looks = belt, given.pressure_angle, given.radius
             wheels.append(Mesh(coupling.name, index, coupling.gap, links, carrier, nodes, slide, *looks))
     return wheels
+
+
+def pitch_radius(mechanism: Core, coupling: str, places: Mapping[str, Value]) -> Value | None:
+    """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
+
+    None where it is not known.
+    """
+    mesh = next((mesh for mesh in mechanism.pressing if mesh.coupling == coupling), None)
+    if mesh is None:
+        return None
+    # Where the carrier's frame is the world, its axes are where its points are.
+    graph, nodes = mechanism.graph, list(mechanism.sketch_configuration.nodes)
+    for axis in mesh.axes:
+        if (mesh.carrier, graph.nodes[axis]) in graph.points:
+            nodes[axis] = mechanism.geometry.place(mesh.carrier, graph.nodes[axis], places)
+    vectors = mechanism.geometry.vectors(places)
+    radii = mesh.radii(replace(mechanism.sketch_configuration, vectors=vectors, nodes=nodes))
+    follower = mechanism.couplings[mesh.index].follower.body
+    return dict(zip(mesh.links, radii, strict=True)).get(follower)
 
 
 def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:
