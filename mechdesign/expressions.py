@@ -235,7 +235,7 @@ class Expression:
             raise ExpressionError(f"{self.text!r} has no finite value: a division by zero, or too large a power")
         return result
 
-    def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
+    def derivatives(self, env: Mapping[str, Any]) -> dict[str, Any]:
         """Exact partial derivative with respect to every variable, at the values of `env` (forward mode).
 
         Of variables that are a `Dual`, derivatives are one too, or a number where they do not change.
@@ -345,14 +345,14 @@ class Expression:
                     stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
         return stack[0]
 
-    def _variable(self, env: Mapping[str, ArrayLike], name: str) -> Number:
+    def _variable(self, env: Mapping[str, Any], name: str) -> Any:
         try:
             value = env[name]
         except KeyError:
             raise ExpressionError(f"unknown name {name!r}") from None
         if isinstance(value, Dual):
-            return value  # type: ignore[return-value]
-        return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)  # type: ignore[arg-type]
+            return value
+        return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)
 
     def _apply(self, name: Called, arguments: list[Any]) -> Number:
         function = _function(name)

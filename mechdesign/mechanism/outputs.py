@@ -197,7 +197,7 @@ def _by_part(coordinate: Coordinate, derivative: Callable[[Coordinate], Value]) 
 
 def _gradient_along(
     configuration: Configuration, coordinate: Coordinate, rate: Mapping[str, Value], *, twice: bool = False
-) -> Mapping[str, Any]:
+) -> dict[str, Any]:
     """Gradient of an expression with its slope along a change of its parts, and with that of the slope if `twice`."""
     assert coordinate.expression is not None
     duals = {name: Dual(value, rate[name]) for name, value in configuration.user_values(coordinate).items()}

@@ -182,7 +182,7 @@ def _backlash(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pi
     if quantity == "angle" and kind_of(section.clearances[name].backlash) == "length":
         radius = pitch_radius(mechanism, name, poses.places)
         assert radius is not None
-        quantity, slope = "length", 1.0 / radius
+        quantity, slope = "length", np.asarray(1.0 / radius, dtype=float)
     factor = study.units.angle_factor if quantity == "angle" else 1.0
     spread, size = clearance.radius_spread, factor * clearance.radius
     law = None if spread is None else spread.law(size, factor)
