@@ -212,10 +212,10 @@ class Cam:
             normal = -1j * out * moved / speed
             pitch, pace = -dot(normal, curved) / norm2(moved), speed
             place, touched, size = center - radius * normal, center, 1 / pitch - radius
-        # The follower's own motion while the cam is held.
-        parted = linear.parted(self.index)
-        held = first(configuration, self.followed, parted)
-        own = self._against(parted, touched, configuration) - held * self._against(velocity, touched, configuration)
+        # The follower's own motion while the cam is held: by play between them, the drives moved back.
+        parted = linear.sensitivity([model.play(self.coupling)])
+        back = first(configuration, self.followed, parted) * self._against(velocity, touched, configuration)
+        own = (self._against(parted, touched, configuration) - back)[0]
         pressure = np.arctan(cross(own, normal) / dot(own, normal))
         turned = normal * np.conj(configuration.body_rotation(self.links[1]))
         swept = pace * dot(self.local(configuration, center), turned)

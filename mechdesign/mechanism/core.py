@@ -120,6 +120,11 @@ class Core:
         """Wheels that make its couplings."""
         return meshes(self.description, self.graph, self.couplings, self.sketch_configuration)
 
+    @property
+    def pressing(self) -> list[Mesh]:
+        """Those whose forces are known."""
+        return [mesh for mesh in self.meshes if mesh.presses]
+
     @cached_property
     def size(self) -> float:
         """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""

@@ -74,7 +74,7 @@ class Mechanism(Core):
     @property
     def engaged(self) -> list[Engagement]:
         """Links that touch as couplings have them move, where the forces between them are known."""
-        return [*(mesh for mesh in self.meshes if mesh.presses), *self.cams]
+        return [*self.pressing, *self.cams]
 
     @property
     def coordinates(self) -> tuple[str, ...]:
