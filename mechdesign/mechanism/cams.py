@@ -215,7 +215,7 @@ class Cam:
         # The follower's own motion while the cam is held: by play between them, the drives moved back.
         parted = linear.sensitivity([model.play(self.coupling)])
         back = first(configuration, self.followed, parted) * self._against(velocity, touched, configuration)
-        own = (self._against(parted, touched, configuration) - back)[0]
+        own = np.asarray(self._against(parted, touched, configuration) - back)[0]
         pressure = np.arctan(cross(own, normal) / dot(own, normal))
         turned = normal * np.conj(configuration.body_rotation(self.links[1]))
         swept = pace * dot(self.local(configuration, center), turned)

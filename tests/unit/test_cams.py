@@ -227,6 +227,22 @@ def test_the_contact_force_bears_the_load_along_the_normal() -> None:
     assert not result.warnings
 
 
+@pytest.mark.parametrize("follower", ["roller: F, radius: 9", "flat: F, direction: 3"])
+def test_the_shaft_bears_the_moment_of_the_contact_force(follower: str) -> None:
+    """Of a massless cam under an arm with a mass, which moves: equilibrium at the place that cam.csv has."""
+    text = ARM.replace("H: [90, 30]}", "H: [90, 30], mass: 0.4, center: [50, 0]}") % follower
+    moving = "{sweep: {disc: {from: 0, to: 345, step: 15}}, rates: {disc: 300 rpm}, loads: [{at: H, force: [5, -40]}]}"
+    study = study_of(text.replace("arm: {P: [0, 0]", "arm: {points: {P: [0, 0]").replace("30], m", "30]}, m")
+                     + f"dynamics: {moving}\n")  # fmt: skip
+    result, table = dynamics(study), cam_of(study)
+    place = (placed(table) * np.exp(1j * np.radians(table["disc"])))[:-1:15]
+    joints = result.tables["joint_forces"]
+    on_arm = (joints["fx"] + 1j * joints["fy"])[joints["joint"] == "lift"]
+    bearing = (joints["fx"] + 1j * joints["fy"])[joints["joint"] == "O"]
+    np.testing.assert_allclose(bearing, on_arm, rtol=1e-11)
+    np.testing.assert_allclose(result.tables["dynamics"]["disc_effort"], (np.conj(place) * on_arm).imag, atol=1e-8)
+
+
 def test_a_follower_that_is_pulled_lifts_off() -> None:
     text = LOADED.replace("[0, -50]", "[0, 50]")
     assert any("the follower lifts off at 36 of 36 poses" in str(w) for w in dynamics(study_of(text)).warnings)
