@@ -31,7 +31,7 @@ _COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its tur
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
-_PROFILE = 2.8  # width of the profile of a cam
+_PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
 _RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _NESTING = 9.0  # between the arrows of drives at one pivot
@@ -211,7 +211,8 @@ def _cam(pair: CamPair, colors: Mapping[str, str]) -> list[Shape]:
     follower, cam = pair.links
     shapes: list[Shape] = []
     for profile in pair.profiles:
-        shapes.append(Line(profile, colors[cam], _PROFILE, PLATES - 0.1, cam, filled=pair.solid))
+        width = _PROFILE if pair.solid else _PROFILE / 2
+        shapes.append(Line(profile, colors[cam], width, PLATES - 0.1, cam, filled=pair.solid))
         if pair.solid:
             shapes.append(Line(profile, lighter(colors[cam], 0.8), 0.1, PLATES - 0.05, cam, filled=True))
     if pair.face is not None:
