@@ -90,6 +90,11 @@ class Body:
         return np.stack(parts, axis=-1).reshape(-1, len(wrenches), 3)
 
     @property
+    def uneven(self) -> bool:
+        """Whether loads move the asked point by more than its compliance times the load on it; see `Effects.moved`."""
+        return bool(self.others) or any(self.network.one_sided)
+
+    @property
     def others(self) -> list[int]:
         """Numbers of the loads that do not act on the asked point alone."""
         return [k for k, wrench in enumerate(self.given.wrenches) if wrench is None]
@@ -169,6 +174,24 @@ def by_forces(body: Body, configuration: Configuration, *, loads: bool = False) 
     applied = _applied(body, configuration) if loads and body.others else None
     length = body.length(configuration)
     return load(twists_of(body.network, body.section, configuration, length, applied), body.size)
+
+
+def under_loads(body: Body, configuration: Configuration) -> tuple[Loaded, list[tuple[Loaded, Floats]]]:
+    """The body as `by_forces` has it with the study's loads; and how it is under these, with each load as in `summed`.
+
+    Under each load those flanks of teeth and strands of belts work that it presses or pulls.
+    """
+    loaded, applied = by_forces(body, configuration, loads=True), body.summed(configuration)
+    if not any(body.network.one_sided):
+        return loaded, [(loaded, applied)]
+    parts, length = [], body.length(configuration)
+    elsewhere = _applied(body, configuration) if body.others else None
+    for k in range(applied.shape[2]):
+        own = applied[:, :, k : k + 1]
+        sides = np.sign(np.nan_to_num(loaded.efforts @ own))[:, :, 0] * body.network.one_sided
+        twists = twists_of(body.network, body.section, configuration, length, elsewhere, sides)
+        parts.append((load(twists, body.size), own))
+    return loaded, parts
 
 
 def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[complex, complex, float]]]:

@@ -21,7 +21,7 @@ from mechdesign.questions.stiffness.columns import (
     STIFFNESS,
 )
 from mechdesign.questions.stiffness.compliance import Held, directional, scales
-from mechdesign.questions.stiffness.force_method import Effects, joints_of, points_of
+from mechdesign.questions.stiffness.effects import Effects, joints_of, points_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import principal
 from mechdesign.results import Column, Table, TableKind

@@ -1,0 +1,154 @@
+"""Couplings in a stiffness: closed forms, finite elements with teeth of their own, and the forces that dynamics says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.frames import Structure, Teeth
+from helpers.stiffness import ask_stiffness, matrix
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.errors import StudyError
+from mechdesign.questions.poses import solve_poses, study_poses
+
+BELT_ARM = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    arm: [O, A, 200]
+    forearm: [A, P, 150]
+    motor: [O, M, 20]
+  drives: [arm, motor]
+  couplings:
+    elbow: {set: forearm, of: motor, ratio: 1, phase: 0, wheels: belt, radius: 25}
+  sketch: {M: [10, 17], A: [190, 60], P: [260, 190]}
+stiffness:
+  at: P
+  actuators: {arm: 1e4 N*m/rad, motor: 2e4 N*m/rad}
+  poses: [{arm: 20, motor: 75}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("gives", "soft"),
+    [
+        ("{elbow: 300 N/mm}", 1 / (300 * 25**2)),
+        ("{elbow: {moment: 400 N*m/rad}}", 1 / 4e5),
+        ("{elbow: {force: 300, moment: 400 N*m/rad}}", 1 / (300 * 25**2) + 1 / 4e5),
+        ("{}", 0.0),
+    ],
+)
+def test_an_arm_with_an_elbow_belt(gives: str, soft: float) -> None:
+    """The belt is in series with the motor: C = J diag(1/k_arm, 1/k_motor + 1/(k r^2)) J^T."""
+    found = matrix(ask_stiffness(BELT_ARM + f"  couplings: {gives}\n"), "C")
+    ends = 1j * np.array([200, 150]) * np.exp(1j * np.radians([20, 75]))
+    jacobian = np.array([ends.real, ends.imag])
+    assert found == pytest.approx(jacobian @ np.diag([1e-7, 0.5e-7 + soft]) @ jacobian.T, rel=1e-12)
+
+
+def test_a_stiff_coupling_tends_to_a_rigid_one() -> None:
+    rigid = matrix(ask_stiffness(BELT_ARM), "C")
+    errors = [
+        np.abs(matrix(ask_stiffness(BELT_ARM + f"  couplings: {{elbow: {k}}}\n"), "C") - rigid).max()
+        for k in (1e6, 1e9)
+    ]
+    assert errors[1] == pytest.approx(errors[0] / 1000, rel=1e-6)
+
+
+def test_a_gear_train_reflects_the_stiffness_of_its_motor() -> None:
+    """1/k = n1^2 n2^2/k_motor + n2^2/(k_1 r_b^2) + 1/(k_2 r_c^2), wheels of 20, 80 and 30, 60 mm."""
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0], C: [100, 0], D: [190, 0]}
+    one: [O, A, 30]
+    two: [C, B, 70]
+    three: [D, P, 50]
+  drives: [one]
+  couplings:
+    first: {set: two, of: one, ratio: -0.25, phase: 10}
+    second: {set: three, of: two, ratio: -0.5, phase: 10}
+stiffness:
+  {at: P, link: three, actuators: {one: 1000 N*m/rad}, couplings: {first: 1e4, second: 2e4 N/mm}, poses: [{one: 40}]}
+"""
+    expected = 0.125**2 / 1e6 + 0.25 / (1e4 * 80**2) + 1 / (2e4 * 60**2)
+    assert ask_stiffness(text).main["k_phi"] == pytest.approx(1 / expected, rel=1e-12)
+
+
+RACK = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    pinion: [O, A, 30]
+    bar: {Q: [0, 0], R: [80, 0]}
+  joints: {guide: {prismatic: [ground, bar], through: O, point: Q}}
+  drives: [pinion]
+  couplings: {rack: {set: guide, of: pinion, ratio: 0.4, phase: 10}}
+  sketch: {A: [20, 20], Q: [30, 0], R: [110, 0]}
+stiffness: {at: R, actuators: {pinion: 100 N*m/rad}, couplings: {rack: 4e3 N/mm}, poses: [{pinion: 40}]}
+"""
+
+
+def test_a_slider_on_a_rack() -> None:
+    radius = 0.4 * 180 / np.pi
+    assert ask_stiffness(RACK).main["k_x"] == pytest.approx(1 / (radius**2 / 1e5 + 1 / 4e3), rel=1e-12)
+
+
+def test_a_cam_reflects_the_stiffness_of_its_motor_by_its_slope() -> None:
+    text = RACK.replace("of: pinion, ratio: 0.4, phase: 10", 'to: "50 + 20*(1 - cos(pinion.angle))"')
+    slope = 20 * np.sin(np.radians(40))
+    assert ask_stiffness(text).main["k_x"] == pytest.approx(1 / (slope**2 / 1e5 + 1 / 4e3), rel=1e-12)
+
+
+# A five-bar whose cranks mesh, each with its wheel, the second on a bracket that bends.
+GEARED = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    frame: {O: [0, 0], C: [100, 0]}
+    one: [O, A, 30]
+    two: [C, D, 35]
+    left: [A, B, 80]
+    right: [D, B, 85]
+  joints: {wall: {fixed: [ground, frame], point: O, angle: 0}}
+  drives: {theta: {angle: one}}
+  couplings: {gears: {set: two, to: 3*frame.angle - 2*one.angle + 80, pressure_angle: %s}}
+  sketch: {C: [100, 0], A: [30, 5], D: [117, 30], B: [50, 90]}
+stiffness:
+  at: B
+  sections: {bar: {E: 2e5, width: 10, height: 15}}
+  elastic: {frame: bar, one: bar, left: bar, two: bar}
+  bearings: {A: 1e4 N/mm, C: 3e4 N/mm}
+  actuators: {theta: 2e3 N*m/rad}
+  couplings: {gears: 5e3 N/mm}
+  loads: [[0, -50], [0, 50], {at: D, force: [20, 10]}]
+  poses: [{theta: 15}, {theta: 35}]
+"""
+
+
+def teeth(side: int, pressure: float) -> dict[str, Teeth]:
+    """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3, from where it drives up as it turns back.
+
+    Deflections along the line of action count as their part along the pitch circles.
+    """
+    push = -1j + side * np.tan(np.radians(pressure))
+    return {"gears": Teeth((("two", "C"), ("one", "O")), 200 / 3 + 0j, push)}
+
+
+@pytest.mark.parametrize("pressure", [0.0, 20.0])
+def test_meshing_cranks_that_bend_are_those_of_finite_elements(pressure: float) -> None:
+    """In general the teeth push along the pitch circles; under a load on the flank that it presses."""
+    text = GEARED % pressure
+    study = study_of(text)
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
+    result = mechdesign.stiffness(study)
+    moves = result.tables["deflections"]
+    for row in range(2):
+        mean = Structure(study, solved.configuration, row, teeth(0, pressure)).compliance()
+        assert matrix(result, "C", row) == pytest.approx(mean, rel=1e-7)
+        flanks = [Structure(study, solved.configuration, row, teeth(side, pressure)).compliance() for side in (1, -1)]
+        for k, load in enumerate(([0, -50], [0, 50])):
+            moved = [moves[name][3 * row + k] for name in ("dx", "dy")]
+            expected = [flank @ load for flank in flanks]
+            assert any(moved == pytest.approx(one, rel=1e-7) for one in expected)
