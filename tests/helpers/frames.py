@@ -54,9 +54,7 @@ class Teeth(NamedTuple):
 class Structure:
     """A mechanism in one pose of a batch (its `row`) as a frame; `asked` is the node whose compliance is asked."""
 
-    def __init__(
-        self, study: Study, poses: Configuration, row: int = 0, teeth: dict[str, Teeth] | None = None
-    ) -> None:
+    def __init__(self, study: Study, poses: Configuration, row: int = 0, teeth: dict[str, Teeth] | None = None) -> None:
         self.study, self.pose, self.frame = study, poses.take(np.array([row])), Frame()
         self.section, self.description = study.stiffness, study.mechanism.description
         self.nodes: dict[tuple[str, str], int] = {}  # of each link: at its points, and where each line's slider is

@@ -1,4 +1,4 @@
-"""Couplings in a stiffness: closed forms, finite elements with teeth of their own, and the forces that dynamics says."""
+"""Couplings in a stiffness: closed forms, finite elements with teeth, and the forces that dynamics says."""
 
 from __future__ import annotations
 
@@ -101,6 +101,33 @@ def test_a_cam_reflects_the_stiffness_of_its_motor_by_its_slope() -> None:
     assert ask_stiffness(text).main["k_x"] == pytest.approx(1 / (slope**2 / 1e5 + 1 / 4e3), rel=1e-12)
 
 
+FIVE_BAR = """
+mechanism:
+  parameters: {p: 0}
+  links: {ground: {O: [0, 0], C: [100, 0]}, g1: [O, A, 30], g2: [C, D, 35], a: [A, B, 80], b: [D, B, 85]}
+  drives: [g1]
+  measures: {span: {distance: [A, D]}}
+  couplings: {mesh: {set: g2, to: "%s + p", wheels: none}}
+  sketch: {A: [30, 5], D: [117, 30], B: [50, 90]}
+"""
+
+
+@pytest.mark.parametrize(
+    "law", ["40*sin(g1) + 70 - 0.3*g1", "30 + 0.3*B.x - 0.002*B.y**2", "60 + 0.4*b.angle", "0.7*span + 0.1*a.B.y - 20",
+            "90*g1/(20 + g1) + atan2(B.y, B.x)"],
+)  # fmt: skip
+def test_a_coupling_by_any_law_is_that_of_the_motions_it_allows(law: str) -> None:
+    """Rigid links: C = sum of j j^T/k, j the motions by the drive and by the coupling's own deflection."""
+    step, moves = 1e-4, []
+    for drive, phase in ((step, 0.0), (0.0, step)):
+        sides = [study_of(FIVE_BAR % law, f"mechanism.parameters.p={sign * phase}").mechanism.solve(
+            {"g1": [20 + sign * drive]}) for sign in (1, -1)]  # fmt: skip
+        moves.append([(sides[0][name][0] - sides[1][name][0]) / np.radians(2 * step) for name in ("B.x", "B.y")])
+    expected = np.transpose(moves) @ np.diag([1 / 4e5, 1 / 7e5]) @ moves
+    section = "stiffness: {at: B, actuators: {g1: 4e5}, couplings: {mesh: {moment: 7e5}}, poses: [{g1: 20}]}\n"
+    assert matrix(ask_stiffness(FIVE_BAR % law + section), "C") == pytest.approx(expected, rel=1e-6)
+
+
 # A five-bar whose cranks mesh, each with its wheel, the second on a bracket that bends.
 GEARED = """
 mechanism:
@@ -128,7 +155,7 @@ stiffness:
 
 
 def teeth(side: int, pressure: float) -> dict[str, Teeth]:
-    """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3, from where it drives up as it turns back.
+    """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3.
 
     Deflections along the line of action count as their part along the pitch circles.
     """
@@ -148,7 +175,77 @@ def test_meshing_cranks_that_bend_are_those_of_finite_elements(pressure: float) 
         mean = Structure(study, solved.configuration, row, teeth(0, pressure)).compliance()
         assert matrix(result, "C", row) == pytest.approx(mean, rel=1e-7)
         flanks = [Structure(study, solved.configuration, row, teeth(side, pressure)).compliance() for side in (1, -1)]
+        pressed = []
         for k, load in enumerate(([0, -50], [0, 50])):
             moved = [moves[name][3 * row + k] for name in ("dx", "dy")]
-            expected = [flank @ load for flank in flanks]
-            assert any(moved == pytest.approx(one, rel=1e-7) for one in expected)
+            pressed.append([moved == pytest.approx(flank @ load, rel=1e-7) for flank in flanks])
+        assert sorted(pressed) == ([[False, True], [True, False]] if pressure else [[True, True], [True, True]])
+
+
+PULLED = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    arm: [O, A, 100]
+    forearm: [A, P, 80]
+    motor: [O, M, 20]
+  drives: [arm, motor]
+  couplings: {elbow: {set: forearm, to: motor*0.5 + 0.5*arm.angle, wheels: belt, radius: 20}}
+  sketch: {M: [20, 5], A: [95, 30], P: [120, 105]}
+"""
+RINGED = """
+mechanism:
+  links:
+    ground: {O: [0, 0], R: [0, 90]}
+    arm: [O, A, 60]
+    planet: [A, P, 15]
+    sun: [O, S, 10]
+  drives: [arm]
+  couplings:
+    inner: {set: planet, to: arm.angle - 3*(sun.angle - arm.angle)}
+    outer: {set: planet, to: arm.angle - 5*arm.angle}
+  sketch: {A: [50, 30], P: [60, 40], S: [8, 5]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "poses", "loads"),
+    [
+        (GEARED.partition("stiffness:")[0] % 20, "[{theta: 15}, {theta: 35}]", "[{at: B, force: [0, %s]}]"),
+        (PULLED, "[{arm: 15, motor: 40}]", "[{at: P, force: [3, %s]}]"),
+        (RINGED, "[{arm: 10}, {arm: 60}]", "[{link: sun, moment: %s}]"),
+    ],
+)
+@pytest.mark.parametrize("push", [40.0, -40.0])
+def test_rigid_links_and_teeth_bear_what_dynamics_says(mechanism: str, poses: str, loads: str, push: float) -> None:
+    at = "B" if "B:" in mechanism else "P"
+    section = f"{{poses: {poses}, loads: {loads % push}}}\n"
+    study = study_of(f"{mechanism}stiffness: {{at: {at}, dynamics: true}}\ndynamics: {section}")
+    ours, theirs = mechdesign.stiffness(study).tables["forces"], mechdesign.dynamics(study).tables["joint_forces"]
+    largest, compared = theirs["magnitude"].max(), 0
+    for joint in dict.fromkeys(theirs["joint"]):
+        some, others = (table["joint"] == joint for table in (ours, theirs))
+        if some.sum() != others.sum():
+            continue
+        sign = 1 if ours["on"][some][0] == theirs["on"][others][0] else -1
+        for axis in ("fx", "fy"):
+            assert sign * ours[axis][some] == pytest.approx(theirs[axis][others], abs=1e-12 * largest), joint
+        compared += 1
+    assert compared >= 2
+    assert {coupling.name for coupling in study.mechanism.couplings} <= {*ours["joint"]}
+
+
+def test_mistakes_are_named() -> None:
+    cases = {
+        "{elbow: 30 N*m/rad}": "where a stiffness is expected",
+        "{ellbow: 30}": "did you mean 'elbow'",
+        "{elbow: {}}": "has a 'force' stiffness or",
+    }
+    for gives, message in cases.items():
+        with pytest.raises(StudyError) as caught:
+            study_of(BELT_ARM + f"  couplings: {gives}\n")
+        assert message in str(caught.value)
+    with pytest.raises(StudyError, match="no pitch circles"):
+        study_of(BELT_ARM.replace(", radius: 25", "") + "  couplings: {elbow: 30}\n")
+    with pytest.raises(StudyError, match=r"no angle follows, but guide\.slide"):
+        study_of(RACK.replace("{rack: 4e3 N/mm}", "{rack: {moment: 3}}"))

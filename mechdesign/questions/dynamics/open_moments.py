@@ -16,7 +16,6 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints, Reaction
 from mechdesign.questions.stiffness.applied import Applied
-from mechdesign.questions.stiffness.couplings import Efforts
 from mechdesign.questions.stiffness.elements import Coil
 from mechdesign.questions.stiffness.force_method import load, moments_about, twists_of
 from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
@@ -52,7 +51,8 @@ def with_open_moments(
     twist, compliance = (np.where(finite, part.T, 0.0).T for part in (twists.twist, twists.compliance))
     couplings = twists.couplings
     if couplings is not None:
-        couplings = Efforts(*(np.where(finite, part.T, 0.0).T for part in (couplings.through, couplings.acting)))
+        through, acting = (np.where(finite, part.T, 0.0).T for part in (couplings.through, couplings.acting))
+        couplings = replace(couplings, through=through, acting=acting)
     loaded = load(replace(twists, twist=twist, compliance=compliance, couplings=couplings), 3)
     origin, completed = configuration.point(section.at), list(reactions)
     for position, contact in enumerate(joints.contacts):

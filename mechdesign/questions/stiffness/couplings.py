@@ -39,24 +39,32 @@ class Efforts:
         Wrench about the origin of the twists on each edge of the tree.
     acting : ndarray, shape (n, freedoms, couplings)
         What they put on each freedom, and on that of the coupling itself where it gives.
+    teeth : complex ndarray, shape (n, couplings)
+        Force of teeth or of a belt on the link that follows; 0 without wheels.
     """
 
     through: Floats
     acting: Floats
+    teeth: Complexes
 
 
 def efforts_on(
     network: Network, configuration: Configuration, origin: Complexes, length: Value, sides: Floats | None
-) -> Floats:
-    """Wrenches about an origin on each edge of the tree by a unit effort on each coupling; see `Efforts`.
+) -> tuple[Floats, Complexes]:
+    """Wrenches about an origin on each edge of the tree, and forces of teeth, of `Efforts`.
 
     `sides` are those of each coupling in each pose, shape (n, couplings); None where all are 0.
     """
     vertices: list[tuple[str, Wrench]] = []
+    teeth = np.zeros((*configuration.shape, len(network.transmissions)), dtype=complex)
     for case, transmission in enumerate(network.transmissions):
         side = np.zeros(configuration.shape) if sides is None else sides[:, case]
-        vertices += _wrenches(transmission, configuration, case, _unit(transmission, length), side)
-    return borne(network, vertices, len(network.transmissions), origin)
+        wrenches = list(_wrenches(transmission, configuration, case, _unit(transmission, length), side))
+        vertices += wrenches
+        if transmission.mesh is not None:
+            # Those on the link that follows come first of each pair.
+            teeth[:, case] = sum(wrench.force for _, wrench in wrenches[::2])
+    return borne(network, vertices, len(network.transmissions), origin), teeth
 
 
 def compliance_of(

@@ -20,7 +20,8 @@ class Effects:
     Parameters
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
-        Force and moment about the joint's place, exerted on the first body by the second; joints as in `joints_of`.
+        Force and moment about the joint's place, exerted on the first body by the second; joints as in `joints_of`, and
+        after them the teeth and belts of couplings, whose moment is 0.
     places : complex ndarray, shape (n, points)
         Places without a load of the points that `points_of` lists.
     moves : complex ndarray, shape (n, points, loads)
@@ -39,7 +40,8 @@ class Effects:
     def unknown(network: Network, poses: int, loads: int, size: int) -> Effects:
         """A record of effects to be filled, all nan."""
         nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
-        forces, moved = np.full((poses, len(joints_of(network)), loads, 3), np.nan), np.zeros((poses, loads, size))
+        count = len(joints_of(network)) + sum(network.one_sided)
+        forces, moved = np.full((poses, count, loads, 3), np.nan), np.zeros((poses, loads, size))
         return Effects(forces, nowhere[:, :, 0].copy(), nowhere, moved)
 
     @staticmethod
@@ -70,10 +72,14 @@ def effects_of(
     size = loaded.size
     origin = configuration.point(at)
     effects = Effects.unknown(network, len(applied), applied.shape[2], size)
-    for row, k in enumerate(joints_of(network)):
+    joints, couplings = joints_of(network), loaded.twists.couplings
+    for row, k in enumerate(joints):
         wrench = loaded.wrenches[:, k] @ applied
         moment = moments_about(configuration.point(network.edges[k].point) - origin, wrench)
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
+    if couplings is not None:
+        teeth = (couplings.teeth[:, :, None] * (loaded.efforts @ applied))[:, network.one_sided]
+        effects.forces[:, len(joints) :] = np.stack([teeth.real, teeth.imag, np.zeros(teeth.shape)], axis=-1)
     for row, (_, point, vertex) in enumerate(points_of(network)):
         dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
         effects.places[:, row] = configuration.point(point)

@@ -235,8 +235,8 @@ def twists_of(
 
     elsewhere = couplings = None
     if network.transmissions:
-        through = efforts_on(network, configuration, origin, length, sides)
-        couplings = Efforts(through, put_on(through))
+        through, teeth = efforts_on(network, configuration, origin, length, sides)
+        couplings = Efforts(through, put_on(through), teeth)
         soft_ones = [k for k, soft in enumerate(giving) if soft is not None]
         couplings.acting[:, first + np.arange(len(soft_ones)), soft_ones] = 1.0
     if applied is not None:
