@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value, Vector
+from mechdesign.mechanism.algebra import Value, Vector, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
 from mechdesign.mechanism.statics import pressing
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -48,6 +48,7 @@ class Efforts:
     teeth: Complexes
 
 
+@quiet
 def efforts_on(
     network: Network, configuration: Configuration, origin: Complexes, length: Value, sides: Floats | None
 ) -> tuple[Floats, Complexes]:
