@@ -44,11 +44,10 @@ def stiffnesses(profile: Profile) -> tuple[float, float, float]:
 
 
 class Teeth(NamedTuple):
-    """Where teeth of two wheels, each given by its link and axis, touch, and the direction of their force."""
+    """Two wheels, each given by its link and axis, and the forces on the first by the other: place and size of each."""
 
     wheels: tuple[tuple[str, str], tuple[str, str]]
-    place: complex
-    along: complex
+    pushes: tuple[tuple[complex, complex], ...]
 
 
 class Structure:
@@ -245,9 +244,10 @@ class Structure:
         """`force` is along the line of the teeth here."""
         terms = []
         for sign, (link, axis) in zip((1, -1), teeth.wheels, strict=True):
-            node, way = self.nodes[link, axis], sign * teeth.along
-            arm = teeth.place - self.place(axis)
-            terms += [(node, 0, way.real), (node, 1, way.imag), (node, 2, (np.conj(arm) * way).imag)]
+            node = self.nodes[link, axis]
+            for place, push in teeth.pushes:
+                way, arm = sign * push, place - self.place(axis)
+                terms += [(node, 0, way.real), (node, 1, way.imag), (node, 2, (np.conj(arm) * way).imag)]
         self.frame.couple(terms, None if gives is None else gives.force)
 
     def _coupling(self, coupling: Coupling, gives: CouplingStiffness | None) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from helpers.frames import Structure, Teeth
@@ -10,7 +12,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import StudyError
+from mechdesign.mechanism import Configuration
 from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.study.designs import Designs
 
 BELT_ARM = """
 mechanism:
@@ -95,6 +99,16 @@ def test_a_slider_on_a_rack() -> None:
     assert ask_stiffness(RACK).main["k_x"] == pytest.approx(1 / (radius**2 / 1e5 + 1 / 4e3), rel=1e-12)
 
 
+def test_a_pinion_that_follows_a_rack() -> None:
+    text = RACK.replace(
+        "{set: guide, of: pinion, ratio: 0.4, phase: 10}", "{set: pinion, of: guide, ratio: 2.5, phase: 0}"
+    )
+    text = text.replace("drives: [pinion]", "drives: [guide]").replace("{pinion: 100 N*m/rad}", "{guide: 700 N/mm}")
+    text = text.replace("at: R", "at: A, link: pinion").replace("{pinion: 40}", "{guide: 16}")
+    radius = 0.4 * 180 / np.pi
+    assert ask_stiffness(text).main["k_phi"] == pytest.approx(radius**2 / (1 / 700 + 1 / 4e3), rel=1e-12)
+
+
 def test_a_cam_reflects_the_stiffness_of_its_motor_by_its_slope() -> None:
     text = RACK.replace("of: pinion, ratio: 0.4, phase: 10", 'to: "50 + 20*(1 - cos(pinion.angle))"')
     slope = 20 * np.sin(np.radians(40))
@@ -154,34 +168,6 @@ stiffness:
 """
 
 
-def teeth(side: int, pressure: float) -> dict[str, Teeth]:
-    """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3.
-
-    Deflections along the line of action count as their part along the pitch circles.
-    """
-    push = -1j + side * np.tan(np.radians(pressure))
-    return {"gears": Teeth((("two", "C"), ("one", "O")), 200 / 3 + 0j, push)}
-
-
-@pytest.mark.parametrize("pressure", [0.0, 20.0])
-def test_meshing_cranks_that_bend_are_those_of_finite_elements(pressure: float) -> None:
-    """In general the teeth push along the pitch circles; under a load on the flank that it presses."""
-    text = GEARED % pressure
-    study = study_of(text)
-    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
-    result = mechdesign.stiffness(study)
-    moves = result.tables["deflections"]
-    for row in range(2):
-        mean = Structure(study, solved.configuration, row, teeth(0, pressure)).compliance()
-        assert matrix(result, "C", row) == pytest.approx(mean, rel=1e-7)
-        flanks = [Structure(study, solved.configuration, row, teeth(side, pressure)).compliance() for side in (1, -1)]
-        pressed = []
-        for k, load in enumerate(([0, -50], [0, 50])):
-            moved = [moves[name][3 * row + k] for name in ("dx", "dy")]
-            pressed.append([moved == pytest.approx(flank @ load, rel=1e-7) for flank in flanks])
-        assert sorted(pressed) == ([[False, True], [True, False]] if pressure else [[True, True], [True, True]])
-
-
 PULLED = """
 mechanism:
   links:
@@ -193,10 +179,81 @@ mechanism:
   couplings: {elbow: {set: forearm, to: motor*0.5 + 0.5*arm.angle, wheels: belt, radius: 20}}
   sketch: {M: [20, 5], A: [95, 30], P: [120, 105]}
 """
+STRAPPED = (
+    PULLED
+    + """
+stiffness:
+  at: P
+  sections: {bar: {E: 2e5, width: 10, height: 15}}
+  elastic: {arm: bar, forearm: bar, motor: bar}
+  bearings: {A: 1e4 N/mm, O: 3e4 N/mm}
+  actuators: {arm: 2e3 N*m/rad}
+  couplings: {elbow: 300 N/mm}
+  loads: [[0, -50], [0, 50]]
+  poses: [{arm: 15, motor: 40}, {arm: 35, motor: 90}]
+"""
+)
+
+
+def meshing(pressure: float) -> Callable[[Configuration, int], Teeth]:
+    """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3."""
+
+    def teeth(_: Configuration, side: int) -> Teeth:
+        push = -1j + side * np.tan(np.radians(pressure))
+        return Teeth((("two", "C"), ("one", "O")), ((200 / 3 + 0j, push),))
+
+    return teeth
+
+
+def belt(pose: Configuration, side: int) -> Teeth:
+    """The belt of STRAPPED on pulleys of 20 and 10 mm: its strand on the right pulls, on the left, or half of both."""
+    driven, driver = (complex(np.ravel(pose.point(point))[0]) for point in "AO")
+    way = (driver - driven) / abs(driver - driven)
+    lean = (20 - 10) / abs(driver - driven)
+    pushes = []
+    for sign, share in ((1, (1 + side) / 2), (-1, (1 - side) / 2)):
+        normal = way * (lean - sign * 1j * np.sqrt(1 - lean**2))
+        begin, end = driven + 20 * normal, driver + 10 * normal
+        pushes.append((begin, sign * share * (end - begin) / abs(end - begin)))
+    return Teeth((("forearm", "A"), ("motor", "O")), tuple(pushes))
+
+
+@pytest.mark.parametrize(
+    ("text", "coupling", "of_side", "odd"),
+    [
+        (GEARED % 0.0, "gears", meshing(0.0), False),
+        (GEARED % 20.0, "gears", meshing(20.0), True),
+        (STRAPPED, "elbow", belt, True),
+    ],
+    ids=["teeth along", "teeth", "belt"],
+)
+def test_wheels_on_links_and_pins_that_give_are_those_of_finite_elements(
+    text: str, coupling: str, of_side: Callable[[Configuration, int], Teeth], odd: bool
+) -> None:
+    """In general by both flanks or strands; under a load by the one that takes it."""
+    study = study_of(text)
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
+    result = mechdesign.stiffness(study)
+    moves = result.tables["deflections"]
+    loads = len(moves) // 2
+
+    def frame(row: int, side: int) -> np.ndarray:
+        pose = solved.configuration.take(np.array([row]))
+        return Structure(study, solved.configuration, row, {coupling: of_side(pose, side)}).compliance()
+
+    for row in range(2):
+        assert matrix(result, "C", row) == pytest.approx(frame(row, 0), rel=1e-7)
+        flanks, pressed = [frame(row, side) for side in (1, -1)], []
+        for k, load in enumerate(([0, -50], [0, 50])):
+            moved = [moves[name][loads * row + k] for name in ("dx", "dy")]
+            pressed.append([moved == pytest.approx(flank @ load, rel=1e-7) for flank in flanks])
+        assert sorted(pressed) == ([[False, True], [True, False]] if odd else [[True, True], [True, True]])
+
+
 RINGED = """
 mechanism:
   links:
-    ground: {O: [0, 0], R: [0, 90]}
+    ground: {O: [0, 0]}
     arm: [O, A, 60]
     planet: [A, P, 15]
     sun: [O, S, 10]
@@ -212,13 +269,14 @@ mechanism:
     ("mechanism", "poses", "loads"),
     [
         (GEARED.partition("stiffness:")[0] % 20, "[{theta: 15}, {theta: 35}]", "[{at: B, force: [0, %s]}]"),
+        (RACK.partition("stiffness:")[0], "[{pinion: 40}]", "[{at: R, force: [%s, 5]}]"),
         (PULLED, "[{arm: 15, motor: 40}]", "[{at: P, force: [3, %s]}]"),
         (RINGED, "[{arm: 10}, {arm: 60}]", "[{link: sun, moment: %s}]"),
     ],
 )
 @pytest.mark.parametrize("push", [40.0, -40.0])
 def test_rigid_links_and_teeth_bear_what_dynamics_says(mechanism: str, poses: str, loads: str, push: float) -> None:
-    at = "B" if "B:" in mechanism else "P"
+    at = next(point for point in ("B", "R", "P") if f"{point}: [" in mechanism)
     section = f"{{poses: {poses}, loads: {loads % push}}}\n"
     study = study_of(f"{mechanism}stiffness: {{at: {at}, dynamics: true}}\ndynamics: {section}")
     ours, theirs = mechdesign.stiffness(study).tables["forces"], mechdesign.dynamics(study).tables["joint_forces"]
@@ -233,6 +291,13 @@ def test_rigid_links_and_teeth_bear_what_dynamics_says(mechanism: str, poses: st
         compared += 1
     assert compared >= 2
     assert {coupling.name for coupling in study.mechanism.couplings} <= {*ours["joint"]}
+
+
+def test_designs_of_other_radii_are_answered_one_by_one() -> None:
+    study = study_of(
+        BELT_ARM.replace("radius: 25", "radius: r").replace("mechanism:", "mechanism:\n  parameters: {r: 25}")
+    )
+    assert not Designs(study, {"r": np.array([20.0, 25.0])}).alike
 
 
 def test_mistakes_are_named() -> None:

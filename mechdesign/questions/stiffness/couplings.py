@@ -78,8 +78,11 @@ def compliance_of(
     soft: list[Value] = []
     if given.force is not None:
         mesh = transmission.mesh
-        radius = mesh.radii(configuration)[0] if mesh is not None and mesh.slide < 0 else 1.0
-        soft.append(1 / (given.force * radius**2))
+        tangential: Value = 1.0
+        if mesh is not None:
+            racked = mesh.slide >= 0
+            tangential = mesh.weight(configuration) if racked else 1 / mesh.radii(configuration)[0]
+        soft.append(tangential**2 / given.force)
     if given.moment is not None:
         soft.append(1 / given.moment)
     return sum(soft) * _unit(transmission, length) ** 2

@@ -300,16 +300,18 @@ class _Builder:
         if part.kind == "slide":
             return next((edge.b, edge.a) for edge in self.edges if edge.name == graph.slides[part.slide])
         if part.kind == "angle":
-            one, other = ([p for b, p in graph.points if b == body] for body in (part.body, part.reference))
+            bodies = part.body, part.reference
+            one, other = ([p for body, p in graph.points if body == b and ":" not in p] for b in bodies)
             shared = [point for point in one if point in other]
-            return tuple(
-                self._node(body, (shared or points)[0])
-                for body, points in ((part.body, one), (part.reference, other))
-            )  # fmt: skip
+            seats = (next(iter(shared or points), "") for points in (one, other))
+            return tuple(self._node(body, seat) for body, seat in zip(bodies, seats, strict=True))
         ends = [(link, graph.nodes[node]) for link, node in part.ends]
         return tuple(self._on_link(link, point) if link else self.pins[point] for link, point in ends)
 
     def _on_link(self, link: str, point: str) -> str:
+        """The vertex of a link at a point; at its first point where that is the origin of its frame."""
+        if ":" in point:
+            return self._node(link, next(iter(self.mechanism.description.links[link].points), ""))
         return self._node(self.mechanism.graph.holder(link, point), point)
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
