@@ -24,6 +24,7 @@ from mechdesign.questions.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.questions.stiffness.legs import Leg, find_legs, hold_by_legs
 from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
+from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import Springs
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -188,7 +189,9 @@ def under_loads(body: Body, configuration: Configuration) -> tuple[Loaded, list[
     elsewhere = _applied(body, configuration) if body.others else None
     for k in range(applied.shape[2]):
         own = applied[:, :, k : k + 1]
-        sides = np.sign(np.nan_to_num(loaded.efforts @ own))[:, :, 0] * body.network.one_sided
+        effort, size = loaded.efforts @ own, np.abs(loaded.stress).max(axis=1, keepdims=True) @ np.abs(own)
+        # An effort that is rounding presses no flank.
+        sides = np.where(np.abs(effort) > RIGID * size, np.sign(effort), 0.0)[:, :, 0] * body.network.one_sided
         twists = twists_of(body.network, body.section, configuration, length, elsewhere, sides)
         parts.append((load(twists, body.size), own))
     return loaded, parts
