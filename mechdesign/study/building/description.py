@@ -27,6 +27,7 @@ from mechdesign.mechanism.model import (
     Link,
     Measure,
     Physical,
+    Plates,
     Prismatic,
     Quantity,
     Slot,
@@ -61,6 +62,7 @@ def build(builder: Builder) -> Description:
     description = Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
         builder.units.angle_factor, builder.masses, springs, couplings, _friction(builder),
+        _plates(builder),
     )  # fmt: skip
     return _with_phases(builder, description)
 
@@ -371,6 +373,31 @@ def _friction(builder: Builder) -> dict[str, Friction]:
         }
         friction[name] = Friction(name, terms["coefficient"], terms.get("radius"), terms.get("length"))
     return friction
+
+
+def _plates(builder: Builder) -> Plates | None:
+    """Plates without mistakes in their names; their numbers become places."""
+    given, path = builder.section.plates, ("plates",)
+    if given is None:
+        return None
+    lengths = {
+        key: builder.place(f"plates.{key}", getattr(given, key))
+        for key in given.given("width", "pin", "thickness", "kerf", "sheet")
+    }
+    widths, layers, pins = dict[str, Term](), dict[str, int](), dict[str, Term]()
+    for name, plate in given.links.items():
+        if not builder.reporter.check_name(name, builder.section.links, "link", (*ROOT, *path, "links", name),
+                                           at_key=True):  # fmt: skip
+            continue
+        if plate.width is not None:
+            widths[name] = builder.place(f"plates.{name}.width", plate.width)
+        if plate.layer is not None:
+            layers[name] = plate.layer
+    for name, diameter in given.pins.items():
+        if builder.reporter.check_name(name, builder.section.owners, "point", (*ROOT, *path, "pins", name),
+                                       at_key=True):  # fmt: skip
+            pins[name] = builder.place(f"plates.{name}.pin", diameter)
+    return Plates(**lengths, widths=widths, pins=pins, layers=layers)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
