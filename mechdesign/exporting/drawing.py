@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,23 @@ class Circle:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A place that is marked, such as the centre of a hole."""
+
+    layer: str
+    place: complex
+
+    @property
+    def ends(self) -> Iterator[complex]:
+        """The place."""
+        return iter((self.place,))
+
+    def moved(self, by: complex, turn: complex = 1.0) -> Mark:
+        """The same turned about 0 by the angle of a unit vector, and then moved."""
+        return replace(self, place=by + turn * self.place)
+
+
+@dataclass(frozen=True)
 class Text:
     """A line of text, level, whose lower left corner is at `place`, or with `centred` its middle."""
 
@@ -117,7 +134,7 @@ class Text:
         return replace(self, place=by + turn * self.place)
 
 
-Shape = Path | Circle | Text
+Shape = Path | Circle | Mark | Text
 
 
 @dataclass(frozen=True)
@@ -126,7 +143,7 @@ class Drawing:
 
     title: str
     groups: Mapping[str, Sequence[Shape]]
-    remarks: Sequence[str] = field(default=())
+    remarks: Sequence[str] = ()
 
     @property
     def shapes(self) -> list[Shape]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mechdesign.errors import printable
-from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text
 
 Pair = tuple[int, str | float | int]
 
@@ -19,8 +19,8 @@ def to_dxf(drawing: Drawing) -> str:
 def _written(value: str | float) -> str:
     """A value; letters beyond ASCII as release 12 has them."""
     if isinstance(value, float):
-        return f"{value + 0.0:.9f}".rstrip("0").rstrip(".") if value else "0"
-    return printable(str(value)).encode("ascii", "namereplace").decode() if isinstance(value, str) else str(value)
+        return f"{round(value, 9) + 0.0:.9f}".rstrip("0").rstrip(".")
+    return printable(str(value)).encode("ascii", "backslashreplace").decode()
 
 
 def _pairs(drawing: Drawing) -> Iterator[Pair]:
@@ -47,6 +47,8 @@ def _entity(shape: Shape) -> Iterator[Pair]:
     if isinstance(shape, Circle):
         yield from _headed("CIRCLE", shape, shape.center)
         yield 40, shape.radius
+    elif isinstance(shape, Mark):
+        yield from _headed("POINT", shape, shape.place)
     elif isinstance(shape, Text):
         yield from _headed("TEXT", shape, shape.place)
         yield from ((40, shape.height), (1, shape.words))

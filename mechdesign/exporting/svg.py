@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from mechdesign.errors import printable, printable_lines
-from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, arc
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text, arc
 
 MARGIN = 5.0  # around the drawing
 STROKE = 0.2  # width of lines
+CROSS = 1.0  # half length of the strokes of a mark
 
 
 def to_svg(drawing: Drawing) -> str:
@@ -44,6 +45,9 @@ def _element(shape: Shape, color: str) -> str:
     if isinstance(shape, Circle):
         x, y = shape.center.real, -shape.center.imag
         return f'<circle cx="{_n(x)}" cy="{_n(y)}" r="{_n(shape.radius)}"/>'
+    if isinstance(shape, Mark):
+        x, y = shape.place.real, -shape.place.imag
+        return f'<path d="M {_n(x - CROSS)} {_n(y)} h {2 * CROSS:g} M {_n(x)} {_n(y - CROSS)} v {2 * CROSS:g}"/>'
     if isinstance(shape, Text):
         look = f'font-family="sans-serif" font-size="{_n(shape.height)}" fill="{color}" stroke="none"'
         middle = ' text-anchor="middle" dominant-baseline="central"' if shape.centred else ""

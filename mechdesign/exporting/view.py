@@ -17,7 +17,7 @@ from mechdesign.mechanism.model import Fixed, Plates
 from mechdesign.mechanism.plates import Sizes
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.question import MotionQuestion, motion_question
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.poses import pose_in_words, solve_poses, study_poses
 from mechdesign.study import Study
 from mechdesign.study.text.fields import Context, read_number
 
@@ -175,6 +175,13 @@ class View:
             raise StudyError("no pose of kinematics is valid: there is no motion to export")
         steps = np.diff(valid)
         return Track(whole.take(valid), follows[valid[:-1]] & (steps == 1), places[valid])
+
+    def words(self, row: int) -> str:
+        """A pose of the motion in words."""
+        poses, place = self.question.poses, self.track.places[row]
+        if place == round(place) < poses.count:
+            return pose_in_words(self.study, poses, round(place))
+        return pose_in_words(self.study, poses.along(np.zeros(1, dtype=np.intp), self.track.places[row : row + 1]), 0)
 
     @cached_property
     def pose(self) -> Configuration:

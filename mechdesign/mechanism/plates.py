@@ -10,8 +10,8 @@ them, or along the line between two corners, so that all of these are tried.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 
@@ -71,82 +71,114 @@ class Sizes:
         """Width of a cut."""
         return self._length(self.plates.kerf)
 
+    @property
+    def sheet(self) -> Value | None:
+        """Width of the sheet on which parts lie; None where the study gives none."""
+        return None if self.plates.sheet is None else self._length(self.plates.sheet)
+
     def _length(self, term: str | float) -> Value:
         return self.mechanism.geometry.term(term, self.places)
 
 
 @dataclass(frozen=True)
-class Pair:
-    """What may meet: the plate of a link, or with `pin` the pin at a point, and the plate of another link."""
+class Item:
+    """The plate of a link, or with `pin` the pin at a point, and the links that it joins."""
 
-    one: str
-    other: str
+    name: str
+    links: tuple[str, ...]
     pin: bool = False
+
+    def __str__(self) -> str:
+        return f"pin {self.name}" if self.pin else self.name
+
+
+def plate_of(link: str) -> Item:
+    """The plate of a link."""
+    return Item(link, (link,))
+
+
+def pins_of(description: Description) -> list[Item]:
+    """The pins of all joints."""
+    return [Item(point, links, pin=True) for point, links in joined(description).items()]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two items that may meet."""
+
+    one: Item
+    other: Item
 
     @property
     def name(self) -> str:
-        """Column of its clearance."""
-        return f"{self.one}.{self.other}.clearance"
+        """Column of their clearance."""
+        return f"{self.one.name}.{self.other.name}.clearance"
 
 
 def pairs_of(description: Description) -> list[Pair]:
-    """What may meet in the plane: links that no joint joins, unless their layers differ, and pins that pass a layer.
+    """What may meet: links that no joint joins, unless their layers differ, and pins with links whose layer they pass.
 
     A pin passes the layers between those of the links that it joins, if all of these are given.
     """
-    plates = description.plates or Plates(0.0)
-    layers, pins = plates.layers, joined(description)
-    together = {frozenset(pair) for links in pins.values() for pair in combinations(links, 2)}
+    layers = {} if description.plates is None else description.plates.layers
+    pins = pins_of(description)
     pairs = [
-        Pair(one, other)
+        Pair(plate_of(one), plate_of(other))
         for one, other in combinations(description.links, 2)
-        if frozenset((one, other)) not in together
+        if not any({one, other} <= {*pin.links} for pin in pins)
         and (one not in layers or other not in layers or layers[one] == layers[other])
     ]
-    for point, links in pins.items():
-        if all(link in layers for link in links):
-            between = range(min(layers[link] for link in links) + 1, max(layers[link] for link in links))
-            pairs += [
-                Pair(point, link, pin=True)
-                for link in description.links
-                if link not in links and layers.get(link) in between
-            ]
+    for pin in pins:
+        if all(link in layers for link in pin.links):
+            ends = [layers[link] for link in pin.links]
+            inside = [link for link, layer in layers.items() if min(ends) < layer < max(ends) and link not in pin.links]
+            pairs += [Pair(pin, plate_of(link)) for link in inside]
     return pairs
 
 
 @dataclass(frozen=True)
 class Clearances:
-    """Clearances of pairs at the poses of a configuration."""
+    """Clearances of items at the poses of a configuration.
+
+    `corners` are by link the places, in its frame, that its plate goes around; left out, its points.
+    """
 
     mechanism: Core
     plates: Plates
     configuration: Configuration
+    corners: Mapping[str, Sequence[complex]] = field(default_factory=dict)
 
     @cached_property
     def sizes(self) -> Sizes:
         """Lengths of the plates."""
         return Sizes(self.mechanism, self.plates, self.configuration.places)
 
-    def of(self, pair: Pair) -> Value:
-        """Distance of the outlines of a pair; where they overlap minus the depth of it; nan of a pose that fails."""
-        one, radius = self._pin(pair.one) if pair.pin else self._plate(pair.one)
-        other, width = self._plate(pair.other)
-        return gap(one, other) - radius - width
+    def of(self, one: Item, other: Item) -> Value:
+        """Distance of two outlines; where they overlap minus the depth of it; nan of a pose that fails."""
+        return gap(self.around(one), self.around(other)) - self._radius(one) - self._radius(other)
 
-    def of_pins(self, one: str, other: str) -> Value:
-        """Distance of two pins."""
-        (first, radius), (second, width) = self._pin(one), self._pin(other)
-        return gap(first, second) - radius - width
+    def around(self, item: Item) -> list[Vector]:
+        """Places in the world that an item goes around."""
+        if item.pin:
+            return [self._node(item.name)]
+        link = self.mechanism.description.links[item.name]
+        if item.name not in self.corners:
+            return [self._node(point) for point in points_of(link)]
+        base, turn = next(iter(link.points)), self.configuration.body_rotation(item.name)
+        local = self.mechanism.geometry.local(item.name, base, self.configuration.places)
+        tip = [self._node(link.ends[1])] if link.telescopic and link.ends else []
+        return [*(self._node(base) + (corner - local) * turn for corner in self.corners[item.name]), *tip]
 
-    def _plate(self, link: str) -> tuple[list[Vector], Value]:
-        points = points_of(self.mechanism.description.links[link])
-        return self._at(points), self.sizes.radius(link)
+    def moved(self, item: Item) -> Value:
+        """The longest way of a place of an item from each pose to the next, shape (n - 1,)."""
+        ways = [np.abs(np.diff(corner)) for corner in self.around(item) if np.ndim(corner)]
+        return np.maximum.reduce(ways) if ways else 0.0
 
-    def _pin(self, point: str) -> tuple[list[Vector], Value]:
-        return self._at([point]), self.sizes.pin(point)
+    def _radius(self, item: Item) -> Value:
+        return self.sizes.pin(item.name) if item.pin else self.sizes.radius(item.name)
 
-    def _at(self, points: Iterable[str]) -> list[Vector]:
-        return [self.configuration.nodes[self.mechanism.graph.node(point)] for point in points]
+    def _node(self, point: str) -> Vector:
+        return self.configuration.nodes[self.mechanism.graph.node(point)]
 
 
 @quiet
