@@ -12,17 +12,20 @@ from mechdesign.exporting.view import View
 from mechdesign.mechanism.plates import joined
 from mechdesign.report.figures.scene import ranks
 
+# Height of letters as a part of the mechanism's size, and the least one (mm).
+LETTERS, SMALLEST = 0.04, 1.0
+
 
 @export("mechanism.dxf", "the mechanism in a pose and the paths of its points, as DXF", order=30)
 def mechanism_dxf(view: View) -> Content:
     """The mechanism in a pose as DXF."""
-    return Content(to_dxf(mechanism_drawing(view)), view.assumed)
+    return Content(to_dxf(mechanism_drawing(view)), view.assumed + view.unmoved)
 
 
 @export("mechanism.svg", "the mechanism in a pose and the paths of its points, as SVG", order=31)
 def mechanism_svg(view: View) -> Content:
     """The mechanism in a pose as SVG."""
-    return Content(to_svg(mechanism_drawing(view)), view.assumed)
+    return Content(to_svg(mechanism_drawing(view)), view.assumed + view.unmoved)
 
 
 def mechanism_drawing(view: View) -> Drawing:
@@ -30,6 +33,7 @@ def mechanism_drawing(view: View) -> Drawing:
     mechanism, scale = view.mechanism, view.millimetres
     description, sizes = mechanism.description, view.sizes
     groups: dict[str, list[Shape]] = {}
+    letters = max(SMALLEST, LETTERS * scale * mechanism.size)
     for link in description.links:
         outline = [scale * place for place in view.in_world(link, view.outline(link))]
         radius = scale * float(sizes.radius(link))
@@ -39,13 +43,13 @@ def mechanism_drawing(view: View) -> Drawing:
                 ends = [scale * place for place in view.in_world(link, slot.ends)]
                 shapes.append(around("links", ends, scale * float(sizes.pin(slot.point))))
         middle = sum(outline) / len(outline)
-        shapes.append(Text("notes", middle, min(0.6 * radius, 5.0), link, centred=True))
+        shapes.append(Text("notes", middle, min(0.6 * radius, letters), link, centred=True))
         groups[link] = shapes
     for point in joined(description):
         place = scale * complex(view.pose.point(point))
         groups[f"pin {point}"] = [
             Circle("links", place, scale * float(sizes.pin(point))),
-            Text("notes", place + 1.4 * scale * float(sizes.pin(point)) * (1 + 1j), 4.0, point),
+            Text("notes", place + 1.4 * scale * float(sizes.pin(point)) * (1 + 1j), letters, point),
         ]
     for point, rank in ranks(view.study).items():
         if rank:

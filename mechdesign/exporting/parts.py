@@ -25,13 +25,13 @@ ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the wid
 @export("parts.dxf", "every link as a part to cut at 1:1, as DXF", order=10)
 def parts_dxf(view: View) -> Content:
     """All parts as DXF."""
-    return Content(to_dxf(parts_drawing(view)), view.assumed)
+    return Content(to_dxf(parts_drawing(view)), view.assumed + view.unmoved)
 
 
 @export("parts.svg", "every link as a part to cut at 1:1, as SVG", order=11)
 def parts_svg(view: View) -> Content:
     """All parts as SVG."""
-    return Content(to_svg(parts_drawing(view)), view.assumed)
+    return Content(to_svg(parts_drawing(view)), view.assumed + view.unmoved)
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ def _pitch_circles(view: View, link: str) -> list[tuple[complex, float]]:
         for wheel, axis, radius in zip(mesh.links, mesh.axes, radii, strict=True):
             size, point = float(np.real(radius)), mechanism.graph.nodes[axis]
             if wheel == link and size > 0 and point in view.points(link):
-                circles.append((view.millimetres * view.points(link)[point], view.millimetres * size))
-    return circles
+                circles.append((view.millimetres * view.points(link)[point], round(view.millimetres * size, 9)))
+    return [*dict.fromkeys(circles)]
 
 
 def parts_drawing(view: View) -> Drawing:

@@ -22,6 +22,8 @@ from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 
 # Layers that the search for a stack tries at most, one link at a time.
 MOST_TRIED = 100_000
+# A search that allows meetings counts one of two plates as so many of a pin.
+OF_PLATES = 100
 # Meetings that a warning names at most.
 MOST_NAMED = 3
 HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
@@ -41,7 +43,7 @@ def layers_csv(view: View) -> Content:
         rows.append((pin.name, "pin", min(layers), max(layers)))
     for item, kind, first, last in rows:
         table.writerow((item, kind, first, last, f"{(first - 1) * thickness:.9g}", f"{last * thickness:.9g}"))
-    return Content(text.getvalue(), (*view.assumed, *stack.cautions))
+    return Content(text.getvalue(), view.assumed + view.unmoved + stack.cautions)
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,11 @@ class Meeting:
     one: Item
     other: Item
     pose: str
+
+    @property
+    def weight(self) -> int:
+        """How much it counts where it cannot be avoided."""
+        return 1 if self.one.pin or self.other.pin else OF_PLATES
 
     def broken(self, layers: Mapping[str, int]) -> bool:
         """Whether both share a layer, of the links that have one."""
@@ -196,14 +203,18 @@ class _Search:
             self._least, self._found = cost, dict(layers)
             return
         link = self.order[rank]
+        before = self._cost(link, layers)
         for layer in [self.given[link]] if link in self.given else range(1, count + 1):
             self.tried += 1
-            before = sum(meeting.broken(layers) for meeting in self.of_link[link])
             layers[link] = layer
-            new = sum(meeting.broken(layers) for meeting in self.of_link[link]) - before
+            new = self._cost(link, layers) - before
             if not (new and self.strict):
                 self._place(rank + 1, layers, broken + new, count)
             del layers[link]
+
+    def _cost(self, link: str, layers: Mapping[str, int]) -> int:
+        """What the meetings of a link count, in some layers."""
+        return sum(meeting.weight for meeting in self.of_link[link] if meeting.broken(layers))
 
     def _length(self, layers: Mapping[str, int]) -> int:
         """Layers that all pins pass."""

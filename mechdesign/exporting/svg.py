@@ -9,7 +9,7 @@ from mechdesign.errors import printable, printable_lines
 from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text, arc
 
 MARGIN = 5.0  # around the drawing
-STROKE = 0.2  # width of lines
+STROKE, LINES = 0.2, 3000  # least width of lines, and their number side by side in a large drawing
 CROSS = 1.0  # half length of the strokes of a mark
 
 
@@ -17,6 +17,7 @@ def to_svg(drawing: Drawing) -> str:
     """The drawing as the text of an SVG file, one unit of which is a millimetre."""
     low, high = drawing.box
     corner, size = complex(low.real, -high.imag) - MARGIN * (1 + 1j), high - low + 2 * MARGIN * (1 + 1j)
+    stroke = max(STROKE, max(size.real, size.imag) / LINES)
     remarks = "\n".join((drawing.title, "made by mechdesign; one unit is 1 mm", *drawing.remarks))
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -27,7 +28,7 @@ def to_svg(drawing: Drawing) -> str:
         f"<title>{escape(printable(drawing.title))}</title>",
     ]
     for layer in drawing.layers:
-        look = f'fill="none" stroke="{layer.color}" stroke-width="{STROKE}"'
+        look = f'fill="none" stroke="{layer.color}" stroke-width="{stroke:.3g}"'
         lines.append(f'<g id="{layer.name}" inkscape:groupmode="layer" inkscape:label="{layer.name}" {look}>')
         for name, group in drawing.groups.items():
             lines += _group(name, [shape for shape in group if shape.layer == layer.name], layer.color)

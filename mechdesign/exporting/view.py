@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -144,30 +144,44 @@ class View:
         return "the pose of the sketch" if self.at is None else self.at
 
     @cached_property
-    def question(self) -> MotionQuestion:
-        """What the study asks of its motion."""
-        return motion_question(self.study, study_poses(self.study, "kinematics"))
+    def question(self) -> MotionQuestion | None:
+        """What the study asks of its motion; None where it gives no poses, and none can be assumed."""
+        try:
+            poses = study_poses(self.study, "kinematics")
+        except StudyError:
+            return None
+        return motion_question(self.study, poses)
+
+    @property
+    def unmoved(self) -> tuple[Caution, ...]:
+        """A warning where the study gives no motion."""
+        if self.question is not None:
+            return ()
+        message = "the study gives no poses of kinematics: slots and layers are those of the sketch's pose alone"
+        return (Caution("incomplete", message),)
 
     @cached_property
     def track(self) -> Track:
-        """The motion of kinematics: its poses, and between them so many that `LOOKS` are there.
+        """The motion of kinematics: its poses, and between them so many that `LOOKS` are there; else the sketch.
 
         Raises
         ------
         StudyError
-            If no poses are given, or none is valid.
+            If none is valid.
         """
+        if self.question is None:
+            still = self.mechanism.sketch_configuration
+            still = replace(still, shape=(1,), reason=still.reason.reshape(1))
+            return Track(still, np.zeros(0, dtype=bool), np.zeros(1))
         poses, curve = self.question.poses, self.question.curve
         if curve is None or curve.spent.any():
-            solved = [*solve_poses(self.study, poses, self.question.watched)]
-            parts = [part.configuration for part in solved]
-            order = np.concatenate([part.rows for part in solved])
-            geometry = self.mechanism.geometry
-            whole = joined(parts, (poses.count,), geometry.nominal, {}) if len(parts) > 1 else parts[0]
-            places, follows = order.astype(float), np.zeros(poses.count - 1, dtype=bool)
+            parts = [*solve_poses(self.study, poses, self.question.watched)]
+            configurations = [part.configuration for part in parts]
+            whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
+            places, follows = np.concatenate([part.rows for part in parts]) * 1.0, np.zeros(poses.count - 1, dtype=bool)
         else:
-            parts_of_row = -(-(LOOKS - 1) // max(poses.end, 1))
-            places = np.linspace(0.0, poses.end, poses.end * parts_of_row + 1)
+            finer = -(-(LOOKS - 1) // max(poses.end, 1))
+            places = np.linspace(0.0, poses.end, poses.end * finer + 1)
             whole = curve.solve(np.zeros(len(places), dtype=np.intp), places)[1]
             follows = np.ones(len(places) - 1, dtype=bool)
         valid = np.flatnonzero(whole.valid)
@@ -178,6 +192,8 @@ class View:
 
     def words(self, row: int) -> str:
         """A pose of the motion in words."""
+        if self.question is None:
+            return "in the sketch"
         poses, place = self.question.poses, self.track.places[row]
         if place == round(place) < poses.count:
             return pose_in_words(self.study, poses, round(place))
