@@ -92,10 +92,10 @@ class Stack:
             return ()
         named = "; ".join(map(str, self.meetings[:MOST_NAMED]))
         more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
-        whole = (
-            "whatever their layers, something meets" if self.complete else "no stack was found in which nothing meets"
-        )
-        return (Caution("infeasible", f"{whole}; here {named}{more}"),)
+        head = "no stack was found in which nothing meets"
+        if self.complete:
+            head = "whatever their layers, some links meet"
+        return (Caution("infeasible", f"{head}; here {named}{more}"),)
 
 
 def stack_of(view: View) -> Stack:

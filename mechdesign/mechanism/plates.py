@@ -193,7 +193,7 @@ def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
     largest: Value = -np.inf
     for direction in directions:
         length = np.abs(direction)
-        along = np.conj(direction / length)
+        along = np.conj(np.divide(direction, length))
         near, far = ([np.real(corner * along) for corner in corners] for corners in (one, other))
         apart = np.minimum.reduce(np.broadcast_arrays(*far)) - np.maximum.reduce(np.broadcast_arrays(*near))
         largest = np.where(length > 0, np.fmax(largest, apart), largest)
