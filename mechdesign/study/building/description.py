@@ -39,7 +39,7 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount
+from mechdesign.study.text.units import Amount, written
 
 # Of teeth as ISO 53 has them (radians).
 PRESSURE_ANGLE = np.radians(20.0)
@@ -397,7 +397,20 @@ def _plates(builder: Builder) -> Plates | None:
         if builder.reporter.check_name(name, builder.section.owners, "point", (*ROOT, *path, "pins", name),
                                        at_key=True):  # fmt: skip
             pins[name] = builder.place(f"plates.{name}.pin", diameter)
+    _check_holes(builder, given)
     return Plates(**lengths, widths=widths, pins=pins, layers=layers)
+
+
+def _check_holes(builder: Builder, given: models.Plates) -> None:
+    """Check that no hole of a given diameter is as wide as its link."""
+    for point, links in builder.section.owners.items():
+        diameter = given.pins.get(point, given.pin)
+        for link in links if len(links) > 1 and diameter is not None else ():
+            own = given.links.get(link)
+            width = given.width if own is None or own.width is None else own.width
+            if diameter >= width:
+                message = f"the pin {point!r} has {written(diameter)}, and link {link!r} is only {written(width)} wide"
+                builder.report(("plates",), f"{message}: its hole would cut the link through", at_key=True)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
