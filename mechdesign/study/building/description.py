@@ -405,10 +405,10 @@ def _check_holes(builder: Builder, given: models.Plates) -> None:
     """Check that no hole of a given diameter is as wide as its link."""
     for point, links in builder.section.owners.items():
         diameter = given.pins.get(point, given.pin)
-        for link in links if len(links) > 1 and diameter is not None else ():
+        for link in links:
             own = given.links.get(link)
             width = given.width if own is None or own.width is None else own.width
-            if diameter >= width:
+            if len(links) > 1 and diameter is not None and diameter >= width:
                 message = f"the pin {point!r} has {written(diameter)}, and link {link!r} is only {written(width)} wide"
                 builder.report(("plates",), f"{message}: its hole would cut the link through", at_key=True)
 
