@@ -84,7 +84,7 @@ def test_words_are_found_by_path_by_last_part_by_kind_and_in_any_case():
     assert words("kN") == ["k-", "N"]
     assert words("reliability.dimensions.rod.length.tolerance") == ["reliability.dimensions.*.tolerance"]
     assert words("clearence") == []
-    assert near(ENTRIES, "clearence") == "clearances"
+    assert near(ENTRIES, "clearence") == "clearance"
 
 
 def test_what_is_said_of_a_word():

@@ -64,9 +64,9 @@ class KinematicsSection(MotionSection):
     collisions: Annotated[
         tuple[TwoLinks, ...] | None, BeforeValidator(_every_pair), fields.OrShort({"type": "boolean"})
     ] = None
-    """Whether clearances are reported, distances of the outlines of mechanism.plates, negative where they overlap; or
-    the pairs of links whose are. ``true``: of all links that no joint joins and whose layers, where given, are the
-    same, and of pins with links whose layer they pass. Example: true Example: [[crank, ground]]
+    """Pairs of links whose clearance is reported: the distance of their outlines by mechanism.plates, negative where
+    they overlap. ``true`` takes all links that no joint joins and whose layers, where both are given, are the same, and pins
+    with the links whose layers they pass. Example: true Example: [[crank, ground]]
     """
 
     def checked(self, checker: Checker) -> Self:
