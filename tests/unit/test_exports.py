@@ -76,7 +76,7 @@ def test_every_file_is_told_of_on_its_page():
 
 
 def test_a_wrong_name_lists_those_there_are():
-    with pytest.raises(StudyError, match=r"nothing is exported as 'mechanism.dfx'; did you mean 'mechanism.dxf'"):
+    with pytest.raises(StudyError, match=r"there is no 'mechanism.dfx' to export; did you mean 'mechanism.dxf'"):
         export_named("mechanism.dfx")
 
 

@@ -65,8 +65,8 @@ class KinematicsSection(MotionSection):
         tuple[TwoLinks, ...] | None, BeforeValidator(_every_pair), fields.OrShort({"type": "boolean"})
     ] = None
     """Pairs of links whose clearance is reported: the distance of their outlines by mechanism.plates, negative where
-    they overlap. ``true`` takes all links that no joint joins and whose layers, where both are given, are the same, and pins
-    with the links whose layers they pass. Example: true Example: [[crank, ground]]
+    they overlap. ``true`` takes all links that no joint joins and whose layers, where both are given, are the same, and
+    pins with the links whose layers they pass. Example: true Example: [[crank, ground]]
     """
 
     def checked(self, checker: Checker) -> Self:
