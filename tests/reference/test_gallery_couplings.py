@@ -142,9 +142,8 @@ def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
 
 def test_backlash_of_a_belt_moves_the_scara_across_its_forearm() -> None:
     """The variances of x and y by it add up to (l2 b)^2/12 at every pose."""
-    linear = mechdesign.reliability(
-        study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
-    ).tables["contributions"]
+    study = study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
+    linear = mechdesign.reliability(study).tables["contributions"]
     own = linear["source"] == "elbow"
     sigma = linear["derivative"][own] * 0.06 / np.sqrt(12)
     assert np.hypot(sigma[::2], sigma[1::2]) == pytest.approx(np.full(3, 150 * np.radians(0.06) / np.sqrt(12)))
