@@ -93,20 +93,20 @@ def remeasured(study: Study, names: Collection[str]) -> bool:
 
 
 def _drawing(study: Study) -> set[str]:
-    """Places on which the measured dimensions depend: of links that are measured in the sketch, and ratios of gears."""
+    """Places on which measured dimensions depend: of links measured in the sketch, and of a phase ratio and guides."""
     links, joints = study.mechanism.description.links, study.mechanism.description.joints
     couplings = {coupling.name: coupling.gap for coupling in study.mechanism.couplings}
     owners: set[str] = set()
-    ratios: set[str] = set()
+    numbers: set[str] = set()
     for place in study.parameters.measured:
         owner, _, _ = place.rpartition(".")
         joint = joints.get(owner)
         if owner in couplings:
-            ratios.add(f"{owner}.ratio")
-            turning = {body for part in couplings[owner].parts for body in (part.body, part.reference)}
-            sliding = [study.mechanism.graph.slides[part.slide] for part in couplings[owner].parts if part.slide >= 0]
-            owners |= turning & links.keys() - {GROUND}
-            owners.update(link for name in sliding for link in (joints[name].links if name in joints else (name,)))
+            numbers.add(f"{owner}.ratio")
+            for part in couplings[owner].parts:
+                name = study.mechanism.graph.slides[part.slide] if part.slide >= 0 else part.body
+                numbers.add(f"{name}.direction")
+                owners.update(joints[name].links if name in joints else {name} & links.keys())
         else:
             owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
     points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
@@ -114,7 +114,7 @@ def _drawing(study: Study) -> set[str]:
     # The numbers of the ground place its points in the sketch.
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
-    return lengths | ratios | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
+    return lengths | numbers | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
