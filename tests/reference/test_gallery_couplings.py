@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.gallery import meet, point, result_of, study_named, unit
 
+import mechdesign
 from mechdesign.mechanism.wheels import meshes
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.stiffness.analysis import stiffness
@@ -145,3 +146,12 @@ def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
     region = workspace(study_named("belt_scara"))
     area = float(region.main["area"][0])
     assert area == pytest.approx(4 * np.pi * 200 * 150, rel=1e-9)
+
+
+def test_backlash_of_a_belt_moves_the_scara_across_its_forearm() -> None:
+    """The variances of x and y by it add up to (l2 b)^2/12 at every pose."""
+    study = study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
+    linear = mechdesign.reliability(study).tables["contributions"]
+    own = linear["source"] == "elbow"
+    sigma = linear["derivative"][own] * 0.06 / np.sqrt(12)
+    assert np.hypot(sigma[::2], sigma[1::2]) == pytest.approx(np.full(3, 150 * np.radians(0.06) / np.sqrt(12)))

@@ -363,6 +363,39 @@ class Friction(fields.Model):
     """
 
 
+class Plate(fields.Model):
+    """Width and layer of one link as a plate; a number alone is its width."""
+
+    bare, short = "width", (fields.NUMBER_FORM,)
+    width: fields.PositiveLengthPlace | None = None
+    """Width of this link: its ends are round with half of it. Left out: that of all. Example: 12 mm"""
+    layer: Annotated[int, fields.whole(1, 1000)] | None = None
+    """Layer in which this link lies, counted from the bottom. Left out: `mechdesign export --to layers.csv` finds one.
+    Example: 2
+    """
+
+
+class Plates(fields.Model):
+    """Links as flat plates that are cut to size, and the pins that join them."""
+
+    width: fields.PositiveLengthPlace
+    """Width of every link: the outline is as far from its points as half of it. Example: 20 mm"""
+    pin: fields.PositiveLengthPlace | None = None
+    """Diameter of every pin and its holes. Left out: 0.4 of ``width``. Example: 6 mm"""
+    thickness: fields.PositiveLengthPlace | None = None
+    """Thickness of a plate, and so the height of a layer. Left out: 0.25 of ``width``. Example: 5 mm"""
+    pins: dict[fields.PointName, fields.PositiveLengthPlace] = Field(default_factory=dict)
+    """Diameters of pins that differ, by their point. Example: {A: 8 mm}"""
+    links: dict[fields.LinkName, Plate] = Field(default_factory=dict)
+    """Widths and layers of links that differ. Example: {coupler: {width: 12 mm, layer: 2}, crank: 15}"""
+    kerf: fields.NonNegativeLengthPlace | None = None
+    """Width of the cut that laser, water or wire takes away: outlines are larger by half of it, holes smaller. Left
+    out: 0. Example: 0.2 mm
+    """
+    sheet: fields.PositiveLengthPlace | None = None
+    """Width of the sheet on which the parts lie in rows. Left out: 600 mm. Example: 300 mm"""
+
+
 class Limit(fields.Model):
     """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
 
@@ -467,6 +500,10 @@ class MechanismSection(fields.Model):
     friction: dict[fields.JointName, Friction] = Field(default_factory=dict)
     """Friction of joints by the name of a point whose pin turns, a slide, a slot or a telescopic link. Example: {A:
     {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
+    """
+    plates: Plates | None = None
+    """Links as plates: widths, pins and layers, for `mechdesign export` and ``kinematics.collisions``. Example: {width:
+    20 mm, thickness: 5 mm, pin: 6 mm, links: {coupler: {width: 12 mm, layer: 2}}}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
