@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Container, Iterable
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -75,6 +76,7 @@ def picture(folder: Path) -> Path | None:
     return next((found[name] for name in PICTURES if name in found), None)
 
 
+@cache
 def title(path: Path) -> str:
     """What a study is called."""
     return str(yaml.safe_load(path.read_text(encoding="utf-8")).get("name") or path.stem)
