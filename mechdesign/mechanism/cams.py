@@ -105,6 +105,16 @@ class Cam:
     plan: Plan
 
     @property
+    def nodes(self) -> tuple[int, int]:
+        """Nodes of the roller's centre, or of a point of the flat face, and of a point of the cam."""
+        return self.node, self.base
+
+    @property
+    def presses(self) -> bool:
+        """The contact force is known."""
+        return True
+
+    @property
     def flat(self) -> bool:
         """Whether its follower has a flat face."""
         return self.given.radius is None
@@ -234,6 +244,11 @@ class Cam:
     def place(self, configuration: Configuration) -> Vector:
         """Where the follower touches the cam."""
         return self.touch(configuration).place
+
+    @quiet
+    def force(self, configuration: Configuration) -> Value:
+        """Contact force for each unit of effort on the coordinate that follows."""
+        return 1 / self.touch(configuration).lever
 
     @quiet
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:

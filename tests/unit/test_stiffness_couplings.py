@@ -115,6 +115,32 @@ def test_a_cam_reflects_the_stiffness_of_its_motor_by_its_slope() -> None:
     assert ask_stiffness(text).main["k_x"] == pytest.approx(1 / (slope**2 / 1e5 + 1 / 4e3), rel=1e-12)
 
 
+# An offset follower with a roller on a cam, whose shaft gives.
+VALVE = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [6, 0]}
+    disc: [O, N, 20]
+    stem: {F: [0, 0], T: [60, 0]}
+  joints: {valve: {prismatic: [ground, stem], through: G, direction: 90, point: F}}
+  drives: {cam: {angle: disc}}
+  couplings: {lift: {set: valve, to: 40 - 10*cos(cam), cam: {link: disc, roller: F, radius: 8}}}
+  sketch: {N: [20, 0], F: [6, 30], T: [6, 90]}
+"""
+
+
+def test_a_cam_gives_along_its_normal_and_loads_its_shaft() -> None:
+    """A push F on the follower is F/cos(phi) on the cam and its shaft, tan(phi) = (s' - e)/s, and F s' on the motor."""
+    text = VALVE + (
+        "stiffness: {at: T, actuators: {cam: 100 N*m/rad}, couplings: {lift: 4e3 N/mm}, bearings: {O: 5e3 N/mm},"
+        " poses: [{cam: 50}]}\n"
+    )
+    slope, s = 10 * np.sin(np.radians(50)), 40 - 10 * np.cos(np.radians(50))
+    steep = 1 + ((slope - 6) / s) ** 2
+    found = matrix(ask_stiffness(text), "C")
+    assert found == pytest.approx(np.diag([0, slope**2 / 1e5 + steep * (1 / 4e3 + 1 / 5e3)]), rel=1e-12, abs=1e-16)
+
+
 FIVE_BAR = """
 mechanism:
   parameters: {p: 0}
@@ -272,11 +298,12 @@ mechanism:
         (RACK.partition("stiffness:")[0], "[{pinion: 40}]", "[{at: R, force: [%s, 5]}]"),
         (PULLED, "[{arm: 15, motor: 40}]", "[{at: P, force: [3, %s]}]"),
         (RINGED, "[{arm: 10}, {arm: 60}]", "[{link: sun, moment: %s}]"),
+        (VALVE, "[{cam: 50}, {cam: 200}]", "[{at: T, force: [3, %s]}]"),
     ],
 )
 @pytest.mark.parametrize("push", [40.0, -40.0])
 def test_rigid_links_and_teeth_bear_what_dynamics_says(mechanism: str, poses: str, loads: str, push: float) -> None:
-    at = next(point for point in ("B", "R", "P") if f"{point}: [" in mechanism)
+    at = next(point for point in ("B", "R", "P", "T") if f"{point}: [" in mechanism)
     section = f"{{poses: {poses}, loads: {loads % push}}}\n"
     study = study_of(f"{mechanism}stiffness: {{at: {at}, dynamics: true}}\ndynamics: {section}")
     ours, theirs = mechdesign.stiffness(study).tables["forces"], mechdesign.dynamics(study).tables["joint_forces"]
