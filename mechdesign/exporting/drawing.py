@@ -23,6 +23,7 @@ LAYERS = {
     layer.name: layer
     for layer in (
         Layer("cut", "what is cut through", 1, "#ff0000"),
+        Layer("pocket", "both sides of a groove, which is milled to a depth", 4, "#00a0a0"),
         Layer("drill", "centres of holes", 3, "#00a000"),
         Layer("engrave", "names and marks", 5, "#0000ff"),
         Layer("links", "links of the mechanism in a pose", 7, "#000000"),
@@ -50,6 +51,10 @@ class Path:
         """Straight lines from place to place."""
         places = tuple(corners)
         return cls(layer, places, (0.0,) * len(places), closed=False)
+
+    def close(self) -> Path:
+        """The same with a line from the last place to the first."""
+        return replace(self, closed=True)
 
     @property
     def ends(self) -> Iterator[complex]:
