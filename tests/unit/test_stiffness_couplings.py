@@ -221,6 +221,38 @@ stiffness:
 )
 
 
+# An arm that bends, with a roller on a cam whose shaft gives.
+ROCKED = """
+mechanism:
+  links:
+    ground: {O: [0, 0], P: [-60, 40]}
+    disc: [O, N, 20]
+    arm: {from: P, to: H, length: 100, points: {F: [60, -10]}}
+  drives: {cam: {angle: disc}}
+  couplings: {lift: {set: arm, to: 8 - 12*cos(cam), cam: {link: disc, roller: F, radius: 8}}}
+  sketch: {N: [20, 0], H: [40, 35]}
+stiffness:
+  at: H
+  sections: {bar: {E: 2e5, width: 10, height: 15}}
+  elastic: {arm: bar}
+  bearings: {O: 1e4 N/mm, P: 3e4 N/mm}
+  actuators: {cam: 200 N*m/rad}
+  couplings: {lift: 5e3 N/mm}
+  loads: [[0, -50], [0, 50]]
+  poses: [{cam: 70}, {cam: 200}]
+"""
+
+
+def rolling(pose: Configuration, _: int) -> Teeth:
+    """The cam of ROCKED presses square to the motion of the roller against it."""
+    turn = np.angle(np.ravel(pose.rotation("disc"))[0])
+    arm = (60 - 10j) * np.exp(1j * np.radians(8 - 12 * np.cos(turn)))
+    roller = -60 + 40j + arm
+    normal = -1j * (1j * arm * np.radians(12) * np.sin(turn) - 1j * roller)
+    normal *= np.sign((normal * np.conj(roller)).real) / abs(normal)
+    return Teeth((("arm", "F"), ("disc", "O")), ((complex(roller - 8 * normal), complex(normal)),))
+
+
 def meshing(pressure: float) -> Callable[[Configuration, int], Teeth]:
     """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3."""
 
@@ -250,8 +282,9 @@ def belt(pose: Configuration, side: int) -> Teeth:
         (GEARED % 0.0, "gears", meshing(0.0), False),
         (GEARED % 20.0, "gears", meshing(20.0), True),
         (STRAPPED, "elbow", belt, True),
+        (ROCKED, "lift", rolling, False),
     ],
-    ids=["teeth along", "teeth", "belt"],
+    ids=["teeth along", "teeth", "belt", "cam"],
 )
 def test_wheels_on_links_and_pins_that_give_are_those_of_finite_elements(
     text: str, coupling: str, of_side: Callable[[Configuration, int], Teeth], odd: bool
