@@ -5,8 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from mechdesign.errors import StudyError
-from mechdesign.importing.sketch import Sketch
-from mechdesign.mechanism.graph import GROUND
+from mechdesign.importing.sketch import GROUND, Sketch
 
 
 class Bodies:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from mechdesign.importing.formats import FORMATS
 from mechdesign.importing.sketch import Drive, Sketch
 from mechdesign.importing.source import Source
 from mechdesign.importing.writer import STEPS, Span, Writer
+from mechdesign.numerics.arrays import Flags, Floats
 
 _APART = "the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits there"
 
@@ -103,7 +104,7 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
         sketch.drives = [_named(sketch, name) for name in chosen]
         return
     if not sketch.drives:
-        pins = [name for name in sketch.fixed if sketch.links_at(name)]
+        pins = [name for name in sketch.fixed if sketch.moving_at(name)]
         listed = ", ".join(map(repr, pins[:12])) or "none: no joint is on the ground"
         raise StudyError(
             f"the file says of no joint that it is driven: choose with --drive; pins of the ground: {listed}"
@@ -118,10 +119,12 @@ def _named(sketch: Sketch, name: str) -> Drive:
     """The drive that a name stands for, with the speed that the file has for it."""
     of = name
     if name in sketch.points and name in sketch.fixed:
-        links = sketch.links_at(name)
+        links = sketch.moving_at(name)
         if len(links) != 1:
             raise StudyError(f"{len(links)} links turn about {name!r}: name the one that is driven")
         of = links[0]
+    elif name in sketch.points:
+        of = next((slide for slide, s in sketch.slides.items() if s.point == name), name)
     for drive in sketch.drives:
         if drive.of == of:
             return drive
@@ -140,9 +143,14 @@ def _settled(writer: Writer, source: str) -> str:
         drive, start = writer.drives[name], writer.start(name)
         turns = drive.kind == "angle" and drive.span is None
         wide = (start - 180, start + 180) if turns else span
+        solve = _loaded(writer.text(source, {name: wide})).mechanism.solve
+
+        def assembled(values: Floats) -> Flags:
+            return np.asarray(solve({name: values}).valid)
+
         values = np.unique([*np.linspace(*wide, 2 * STEPS + 1), start])
-        valid = _assembled(writer.text(source, {name: wide}), name, values)
-        spans[name] = _passed(values, valid, start)
+        valid = assembled(values)
+        spans[name] = _passed(values, valid, start, assembled)
         if turns and valid.all():
             spans[name] = span
         remark = []
@@ -166,18 +174,22 @@ def _loaded(text: str) -> studies.Study:
         raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
 
 
-def _assembled(text: str, name: str, values: np.ndarray) -> np.ndarray:
-    return np.asarray(_loaded(text).mechanism.solve({name: values}).valid)
-
-
-def _passed(values: np.ndarray, valid: np.ndarray, start: float) -> Span:
-    """The values around the start without a gap, at which the mechanism is assembled."""
+def _passed(values: Floats, valid: Flags, start: float, assembled: Callable[[Floats], Flags]) -> Span:
+    """The ends of the values around the start, without a gap, at which the mechanism is assembled."""
     middle = int(np.argmin(np.abs(values - start)))
     if not valid[middle]:
         raise AssemblyError(_APART)
-    low = high = middle
-    while low > 0 and valid[low - 1]:
-        low -= 1
-    while high < len(values) - 1 and valid[high + 1]:
-        high += 1
-    return float(values[low]), float(values[high])
+    ends = []
+    for step in (-1, 1):
+        end = middle
+        while 0 <= end + step < len(values) and valid[end + step]:
+            end += step
+        inside = float(values[end])
+        if 0 <= end + step < len(values):
+            outside = float(values[end + step])
+            for _ in range(2):
+                tried = np.linspace(inside, outside, STEPS + 1)
+                last = int(np.argmin(assembled(tried))) - 1
+                inside, outside = float(tried[last]), float(tried[last + 1])
+        ends.append(inside)
+    return ends[0], ends[1]

@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.mechanism.graph import GROUND
 
 # Most points, and most links, of a file; most points on links; and the largest number.
 MOST = 1000
 MOST_ENDS = 5000
+# The ground among links, whose names are not empty.
+GROUND = ""
 LARGEST = 1e12
 
 
@@ -146,9 +147,17 @@ class Sketch:
             raise StudyError(f"more than {MOST_ENDS} joints of links")
         return self.links[name]
 
+    def fix(self, points: Iterable[str]) -> None:
+        """Put points on the ground; those that the sketch does not have are passed over."""
+        self.fixed += [point for point in points if point in self.points and point not in self.fixed]
+
     def links_at(self, point: str) -> list[str]:
         """The links that have a point."""
         return [name for name, link in self.links.items() if point in link.points]
+
+    def moving_at(self, point: str) -> list[str]:
+        """The links that have a point, but those whose points are all on the ground."""
+        return [name for name in self.links_at(point) if not {*self.links[name].points} <= {*self.fixed}]
 
     def distance(self, one: str, other: str) -> float:
         """Distance of two points."""

@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from mechdesign.errors import StudyError, cut, printable
 from mechdesign.importing.bodies import Bodies
 from mechdesign.importing.names import Names
-from mechdesign.importing.sketch import Drive, Gears, Sketch, Slide
-from mechdesign.mechanism.graph import GROUND
+from mechdesign.importing.sketch import GROUND, Drive, Gears, Sketch, Slide
 
 Span = tuple[float, float]
 """First and last value of a drive, in degrees or the unit of length."""
@@ -95,7 +94,7 @@ class Writer:
         return self._names.make("point", name)
 
     def _link(self, body: str) -> str:
-        return GROUND if body == GROUND else self._names.make("link", body)
+        return "ground" if body == GROUND else self._names.make("link", body)
 
     # Parts of the mechanism.
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import MOST, Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, MOST, Drive, Sketch, Slide, number
 from mechdesign.importing.source import Source
-from mechdesign.mechanism.graph import GROUND
 
 NAME = "DXF sketch (ASCII)"
 _TOOL = "DXF"
@@ -212,7 +211,7 @@ class _Drawing:
                 self.sketch.omitted.append(f"the guide from {ends[0]!r} to {ends[1]!r}, on which no pin lies")
 
     def _add_drive(self, name: str) -> None:
-        links = self.sketch.links_at(name)
+        links = self.sketch.moving_at(name)
         if len(links) != 1:
             raise StudyError(f"the pin {name!r} on the layer of drives belongs to {len(links)} links, not one")
         self.sketch.drives.append(Drive("angle", links[0]))

@@ -14,9 +14,8 @@ from xml.parsers import expat
 
 from mechdesign.errors import StudyError
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Gears, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, Drive, Gears, Sketch, Slide, number
 from mechdesign.importing.source import Source
-from mechdesign.mechanism.graph import GROUND
 
 NAME = "Linkage (.linkage2)"
 _TOOL = "Linkage"
@@ -151,7 +150,7 @@ class _Reader:
             self._add_actuator(name, link)
 
     def _add_actuator(self, name: str, link: _Element) -> None:
-        """An actuator grows by its throw and shrinks again so many times a minute; it pulls where these are negative."""
+        """An actuator grows by its throw and shrinks again, so many times a minute; negative ones pull."""
         length = self.sketch.distance(*self.sketch.links[name].points)
         throw = self._scale * link.number("throw")
         cycles = link.number("cpm")
@@ -183,11 +182,11 @@ class _Reader:
 
     def _turned(self, key: str) -> list[str]:
         """The links that an input turns: all at its anchor, but those that are fastened or lie between anchors."""
-        fixed = set(self.sketch.fixed)
-        held = {weld[1] for weld in self.sketch.welds if weld[0] == GROUND}
+        held = {name for weld in self.sketch.welds if weld[:1] == (GROUND,) for name in weld[1:]}
+        moving = self.sketch.moving_at(self._points[key])
         return [
             name for name in self.sketch.links_at(self._points[key])
-            if name not in held and (len(self.sketch.links[name].points) == 1 or not {*self.sketch.links[name].points} <= fixed)
+            if name not in held and (name in moving or len(self.sketch.links[name].points) == 1)
         ]  # fmt: skip
 
     def _add_slide(self, key: str, connector: _Element) -> None:

@@ -14,9 +14,8 @@ from urllib.parse import unquote
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Force, Link, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, Drive, Force, Link, Sketch, Slide, number
 from mechdesign.importing.source import Source
-from mechdesign.mechanism.graph import GROUND
 
 NAME = "PMKS+ share address or file"
 _TOOL = "PMKS+"
@@ -53,7 +52,7 @@ def read(source: Source) -> Sketch:
     query = _query(source)
     if query.startswith(_NEWER):
         raise StudyError(
-            "this is an address of the development version of PMKS+ (pmks2:...); share the drawing from app.pmksplus.com"
+            "an address of the development version of PMKS+ (pmks2:...); share the drawing from app.pmksplus.com"
         )
     sketch = source.started(_TOOL)
     if _is_encoded(query):
@@ -142,15 +141,15 @@ def _read_encoded(sketch: Sketch, query: str) -> None:
             traced=record.has(4), angle=angle, guide=guide, through=tuple(through), speed=record.decimal(),
         )  # fmt: skip
     for record in links:
-        if record.flags[0] not in _WHOLE + _PARTS:
+        if record.flags[:1] not in tuple(_WHOLE + _PARTS):
             raise StudyError(f"the address has a link of the kind {cut(record.flags[:1])!r}, which is not known")
         name, title = record.text(), record.text()
         link = Link([], mass=record.decimal(), inertia=record.decimal(), center=(record.decimal(), record.decimal()))
         record.text()
         fields = record.rest()
         link.points = fields[: fields.index("")] if "" in fields else fields
-        if record.flags[0] in _WHOLE:
-            table.link(name, title, link, block=record.flags[1] == "P")
+        if record.flags[:1] in tuple(_WHOLE):
+            table.link(name, title, link, block=record.flags[1:] == "P")
     for record in forces:
         name, of, _ = record.text(), record.text(), record.text()
         start, end = (record.decimal(), record.decimal()), (record.decimal(), record.decimal())
@@ -245,6 +244,7 @@ class _Joints:
         self._blocks: dict[str, list[str]] = {}
         self._welded: set[str] = set()
         self._driven: dict[str, float] = {}
+        self._titles = {GROUND: GROUND}
 
     def add(
         self, name: str, x: float | str, y: float | str, *, slides: bool, fixed: bool, driven: bool,
@@ -261,23 +261,22 @@ class _Joints:
             self._driven[name] = speed
 
     def link(self, name: str, title: str, link: Link, *, block: bool) -> None:
-        """Add a link, or a block."""
+        """Add a link, by its title if that is one of its own, or a block."""
         if block:
             if any(point not in self.sketch.points for point in link.points):
                 raise StudyError(f"block {name!r} has a joint that the address does not have")
             self._blocks[name] = link.points
             return
-        new = self.sketch.add_link(name, link.points)
+        self._titles[name] = title if title and title not in self.sketch.links else name
+        new = self.sketch.add_link(self._titles[name], link.points)
         new.mass, new.inertia, new.center = link.mass, link.inertia, link.center
-        if title and title != name:
-            self.sketch.choices.append(f"link {name!r} is called {title!r} in the drawing")
 
     def force(
         self, name: str, link: str, start: tuple[float, float], end: tuple[float, float], size: float, *,
         local: bool, outward: bool,
     ) -> None:  # fmt: skip
         """Add a force along its arrow, out of the link or into it."""
-        if link not in self.sketch.links:
+        if link not in self._titles:
             self.sketch.omitted.append(f"force {name!r}, which acts on {link!r}, no link")
             return
         length = math.hypot(end[0] - start[0], end[1] - start[1])
@@ -286,7 +285,7 @@ class _Joints:
             return
         factor = size / length * (1 if outward else -1)
         vector = factor * (end[0] - start[0]), factor * (end[1] - start[1])
-        self.sketch.forces.append(Force(name, link, start, vector, local))
+        self.sketch.forces.append(Force(name, self._titles[link], start, vector, local))
 
     def finish(self, turns: float, slide: float) -> None:
         """Make slides of the blocks, and drives of the inputs, at these speeds unless a joint has its own."""
@@ -296,7 +295,7 @@ class _Joints:
             if name in slides:
                 sketch.drives.append(Drive("slide", slides[name], speed=speed or slide))
                 continue
-            links = sketch.links_at(name)
+            links = sketch.moving_at(name)
             if name in sketch.fixed:
                 links.insert(0, GROUND)
             if len(links) < 2:
@@ -309,12 +308,17 @@ class _Joints:
         if not sketch.dynamic and any(link.mass not in (None, 0.0, 1.0) for link in sketch.links.values()):
             sketch.dynamic = True
         if not sketch.dynamic and sketch.links:
-            sketch.omitted.append("masses, all those that PMKS+ gives a new link; no force acts")
+            sketch.omitted.append("masses: those that PMKS+ gives every new link, and no force acts")
 
     def _add_slide(self, name: str) -> str:
         """The slide of a joint: of the pin that its block joins to it, or of itself; it fixes what is welded there."""
         sketch = self.sketch
-        angle, guide, through = self._sliding[name]
+        angle, carrier, through = self._sliding[name]
+        if carrier not in self._titles or any(point not in sketch.points for point in through):
+            raise StudyError(
+                f"joint {name!r} slides on link {cut(carrier)!r} or on joints that the address does not have"
+            )
+        guide = self._titles[carrier]
         block = next((joints for joints in self._blocks.values() if name in joints), [])
         pin = next((joint for joint in block if joint != name), name)
         if guide == GROUND and pin == name:

@@ -13,9 +13,8 @@ from typing import Any
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide, number
 from mechdesign.importing.source import Source
-from mechdesign.mechanism.graph import GROUND
 
 NAME = "pylinkage (JSON)"
 _TOOL = "pylinkage"
@@ -107,13 +106,12 @@ def _add_link(sketch: Sketch, link: Mapping[str, Any]) -> None:
     points = [_name(joint, "joint") for joint in _list(link.get("joints", []), f"the joints of {name!r}")]
     motor = link.get("motor_joint")
     if kind == "ground":
-        sketch.fixed += [point for point in points if point in sketch.points and point not in sketch.fixed]
+        sketch.fix(points)
         return
     sketch.add_link(name, points)
     if kind not in ("driver", "arc_driver"):
         return
-    if motor in sketch.points and motor not in sketch.fixed:
-        sketch.fixed.append(motor)
+    sketch.fix([str(motor)])
     speed = number(link.get("angular_velocity", math.tau / 360), f"the speed of {name!r}")
     arc = f"the arc of {name!r}"
     low, high = number(link.get("arc_start", 0), arc), number(link.get("arc_end", 0), arc)

@@ -2,7 +2,8 @@
 
 Joints have `name`, `x`, `y` and may have `ground` (yes), `drive` (yes, or a speed in turns a minute), `trace` (yes) and
 `slide` (an angle in degrees: the joint moves along a fixed line through its place). Links have `name` and `joints`,
-names with spaces, commas, semicolons or bars between. JSON: ``{"units": "mm", "joints": [...], "links": [...]}``.
+names with spaces, commas, semicolons or bars between; a link `ground` has what does not move. JSON:
+``{"units": "mm", "joints": [...], "links": [...]}``.
 """
 
 from __future__ import annotations
@@ -15,9 +16,8 @@ from typing import Any
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide, number
 from mechdesign.importing.source import JOINTS, LINKS, Source
-from mechdesign.mechanism.graph import GROUND
 
 NAME = "joints.csv and links.csv, or both as JSON"
 _TOOL = "tables of joints and links"
@@ -50,7 +50,10 @@ def read(source: Source) -> Sketch:
     for link in (_row(raw, "link") for raw in links):
         given = link.get("joints", "")
         points = given if isinstance(given, list) else [part for part in _BETWEEN.split(str(given)) if part]
-        sketch.add_link(str(link.get("name", "")), map(str, points))
+        if str(link.get("name", "")).lower() == "ground":
+            sketch.fix(map(str, points))
+        else:
+            sketch.add_link(str(link.get("name", "")), map(str, points))
         if unknown := [key for key in link if key not in ("name", "joints")]:
             sketch.omitted.append(f"{', '.join(map(repr, unknown))} of link {link['name']!r}")
     for name, speed in driven:
@@ -105,7 +108,7 @@ def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> tuple[str, float | N
 
 
 def _add_drive(sketch: Sketch, name: str, speed: float | None) -> None:
-    links = sketch.links_at(name)
+    links = sketch.moving_at(name)
     slide = clean(f"{name}_slide")
     if slide in sketch.slides:
         sketch.drives.append(Drive("slide", slide))
