@@ -32,6 +32,7 @@ from mechdesign.mechanism.model import (
     Slot,
     Spring,
     Term,
+    play,
 )
 from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
@@ -403,6 +404,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
+        builder.place(play(name), 0.0, kind)
         couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
     return couplings
 
