@@ -113,6 +113,9 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
     for drive in sketch.drives:
         kept.setdefault((drive.kind, drive.of), drive)
     sketch.drives = list(kept.values())
+    if len(kept) > 1:
+        by_hand = [repr(drive.of) for drive in sketch.drives if drive.held]
+        sketch.choices += [f"input {name} is moved by hand there, and held here" for name in by_hand]
 
 
 def _named(sketch: Sketch, name: str) -> Drive:

@@ -107,7 +107,8 @@ class _Reader:
     def __init__(self, sketch: Sketch, root: _Element, scale: float) -> None:
         self.sketch, self._root, self._scale = sketch, root, scale
         self._connectors = {c.get("id"): c for c in root.all("connector") if not _drawn(c)}
-        self._links = {link.get("id"): link for link in root.all("Link", "element") if not _drawn(link)}
+        # Files may give several links one number, which then stands for the first.
+        self._links = [link for link in root.all("Link", "element") if not _drawn(link)]
         self._points: dict[str, str] = {}
         self._names: dict[str, str] = {}
 
@@ -118,9 +119,8 @@ class _Reader:
             self.sketch.omitted.append(f"{drawn} points and lines that are drawn or measure only")
         for key, connector in self._connectors.items():
             self._add_connector(key, connector)
-        for key, link in self._links.items():
-            self._add_link(key, link)
-        self._fasten()
+        names = [self._add_link(link) for link in self._links]
+        self._fasten(names)
         for key, connector in self._connectors.items():
             if connector.is_true("slider"):
                 self._add_slide(key, connector)
@@ -140,14 +140,21 @@ class _Reader:
         traced = connector.is_true("draw")
         self.sketch.add_point(name, x, y, traced=traced, fixed=fixed)
 
-    def _add_link(self, key: str, link: _Element) -> None:
-        name = link.get("name") or f"link_{key}"
-        self._names[key] = name = name if name not in self.sketch.links else f"{name}_{key}"
-        points = [self._points[end] for end in link.ids("connector") if end in self._points]
+    def _add_link(self, link: _Element) -> str:
+        """Add a link and return its name, which is one of its own."""
+        key = link.get("id")
+        first, count = link.get("name") or f"link_{key}", 1
+        name = first
+        while name in self.sketch.links:
+            count += 1
+            name = f"{first}_{count}"
+        self._names.setdefault(key, name)
+        points = list(dict.fromkeys(self._points[end] for end in link.ids("connector") if end in self._points))
         actuator = link.is_true("actuator") and len(points) == 2
         self.sketch.add_link(name, points, telescopic=actuator)
         if actuator:
             self._add_actuator(name, link)
+        return name
 
     def _add_actuator(self, name: str, link: _Element) -> None:
         """An actuator grows by its throw and shrinks again, so many times a minute; negative ones pull."""
@@ -162,11 +169,11 @@ class _Reader:
             Drive("length", name, speed=speed, span=(low, high), held=link.is_true("alwaysmanual"))
         )
 
-    def _fasten(self) -> None:
+    def _fasten(self, names: list[str]) -> None:
         """Links that are fastened to links or anchors, and the links of an input, which turn as one."""
         sketch = self.sketch
-        for key, link in self._links.items():
-            name, anchor = self._names[key], link.get("fastenconnector")
+        for name, link in zip(names, self._links, strict=True):
+            anchor = link.get("fastenconnector")
             if link.get("fastenlink") in self._names:
                 sketch.welds.append((self._names[link.get("fastenlink")], name))
             elif anchor in self._points and self._points[anchor] in sketch.fixed:
