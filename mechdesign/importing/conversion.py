@@ -10,10 +10,11 @@ import numpy as np
 
 from mechdesign import study as studies
 from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
+from mechdesign.importing.draft import Draft, Span
 from mechdesign.importing.formats import FORMATS
 from mechdesign.importing.sketch import Drive, Sketch
 from mechdesign.importing.source import Source
-from mechdesign.importing.writer import STEPS, Span, Writer
+from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
 
 _APART = "the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits there"
@@ -79,7 +80,7 @@ def convert(
     if unit is not None:
         sketch.units["length"] = unit
     _choose(sketch, drives)
-    return _settled(Writer(sketch), cut(origin.name))
+    return _settled(Draft(sketch), cut(origin.name))
 
 
 def _scale(sketch: Sketch, factor: float) -> None:
@@ -138,12 +139,13 @@ def _named(sketch: Sketch, name: str) -> Drive:
     raise StudyError(f"--drive {cut(name)}: no pin of the ground, link or slide of the file has this name")
 
 
-def _settled(writer: Writer, source: str) -> str:
+def _settled(draft: Draft, source: str) -> str:
     """The study, whose drive goes no farther than the mechanism lets it."""
-    spans = {name: writer.span(name) for name in writer.drives}
+    writer = Writer(draft)
+    spans = {name: draft.span(name) for name in draft.drives}
     if len(spans) == 1:
         ((name, span),) = spans.items()
-        drive, start = writer.drives[name], writer.start(name)
+        drive, start = draft.drives[name], draft.start(name)
         turns = drive.kind == "angle" and drive.span is None
         wide = (start - 180, start + 180) if turns else span
         solve = _loaded(writer.text(source, {name: wide})).mechanism.solve
@@ -162,7 +164,7 @@ def _settled(writer: Writer, source: str) -> str:
             remark = [f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"]
         return writer.text(source, spans, remark)
     text = writer.text(source, spans)
-    if not _loaded(text).mechanism.solve({name: [writer.start(name)] for name in spans}).valid.all():
+    if not _loaded(text).mechanism.solve({name: [draft.start(name)] for name in spans}).valid.all():
         raise AssemblyError(_APART)
     return text
 
