@@ -75,6 +75,8 @@ def convert(
         raise StudyError(f"{cut(origin.name)} is of no format that is read: {names}")
     if not sketch.links:
         raise StudyError(f"{cut(origin.name)} has no links")
+    if not sketch.fixed:
+        raise StudyError(f"no joint of {cut(origin.name)} is on the ground: nothing holds the mechanism")
     if scale is not None:
         _scale(sketch, scale)
     if unit is not None:
@@ -106,7 +108,7 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
         return
     if not sketch.drives:
         pins = [name for name in sketch.fixed if sketch.moving_at(name)]
-        listed = ", ".join(map(repr, pins[:12])) or "none: no joint is on the ground"
+        listed = ", ".join(map(repr, pins[:12]))
         raise StudyError(
             f"the file says of no joint that it is driven: choose with --drive; pins of the ground: {listed}"
         )

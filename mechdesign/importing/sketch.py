@@ -144,7 +144,7 @@ class Sketch:
                 raise StudyError(f"link {cut(name)!r} has the joint {cut(point)!r}, which the file does not have")
         self.links[name] = Link(listed, telescopic)
         if sum(len(link.points) for link in self.links.values()) > MOST_ENDS:
-            raise StudyError(f"more than {MOST_ENDS} joints of links")
+            raise StudyError(f"the links of the file have more than {MOST_ENDS} joints together; take a part of it")
         return self.links[name]
 
     def fix(self, points: Iterable[str]) -> None:
@@ -176,7 +176,7 @@ def _check_new(noun: str, name: str, known: dict[str, Any]) -> None:
     if name in known:
         raise StudyError(f"two {noun}s have the name {cut(name)!r}")
     if len(known) >= MOST:
-        raise StudyError(f"more than {MOST} {noun}s")
+        raise StudyError(f"the file has more than {MOST} {noun}s; take a part of it")
 
 
 def number(raw: Any, meaning: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +36,7 @@ class Source:
         StudyError
             Where there is nothing to read, or too much.
         """
-        if "://" in source or "?" in source:
+        if "://" in source or ("?" in source and not os.path.exists(source)):
             return cls.of_text(source, "a share address")
         path = Path(source)
         if path.name.lower() in (JOINTS, LINKS):

@@ -361,6 +361,9 @@ def drawing(*shapes, version="AC1009", header=""):
     lines += ["0", "SECTION", "2", "ENTITIES"]
     for kind, layer, *places in shapes:
         lines += ["0", kind, "8", layer]
+        if kind == "LWPOLYLINE closed":
+            lines[-3] = "LWPOLYLINE"
+            lines += ["90", str(len(places)), "70", "1"]
         if kind == "POLYLINE":
             lines += ["66", "1", "10", "0", "20", "0"]
             for x, y in places:
@@ -386,6 +389,7 @@ TRACE = ("POINT", "trace", (40, 80))
 PLATES = {
     "R12": [("POLYLINE", "0", *PLATE)],
     "2018": [("LWPOLYLINE", "0", *PLATE)],
+    "outline": [("LWPOLYLINE closed", "0", (-9, 20), (80, 40), (90, 60), (30, 99))],
     "lines": [("LINE", "0", PLATE[1], PLATE[2]), ("LINE", "0", PLATE[2], PLATE[0])],
 }
 
@@ -497,6 +501,8 @@ HOSTILE = {
     "binary drawing": ("AutoCAD Binary DXF\r\n\x1a\0", "binary DXF"),
     "broken drawing": ("0\nSECTION\n2\nENTITIES\nx\ny\n", "not the number of a group"),
     "drawing without lines": (drawing(PINS[0]), "no line or polyline"),
+    "drawing without a fixed pin": (drawing(*BARS), "no pin of the drawing is fixed"),
+    "nothing on the ground": (TABLES.replace('"ground": true, "drive": true', '"trace": true'), "is on the ground"),
     "nothing": ("", "of no format"),
     "something else": ("hello", "of no format"),
     "an unknown unit": (TABLES.replace('"in"', '"furlong"'), "furlong"),

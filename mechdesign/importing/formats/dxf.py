@@ -1,7 +1,8 @@
 """DXF sketches in ASCII, R12 to 2018: lines and polylines are links, circles are pins.
 
 Where circles are drawn, links meet at them alone, at ends or between, and lines that touch without a circle are one
-rigid link; in a drawing without circles every common end is a pin. A polyline is one link. Layers, by a word in their
+rigid link; in a drawing without circles every common end is a pin. A polyline is one link, a closed one an outline with
+the circles inside as its pins. Layers, by a word in their
 names: GROUND has what does not move, DRIVE the pins of inputs, TRACE the points whose paths are asked for, SLIDE fixed
 lines along which the pins on them move; LINK, if there is such a layer, all that is a link.
 """
@@ -37,6 +38,7 @@ class _Shape:
     kind: str
     layer: str
     places: list[_Place] = field(default_factory=list)
+    closed: bool = False
 
     def on(self, word: str) -> bool:
         return word in self.layer
@@ -66,6 +68,8 @@ def read(source: Source) -> Sketch:
     for kind, count in others.items():
         sketch.omitted.append(f"{count} of the kind {kind}")
     _Drawing(sketch, shapes).add()
+    if not sketch.fixed:
+        raise StudyError("no pin of the drawing is fixed: put its circle on a layer with GROUND or DRIVE in its name")
     return sketch
 
 
@@ -114,15 +118,18 @@ def _add_shape(shapes: list[_Shape], kind: str, groups: list[tuple[int, str]]) -
     xs = [number(value, f"x of a {kind}") for code, value in groups if code in (10, 11)]
     ys = [number(value, f"y of a {kind}") for code, value in groups if code in (20, 21)]
     places = [_Place(x, y) for x, y in zip(xs, ys, strict=False)]
+    closed = any(code == 70 and value.isdigit() and int(value[:9]) & 1 for code, value in groups)
     if kind == "VERTEX":
         if shapes and shapes[-1].kind == "POLYLINE":
             shapes[-1].places += places
     elif kind == "POLYLINE":
-        shapes.append(_Shape(kind, layer))
+        shapes.append(_Shape(kind, layer, closed=closed))
     elif kind != "SEQEND" and places:
-        shapes.append(_Shape(kind, layer, places))
+        shapes.append(_Shape(kind, layer, places, closed and kind == "LWPOLYLINE"))
     if len(shapes) > MOST or sum(len(shape.places) for shape in shapes[-1:]) > MOST:
-        raise StudyError(f"more than {MOST} lines and circles, or corners of a polyline")
+        raise StudyError(
+            f"the drawing has more than {MOST} lines and circles, or corners of a polyline; take a part of it"
+        )
 
 
 class _Drawing:
@@ -147,7 +154,8 @@ class _Drawing:
     def add(self) -> None:
         """Add points where links meet, begin or end, then the links, what is fixed, slides and drives."""
         pins = [circle for circle in self.circles if circle.kind == "CIRCLE"]
-        places = [shape.places[0] for shape in self.circles] + [place for bar in self.bars for place in bar.places]
+        places = [shape.places[0] for shape in self.circles]
+        places += [place for bar in self.bars if not self._inside(bar) for place in bar.places]
         places += [place for guide in self.guides for place in guide.places]
         for place in places:
             if self._at(place) is None:
@@ -183,7 +191,8 @@ class _Drawing:
         for bar in self.bars:
             if bar.on("ground"):
                 continue
-            ends = {str(self._at(place)) for place in bar.places}
+            inside = self._inside(bar)
+            ends = {str(self._at(place)) for place in inside or bar.places}
             for name, point in self.sketch.points.items():
                 if (name in pinned or point.traced) and self._lies_on(bar, _Place(point.x, point.y)):
                     ends.add(name)
@@ -193,8 +202,14 @@ class _Drawing:
         order = list(self.sketch.points)
         return [sorted(group, key=order.index) for group in groups]
 
+    def _inside(self, bar: _Shape) -> list[_Place]:
+        """Circles and points in a closed outline or on it."""
+        places = [circle.places[0] for circle in self.circles] if bar.closed else []
+        return [place for place in places if self._lies_on(bar, place) or _encloses(bar.places, place)]
+
     def _lies_on(self, bar: _Shape, place: _Place) -> bool:
-        return any(_distance(a, b, place) <= self.close for a, b in zip(bar.places, bar.places[1:], strict=False))
+        ends = bar.places[1:] + (bar.places[:1] if bar.closed else [])
+        return any(_distance(a, b, place) <= self.close for a, b in zip(bar.places, ends, strict=False))
 
     def _add_slides(self, pinned: set[str | None]) -> None:
         for count, guide in enumerate(self.guides, 1):
@@ -215,6 +230,15 @@ class _Drawing:
         if len(links) != 1:
             raise StudyError(f"the pin {name!r} on the layer of drives belongs to {len(links)} links, not one")
         self.sketch.drives.append(Drive("angle", links[0]))
+
+
+def _encloses(corners: list[_Place], place: _Place) -> bool:
+    """Whether an outline goes round a place: a ray from there crosses it an odd number of times."""
+    crossed = False
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        if (a.y > place.y) != (b.y > place.y):
+            crossed ^= place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    return crossed
 
 
 def _distance(a: _Place, b: _Place, place: _Place) -> float:

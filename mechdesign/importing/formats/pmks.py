@@ -242,7 +242,7 @@ class _Joints:
         self.sketch = sketch
         self._sliding: dict[str, tuple[float, str, tuple[str, ...]]] = {}
         self._blocks: dict[str, list[str]] = {}
-        self._welded: set[str] = set()
+        self._welded: list[str] = []
         self._driven: dict[str, float] = {}
         self._titles = {GROUND: GROUND}
 
@@ -256,7 +256,7 @@ class _Joints:
         if slides:
             self._sliding[name] = (angle, guide or GROUND, through if guide else (name,))
         if welded:
-            self._welded.add(name)
+            self._welded.append(name)
         if driven:
             self._driven[name] = speed
 
@@ -290,6 +290,7 @@ class _Joints:
     def finish(self, turns: float, slide: float) -> None:
         """Make slides of the blocks, and drives of the inputs, at these speeds unless a joint has its own."""
         sketch = self.sketch
+        sketch.welds += [tuple(sketch.links_at(name)) for name in self._welded]
         slides = {name: self._add_slide(name) for name in self._sliding}
         for name, speed in self._driven.items():
             if name in slides:
@@ -327,8 +328,6 @@ class _Joints:
             sketch.add_point(through[0], sketch.points[name].x, sketch.points[name].y, fixed=True)
             sketch.fixed = [point for point in sketch.fixed if point != name]
         riders = tuple(sketch.links_at(pin)) if pin in self._welded else ()
-        if riders:
-            sketch.welds.append(riders)
         slide = clean(f"{pin}_slide")
         while slide in sketch.slides:
             slide += "_"

@@ -21,7 +21,7 @@ from mechdesign.importing.source import JOINTS, LINKS, Source
 
 NAME = "joints.csv and links.csv, or both as JSON"
 _TOOL = "tables of joints and links"
-_YES, _NO = ("yes", "y", "true", "1", "x"), ("", "no", "n", "false", "0", "none")
+_YES, _NO = ("yes", "y", "true", "x"), ("", "no", "n", "false", "none")
 _BETWEEN = re.compile(r"[\s,;|]+")
 _KEYS = ("name", "x", "y", "ground", "drive", "trace", "slide")
 
@@ -82,9 +82,9 @@ def _row(raw: Any, noun: str) -> Mapping[str, Any]:
 
 def _yes(raw: Any, meaning: str) -> bool:
     word = "" if raw is None else str(raw).strip().lower()
-    if word not in (*_YES, *_NO):
+    if word not in (*_YES, *_NO, "1", "0"):
         raise StudyError(f"{cut(meaning)} is {cut(repr(raw))}, not yes or no")
-    return word in _YES
+    return word in (*_YES, "1")
 
 
 def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> tuple[str, float | None] | None:
@@ -104,7 +104,7 @@ def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> tuple[str, float | N
     drive = "" if joint.get("drive") is None else str(joint["drive"]).strip().lower().removesuffix("rpm").strip()
     if drive in _NO:
         return None
-    return name, None if drive in _YES else number(drive, f"drive of joint {name!r}") * math.pi / 30
+    return name, None if drive in _YES else number(drive, f"drive of joint {name!r}") * math.pi / 30 or None
 
 
 def _add_drive(sketch: Sketch, name: str, speed: float | None) -> None:
@@ -116,5 +116,6 @@ def _add_drive(sketch: Sketch, name: str, speed: float | None) -> None:
     if name in sketch.fixed:
         links.insert(0, GROUND)
     if len(links) != 2:
-        raise StudyError(f"the drive at joint {name!r} stands between {len(links)} links, not two")
+        message = f"the drive at joint {name!r} turns one link against another, or against the ground"
+        raise StudyError(f"{message}; there {len(links)} are joined: choose with --drive")
     sketch.drives.append(Drive("angle", links[1], links[0], speed))
