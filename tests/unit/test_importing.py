@@ -502,7 +502,10 @@ HOSTILE = {
     "broken drawing": ("0\nSECTION\n2\nENTITIES\nx\ny\n", "not the number of a group"),
     "drawing without lines": (drawing(PINS[0]), "no line or polyline"),
     "drawing without a fixed pin": (drawing(*BARS), "no pin of the drawing is fixed"),
-    "nothing on the ground": (TABLES.replace('"ground": true, "drive": true', '"trace": true'), "is on the ground"),
+    "nothing on the ground": (
+        TABLES.replace('"ground": true, "drive": true', '"trace": true').replace(', "slide": 0', ""),
+        "is on the ground",
+    ),
     "nothing": ("", "of no format"),
     "something else": ("hello", "of no format"),
     "an unknown unit": (TABLES.replace('"in"', '"furlong"'), "furlong"),

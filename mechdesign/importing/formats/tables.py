@@ -117,5 +117,5 @@ def _add_drive(sketch: Sketch, name: str, speed: float | None) -> None:
         links.insert(0, GROUND)
     if len(links) != 2:
         message = f"the drive at joint {name!r} turns one link against another, or against the ground"
-        raise StudyError(f"{message}; there {len(links)} are joined: choose with --drive")
+        raise StudyError(f"{message}; there {len(links)} are joined")
     sketch.drives.append(Drive("angle", links[1], links[0], speed))
