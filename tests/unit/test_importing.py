@@ -160,6 +160,7 @@ def test_an_actuator_of_linkage_that_pulls_lifts_the_scissors():
     solved = study.mechanism.solve({"link_11": lengths})
     # Arms of sqrt(160^2 + 40^2) cross five times.
     arm = math.hypot(160, 40) * 24.5 / 96
+    moved(study)
     assert solved["P32.y"] + 1180 * 24.5 / 96 == pytest.approx(5 * np.sqrt(arm**2 - lengths**2), abs=DIGITS)
 
 
@@ -498,6 +499,7 @@ HOSTILE = {
     "wrong digits": ("https://pmks.example/?2P.Ay.K,0.101.6A,A,$$,0,0....N_T", "not complete|a digit"),
     "newer address": ("pmks2:00000000.abc", "development version"),
     "short rows": ("?j=O,0,0&l=a,R", "of 8 fields"),
+    "endless cell": (OLD_FILE.replace('"O,A"', '"' + "9" * 200_000 + '"'), "cannot be read as CSV"),
     "binary drawing": ("AutoCAD Binary DXF\r\n\x1a\0", "binary DXF"),
     "broken drawing": ("0\nSECTION\n2\nENTITIES\nx\ny\n", "not the number of a group"),
     "drawing without lines": (drawing(PINS[0]), "no line or polyline"),

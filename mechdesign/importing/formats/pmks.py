@@ -178,7 +178,11 @@ def _tables_of_query(query: str) -> tuple[list[list[str]], list[list[str]], list
 def _tables_of_file(text: str) -> tuple[list[list[str]], list[list[str]], list[list[str]], list[str]]:
     rows: dict[str, list[list[str]]] = {"joints": [], "links": [], "forces": []}
     key = ""
-    for row in csv.reader(text.splitlines()):
+    try:
+        read = list(csv.reader(text.splitlines()))
+    except csv.Error as error:
+        raise StudyError(f"the file cannot be read as CSV: {error}") from None
+    for row in read:
         if len(row) == 1 and row[0]:
             key = row[0].strip()
         elif row and row[0] != "id" and key in rows:
@@ -189,10 +193,12 @@ def _tables_of_file(text: str) -> tuple[list[list[str]], list[list[str]], list[l
 def _read_tables(
     sketch: Sketch, joints: list[list[str]], links: list[list[str]], forces: list[list[str]], settings: list[str]
 ) -> None:
-    unit = settings[3].strip() if len(settings) > 3 else "cm"
-    _use_units(sketch, {"in": 0, "cm": 1, "m": 2}.get(unit, 1))
-    if len(settings) < 4:
-        sketch.choices.append("the file says no unit: lengths are taken as cm, the unit that PMKS+ begins with")
+    units = {"in": 0, "cm": 1, "m": 2}
+    unit = settings[3].strip() if len(settings) > 3 else ""
+    _use_units(sketch, units.get(unit, units["cm"]))
+    if unit not in units:
+        said = f"the unit {cut(repr(unit))} is not known" if unit else "the file says no unit"
+        sketch.choices.append(f"{said}: lengths are taken as cm, the unit that PMKS+ begins with")
     table = _Joints(sketch)
     for row in joints:
         _check_length(row, 8, "joint")
