@@ -42,7 +42,8 @@ PIN = "pin:"
 class Balance:
     """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
 
-    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets.
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets. Where teeth do
+    that it is 0, and `pressed` has what they do.
     """
 
     linear: Linearization
@@ -51,6 +52,7 @@ class Balance:
     edges: list[Vector]
     couplings: list[Value]
     teeth: Mapping[str, Vector] = field(default_factory=dict)  # force on the link that follows, by coupling
+    pressed: Sequence[Value] = ()
 
 
 @quiet
@@ -74,7 +76,7 @@ def balance(
         effort = held.couplings[mesh.index]
         apart = 1.0 if pressed is None else np.sign(effort * pressed[mesh.index])
         pressing[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
-    return replace(_balance(linear, forces.plus(teeth)), teeth=pressing)
+    return replace(_balance(linear, forces.plus(teeth)), teeth=pressing, pressed=held.couplings)
 
 
 def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Value) -> Vector:
