@@ -17,6 +17,7 @@ from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction_equations import Equations
+from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Friction
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import PIN, Balance, Joints, Reaction, balance, reactions
@@ -44,6 +45,13 @@ class Rubbing(NamedTuple):
     slide: int | None
     edge: int
     friction: Friction
+
+    def rate(self, graph: Graph, rates: Rates) -> Value:
+        """How fast the members move against each other."""
+        if self.slide is not None:
+            return rates.slides[self.slide]
+        on, by = (rates.angles[graph.bodies[body][0]] for body in (self.on, self.by))
+        return on - by
 
 
 def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]:
@@ -138,16 +146,12 @@ class Rubs:
 
     def relative(self, rates: Rates) -> Floats:
         """Relative rates of the contacts, shape (contacts, poses); 0 where both members rest against each other."""
-        bodies = self.linear.graph.bodies
         speed = largest([*(np.abs(node) for node in rates.nodes), *rates.slides])
         turning = np.maximum(largest(rates.angles), speed / self.size)
         values = []
         for contact in self.contacts:
-            if contact.slide is None:
-                rate = rates.angles[bodies[contact.on][0]] - rates.angles[bodies[contact.by][0]]
-                fastest = turning
-            else:
-                rate, fastest = rates.slides[contact.slide], turning * self.size
+            rate = contact.rate(self.linear.graph, rates)
+            fastest = turning if contact.slide is None else turning * self.size
             values.append(self._flat(np.where(np.abs(rate) > AT_REST * fastest, rate, 0.0)))
         return np.stack(values)
 
@@ -177,7 +181,9 @@ class Rubs:
             friction[:, wrong] = np.nan
             jams[wrong] = np.abs(system.strength).argmax(axis=0)[wrong]
             held = self._with(friction)
-        return Rubbed(held, *map(self.shaped, (friction, relative)), jams.reshape(self.shape), apart.reshape(self.shape))
+        return Rubbed(
+            held, *map(self.shaped, (friction, relative)), jams.reshape(self.shape), apart.reshape(self.shape)
+        )
 
     def given(self, friction: Floats, rates: Rates) -> Rubbed:
         """The equilibrium with known moments and forces of friction, shape (contacts, poses)."""

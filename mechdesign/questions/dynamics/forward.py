@@ -105,7 +105,13 @@ def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) ->
     for output in outputs:
         value = np.broadcast_to(in_study_units(study, output, course.configuration.value(output)), course.times.shape)
         columns.append(FORWARD["<output>"].column(value, label(output.quantity), output=output.name))
-    energies = {"kinetic_energy": course.rates.kinetic, "potential_energy": course.rates.potential, "work": course.work}
+    energies = {
+        "kinetic_energy": course.rates.kinetic,
+        "potential_energy": course.rates.potential,
+        "work": course.work[0],
+    }
+    if len(course.work) > 1:
+        energies["friction_work"] = course.work[1]
     columns += FORWARD.columns(study.units.labels, **energies)
     return FORWARD.table([*columns, VALID.column(motion.valid)])
 
