@@ -27,6 +27,8 @@ LIMIT_ROUNDS, CONVERGED = 400, 1e-13
 # Relative accelerations below this part of what they are sums of are rounding, and so are motions of contacts at rest
 # that others prevent.
 ROUNDING = 1e-10
+# An acceleration below this part of what it is the sum of is 0: what rests stays where it is.
+NOTHING = 1e-13
 
 
 class Accelerations(NamedTuple):
@@ -93,7 +95,9 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
         else:
             limits = Equations(start, changes, rubs.coefficients, rubs.weights)
             friction, jams = _resting(limits, signs, mobility, freely)
-        values = free + np.einsum("nkp,kp->np", gains, friction)
+        parts = gains * friction
+        values = free + parts.sum(axis=1)
+        values = np.where(np.abs(values) <= NOTHING * (np.abs(free) + np.abs(parts).sum(axis=1)), 0.0, values)
         sides = [np.sign(_along(effort, values, friction, cases)) for effort in held.pressed]
         if all(np.array_equal(np.sign(side), now) for side, now in zip(pressed, sides, strict=True)):
             break

@@ -334,16 +334,13 @@ class Integration:
 
     def _sliding(self, velocity: Floats) -> Floats:
         """How fast the members of contacts move against each other, in radians or sizes of the mechanism."""
-        graph, positions, rows = self.mechanism.graph, self.positions, len(self.positions.rows)
-        speeds = np.zeros((len(self.equations.contacts), *velocity.shape[1:]))
-        for speed, contact in zip(speeds, self.equations.contacts, strict=True):
-            if contact.slide is not None:
-                speed[...] = velocity[rows + contact.slide] / self.mechanism.size
-                continue
-            for sign, body in ((1, contact.on), (-1, contact.by)):
-                frame = graph.bodies[body][0]
-                speed += sign * velocity[positions.rows[frame]] if frame else 0.0
-        return speeds
+        positions = self.positions
+        speeds = [
+            positions.between(contact.on, contact.by, velocity) if contact.slide is None
+            else velocity[len(positions.rows) + contact.slide] / positions.size
+            for contact in self.equations.contacts
+        ]  # fmt: skip
+        return np.array(speeds).reshape(len(speeds), *velocity.shape[1:])
 
     def _scales(self, x: Floats, velocity: Floats, works: int) -> Floats:
         """Sizes of positions, velocities and work, of which errors are parts."""
@@ -383,7 +380,8 @@ class Integration:
             solver = self._solver(0.0, self.begin)
             self._keep(rows[:1], self.begin[:, None])
             rows = rows[1:]
-            failed, steps, bounces, watches = False, 0, 0, bool(list(self._watched()))
+            failed, steps, bounces = False, 0, 0
+            watches = bool(self.equations.contacts or list(self._watched()))
             while solver.status == "running":
                 begin, steps = solver.t, steps + 1
                 if not np.isfinite(solver.f).all() or solver.step() is not None or steps > MAX_STEPS:
@@ -555,7 +553,7 @@ class Integration:
         along = np.array([np.ravel(first(linear.configuration, coordinate, part))[0] for part in linear.by_drives])
         velocity = velocity[rows]
         speed = float(along @ velocity)
-        scale = self.mechanism.size if coordinate.quantity == "length" else 1.0
+        scale = self.positions.size if coordinate.quantity == "length" else 1.0
         if not self.section.restitution * abs(speed) > REST * self.pace * scale:
             self._ended = f"the mechanism rests at limit {name} from {time:.6g} on"
             return None
