@@ -24,8 +24,9 @@ from mechdesign.numerics.arrays import Floats, Ints
 
 # Most rounds in which limits are found, and the change of friction, as a part of the largest, that ends them.
 LIMIT_ROUNDS, CONVERGED = 400, 1e-13
-# Relative accelerations below this part of what they are sums of are rounding, and so are motions of contacts at rest
-# that others prevent.
+# Most changes of contacts between rest and limit.
+SHARING_ROUNDS = 1000
+# Motions of contacts at rest that others prevent are rounding, below this part of the others.
 ROUNDING = 1e-10
 # An acceleration below this part of what it is the sum of is 0: what rests stays where it is.
 NOTHING = 1e-13
@@ -147,32 +148,28 @@ def _resting(limits: Equations, signs: Floats, mobility: Floats, freely: Floats)
 def _shared(limits: Floats, signs: Floats, mobility: Floats, freely: Floats) -> Floats:
     """Friction within limits: the least as parts of them, u, that keeps contacts at rest, or -s where they slide.
 
-    Changes one contact a time, the first that is on the wrong side [Murty].
+    A little friction in proportion to u makes the function strictly convex. Then changing one contact a time, the first
+    on the wrong side, ends [Murty].
     """
     matrix, right = limits[:, None] * mobility * limits, limits * freely
-    rounding = ROUNDING * (np.abs(right).max() + np.abs(matrix).max())
-    parts, inside = -signs, np.logical_and(signs == 0, limits > 0)
-    free = np.flatnonzero(inside)
-    resting = free
-    for _ in range(4 ** len(resting)):
-        fixed = np.where(np.isin(np.arange(len(limits)), free), 0.0, parts)
-        parts = fixed
-        if len(free):
-            inverse = np.linalg.pinv(matrix[np.ix_(free, free)], rcond=ROUNDING, hermitian=True)
-            parts[free] = -inverse @ (right + matrix @ fixed)[free]
-        speeds = right + matrix @ parts
-        for k in resting:
-            if k in free:
-                outside = abs(parts[k]) > 1.0
-                if outside or abs(speeds[k]) > rounding:
-                    # Without this friction the contact would slide this way.
-                    parts[k] = np.sign(parts[k]) if outside else -np.sign(speeds[k])
-                    free = free[free != k]
-                    break
-            elif parts[k] * speeds[k] > rounding:
-                free = np.sort(np.append(free, k))
-                break
-        else:
+    convex = matrix + ROUNDING * np.trace(matrix) * np.eye(len(limits))
+    parts, resting = -signs, np.flatnonzero((signs == 0) & (limits > 0))
+    free = np.isin(np.arange(len(limits)), resting)
+    for _ in range(SHARING_ROUNDS):
+        parts[free] = 0.0
+        parts[free] = np.linalg.solve(convex[np.ix_(free, free)], -(right + matrix @ parts)[free])
+        speeds = right + convex @ parts
+        outside = free & (np.abs(parts) > 1.0)
+        held = np.zeros_like(free)
+        held[resting] = parts[resting] * speeds[resting] > 0
+        wrong = np.flatnonzero(outside | (held & ~free))
+        if not len(wrong):
             break
+        first = wrong[0]
+        free[first] = not free[first]
+        parts[first] = np.sign(parts[first])
+    parts[free] = 0.0
+    inverse = np.linalg.pinv(matrix[np.ix_(free, free)], rcond=ROUNDING, hermitian=True)
+    parts[free] = -inverse @ (right + matrix @ parts)[free]
     share: Floats = parts * limits
     return share

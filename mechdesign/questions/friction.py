@@ -58,10 +58,14 @@ class Friction:
         self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])
 
     @quiet
-    def solve(self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True) -> Slipping:
+    def solve(
+        self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True,
+        given: Floats | None = None,
+    ) -> Slipping:  # fmt: skip
         """Equilibrium under forces while the mechanism moves; where it stands still, as if all drives moved up.
 
-        With `back` also what it does on its way back.
+        With `back` also what it does on its way back. Friction that is `given`, shape (contacts, poses), is that of a
+        motion in time, and no way back is asked.
         """
         mechanism, moves = self.mechanism, velocity is not None
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
@@ -69,9 +73,9 @@ class Friction:
             velocity = linear.velocity([1.0 if c.quantity == "angle" else mechanism.size for c in drives])
         rates = [first(linear.configuration, drive, velocity) for drive in drives]
         rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.pressing, mechanism.size)
-        ahead = rubs.solve(velocity)
-        ways = [ahead, rubs.solve(velocity, back=True)] if back else [ahead]
-        columns: dict[str, Value] = {}
+        ahead = rubs.solve(velocity) if given is None else rubs.given(given, velocity)
+        ways = [ahead, rubs.solve(velocity, back=True)] if back and given is None else [ahead]
+        columns: dict[str, Value] = dict.fromkeys(EFFICIENCIES, np.nan)
         holds: Value = 0.0
         for name, rubbed, sign in zip(EFFICIENCIES, ways, (1.0, -1.0), strict=False):
             lost = np.sum(rubbed.power, axis=0)

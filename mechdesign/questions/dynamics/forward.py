@@ -78,7 +78,10 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
         (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
         slopes=slopes, bends=bends,
     )  # fmt: skip
-    motion = Motion(force_question(study, poses), reason=np.zeros(count, dtype=np.int8))
+    question = force_question(study, poses)
+    if len(course.rates.friction):
+        question = replace(question, borne=replace(question.borne, rubbing=course.rates.friction))
+    motion = Motion(question, reason=np.zeros(count, dtype=np.int8))
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
     # Efforts are known, also where the drives are singular.
