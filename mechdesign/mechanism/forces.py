@@ -88,8 +88,8 @@ class Forces:
             self.on_body(body, 0.0, moment)
         for slide, force in pulls.slides.items():
             self.on_slide(slide, force)
-        for node, force in pulls.nodes.items():
-            self.on_pin(node, force)
+        for node, pull in pulls.nodes.items():
+            self.on_pin(node, pull)
 
     def pull(self, ends: tuple[str, str], force: Vector) -> None:
         """Add forces that pull two points together: this one at the first, the opposite at the second."""

@@ -42,8 +42,8 @@ PIN = "pin:"
 class Balance:
     """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
 
-    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets. Where teeth do
-    that it is 0, and `pressed` has what they do.
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets. It is 0 where
+    teeth do that, and `pressed` has what it would be.
     """
 
     linear: Linearization

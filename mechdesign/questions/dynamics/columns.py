@@ -42,7 +42,8 @@ FORWARD = TableKind.of("forward", "the motion that given efforts bring about, a 
     ("<output>", "output", "as the output"), ("kinetic_energy", "energy of the motion", "moment"),
     ("potential_energy", "energy of weights and springs", "moment"),
     ("work", "work of efforts and loads since the start, less what dampers, stops and friction took: the gain of both "
-     "energies", "moment"), ("friction_work", "work of friction since the start, never positive", "moment"), VALID)  # fmt: skip
+     "energies", "moment"),
+    ("friction_work", "work of friction since the start, never positive", "moment"), VALID)  # fmt: skip
 EVENTS = TableKind.of("events", "limits reached and values passed in time, a row each",
     ("event", "name of the crossing or limit"), ("time", "when", "time"),
     ("direction", "up where the value rises through it, else down; at a limit down"))  # fmt: skip

@@ -117,7 +117,7 @@ class Course:
     x, velocity, acceleration : Floats
         All positions, as `positions` has them.
     work : Floats, shape (1 or 2, instants)
-        Work of efforts and loads since the start, less what dampers, stops and friction have taken; and that of friction.
+        Work of efforts and loads since the start, less what dampers, stops and friction have taken; that of friction.
     ended : str
         Why the motion ended before its time; empty if it did not.
     failed : bool
@@ -264,7 +264,8 @@ class EquationsOfMotion:
             matrix = np.moveaxis(table[:, 1:] - table[:, :1], -1, 0)
             return solved_each(matrix, -table[:, 0].T[..., None])[..., 0].T, np.empty((0, *shape))
         mechanism, question = self.study.mechanism, self.question
-        assert moving.velocity is not None and moving.acceleration is not None
+        assert moving.velocity is not None
+        assert moving.acceleration is not None
         rubs = Rubs(question.joints, self.contacts, linear, forces, mechanism.pressing, mechanism.size)
         offsets = self._sliding(linear, moving.acceleration, (1 + count + len(self.contacts), *shape))[:, 0]
         answer = accelerate(rubs, self.signs, self._sliding(linear, moving.velocity, shape), offsets)
