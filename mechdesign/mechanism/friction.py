@@ -181,9 +181,8 @@ class Rubs:
             friction[:, wrong] = np.nan
             jams[wrong] = np.abs(system.strength).argmax(axis=0)[wrong]
             held = self._with(friction)
-        return Rubbed(
-            held, *map(self.shaped, (friction, relative)), jams.reshape(self.shape), apart.reshape(self.shape)
-        )
+        friction, relative = self.shaped(friction), self.shaped(relative)
+        return Rubbed(held, friction, relative, jams.reshape(self.shape), apart.reshape(self.shape))
 
     def given(self, friction: Floats, rates: Rates) -> Rubbed:
         """The equilibrium with known moments and forces of friction, shape (contacts, poses)."""

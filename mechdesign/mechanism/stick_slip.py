@@ -109,7 +109,7 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
 
 def solved_each(matrix: Floats, right: Floats) -> Floats:
     """Solutions of linear systems, shape (poses, n, r), of matrices of shape (poses, n, n); nan where there is none."""
-    good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
+    good = np.array(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
     good[good] = np.linalg.det(matrix[good]) != 0
     solution = np.full(right.shape, np.nan)
     solution[good] = np.linalg.solve(matrix[good], right[good])

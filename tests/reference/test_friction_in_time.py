@@ -88,13 +88,14 @@ dynamics: {{gravity: [0, -{G}], forward: {{duration: 2, start: {{s: 0, s_velocit
     assert "ended early: friction in way jams the mechanism, no acceleration agrees with it, at 0 s" in str(warning)
 
 
+@pytest.mark.nightly
 def test_friction_of_its_pin_brings_a_pendulum_to_rest() -> None:
-    # With mu R small beside the length the pin bears F = m g cos(th) + m r w^2 along the arm, and m g sin(th) J_c/J
-    # across it; the energy lost between turning points is the integral of mu R F over the angle.
     mass, reach, inertia, arm = 1.5, 0.5, 0.1, 0.3 * 0.1
     result = run(f"""
 mechanism:
-  links: {{ground: {{O: [0, 0]}}, arm: {{from: O, to: P, length: 1, mass: {mass}, center: [{reach}, 0], inertia: {inertia}}}}}
+  links:
+    ground: {{O: [0, 0]}}
+    arm: {{from: O, to: P, length: 1, mass: {mass}, center: [{reach}, 0], inertia: {inertia}}}
   drives: {{theta: {{angle: arm}}}}
   friction: {{O: {{coefficient: 0.3, radius: 0.1}}}}
 dynamics: {{gravity: [0, -{G}], forward: {{duration: 9.5, start: {{theta: 0.5}}, rows: 96}}}}

@@ -79,8 +79,10 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
         slopes=slopes, bends=bends,
     )  # fmt: skip
     question = force_question(study, poses)
+    borne = question.borne
+    assert isinstance(borne, ForceQuestion)
     if len(course.rates.friction):
-        question = replace(question, borne=replace(question.borne, rubbing=course.rates.friction))
+        question = replace(question, borne=replace(borne, rubbing=course.rates.friction))
     motion = Motion(question, reason=np.zeros(count, dtype=np.int8))
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
