@@ -119,7 +119,7 @@ class Friction:
         """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
         warnings, count = [], poses.count // poses.designs
 
-        def told(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
+        def caution(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
             number, row = marks[f"{what} {name}"]
             where = pose_in_words(study, poses, row) if number >= least else ""
             words = f"in {number} of {count} poses {text}; the first: {where}"
@@ -130,18 +130,18 @@ class Friction:
                 f"friction in {name} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
                 "forces are nan; a longer guide, a smaller offset or coefficient frees it"
             )
-            if jams := told(_JAMS, name, 1, text):
+            if jams := caution(_JAMS, name, 1, text):
                 warnings.append(Caution("jammed", *jams))
             text = (
                 f"friction holds what the loads would move, most of it in {name}: the mechanism is self-locking there, "
                 "and the drives must push in either direction"
             )
-            if holds := told(_HOLDS, name, max(OFTEN * count, 1), text):
+            if holds := caution(_HOLDS, name, max(OFTEN * count, 1), text):
                 warnings.append(Caution("self_locking", *holds))
             text = (
                 f"{name} bears a moment, which presses on both ends of its guide, and its friction counts the force "
                 "across alone; give its 'length'"
             )
-            if turns := told(_MOMENT, name, 1, text):
+            if turns := caution(_MOMENT, name, 1, text):
                 warnings.append(Caution("incomplete", *turns))
         return warnings

@@ -103,6 +103,33 @@ dynamics:
     assert table["theta"] == pytest.approx(alone["theta"], abs=1e-7)
 
 
+def test_a_planetary_train_moves_with_its_reduced_inertia() -> None:
+    # Ring held: the arm turns with 1/5 of the sun, the planet with -7/5. Weights turn back with m r g cos(th/5)/5.
+    arm, planet = 0.2, -1.4
+    inertia = 0.001 + arm**2 * (0.002 + 0.4 * 0.02**2 + 0.3 * 0.06**2) + planet**2 * 0.0005
+    table = run(f"""{UNITS}
+mechanism:
+  links:
+    ground: {{O: [0, 0]}}
+    sun: {{from: O, to: S, length: 0.02, mass: 0.5, center: [0, 0], inertia: 0.001}}
+    arm: {{from: O, to: P, length: 0.06, mass: 0.4, center: [0.02, 0], inertia: 0.002}}
+    planet: {{from: P, to: Q, length: 0.02, mass: 0.3, center: [0, 0], inertia: 0.0005}}
+  couplings:
+    inner: {{set: planet.angle, to: "-2*sun.angle + 3*arm.angle"}}
+    ring: {{set: arm.angle, to: "sun.angle/5"}}
+  drives: {{theta: {{angle: sun}}}}
+  sketch: {{S: [0.02, 0], P: [0.06, 0], Q: [0.08, 0]}}
+dynamics:
+  gravity: [0, -9.81]
+  forward: {{duration: 1, start: {{theta: 0, theta_velocity: 3}}, efforts: {{theta: 0.02}}, rows: 11}}
+""").main
+    back = 9.81 * (0.4 * 0.02 + 0.3 * 0.06) * arm * np.cos(arm * table["theta"])
+    assert table["theta_acceleration"] == pytest.approx((0.02 - back) / inertia, rel=1e-12)
+    energy = 0.5 * inertia * table["theta_velocity"] ** 2
+    assert table["kinetic_energy"] == pytest.approx(energy, rel=1e-12)
+    assert np.abs(balance(table)).max() < 1e-9 * table["kinetic_energy"].max()
+
+
 @pytest.mark.nightly
 def test_a_slider_crank_is_driven_through_its_dead_centres_by_its_slider() -> None:
     # The crank turns through the dead centres of the slider, which is the drive; without friction it turns on for ever.

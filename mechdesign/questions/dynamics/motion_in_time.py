@@ -247,7 +247,7 @@ class EquationsOfMotion:
             loading.add(loads, moving)
             power = power + loads.power(moves)
         kinetic, potential = (np.array(np.broadcast_to(value, shape)) for value in (energy.kinetic, energy.potential))
-        powers = np.broadcast_to(power, shape)[None]
+        powers = np.array(np.broadcast_to(power, (1, *shape)))
         if self.contacts:
             lost = np.sum(friction * self._sliding(linear, moves, shape), axis=0)
             powers = np.array([powers[0] + lost, lost])
