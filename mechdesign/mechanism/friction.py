@@ -156,10 +156,14 @@ class Rubs:
         return np.stack(values)
 
     @cached_property
+    def smooth(self) -> Balance:
+        """The equilibrium without friction."""
+        return balance(self.linear, self.forces, self.meshes)
+
+    @cached_property
     def _free(self) -> tuple[Complexes, Complexes]:
         """What the contacts bear without friction, and its slopes."""
-        held = balance(self.linear, self.forces, self.meshes)
-        return self.borne(held), self._slopes(held)
+        return self.borne(self.smooth), self._slopes(self.smooth)
 
     @quiet
     def solve(self, rates: Rates, *, back: bool = False) -> Rubbed:

@@ -42,8 +42,8 @@ PIN = "pin:"
 class Balance:
     """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
 
-    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets; 0 where teeth
-    do that. `pressed` are the same without teeth.
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets; 0
+    where teeth do that. `pressed` are the same without teeth.
     """
 
     linear: Linearization

@@ -25,6 +25,8 @@ from mechdesign.study.poses import Poses
 _JAMS, _HOLDS = "jams in", "is held by"
 # Another: how far a pose is from jamming, from 0 to 1; forces lose so many digits.
 APART = "apart from jamming"
+# Efforts without friction, with the drive's name behind it.
+SMOOTH = "effort without friction of"
 # A slide bears a moment of note from this part of the largest joint force times the size of the mechanism.
 NOTABLE_MOMENT = 0.01
 # The mechanism is called self-locking where friction holds it in at least this part of the poses: at a dead centre, and
@@ -76,6 +78,9 @@ class Friction:
         ahead = rubs.solve(velocity) if given is None else rubs.given(given, velocity)
         ways = [ahead, rubs.solve(velocity, back=True)] if back and given is None else [ahead]
         columns: dict[str, Value] = dict.fromkeys(EFFICIENCIES, np.nan)
+        if given is None:
+            smooth = zip(mechanism.drives, rubs.smooth.efforts, strict=True)
+            columns |= {f"{SMOOTH} {name}": effort for name, effort in smooth}
         holds: Value = 0.0
         for name, rubbed, sign in zip(EFFICIENCIES, ways, (1.0, -1.0), strict=False):
             lost = np.sum(rubbed.power, axis=0)

@@ -55,7 +55,7 @@ def test_a_block_slides_up_an_incline_and_sticks_or_comes_back(slope: float) -> 
     lost = -0.2 * 2 * G * math.cos(slope) * (way + (way - table["s"][-1] if driven > 0 else 0))
     assert table["friction_work"][-1] == pytest.approx(lost, rel=1e-11)
     if driven > 0:
-        assert len(events) == 0
+        assert not np.isfinite(events["time"]).any()
         return
     assert events["event"].tolist() == ["standstill"]
     assert events["time"][0] == pytest.approx(stop, rel=1e-12)
