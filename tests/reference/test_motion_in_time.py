@@ -68,11 +68,15 @@ dynamics: {{gravity: [0, -9.81], forward: {{duration: 5, start: {{t1: 1, t2: 1}}
     assert np.abs(balance(table)).max() < 1e-9 * table["kinetic_energy"].max()
 
 
-def test_four_bars_go_through_the_pose_in_which_all_links_lie_on_a_line() -> None:
+@pytest.mark.parametrize(
+    ("count", "energy", "angle"), [(2, 1e-9, 1e-7), pytest.param(40, 5e-9, 1e-6, marks=pytest.mark.nightly)]
+)
+def test_four_bars_go_through_the_pose_in_which_all_links_lie_on_a_line(
+    count: int, energy: float, angle: float
+) -> None:
     # IFToMM library of computational benchmark problems, N four-bars: links of 1 m and 1 kg, from the upright position
     # with 1 m/s, 10 s. All links are on a line twice a turn, where the loops lose rank; the mechanism is a pendulum of
     # N + 1 bars that turn with the crank and N that do not, of J = (N + 1)/3 + N and m r = (N + 1)/2 + N.
-    count = 2
     points = ", ".join(f"A{k}: [{k}, 0]" for k in range(count + 1))
     cranks = "\n".join(f"    r{k}: {{from: A{k}, to: B{k}, length: 1, {BAR}}}" for k in range(count + 1))
     rods = "\n".join(f"    c{k}: {{from: B{k}, to: B{k + 1}, length: 1, {BAR}}}" for k in range(count))
@@ -88,7 +92,7 @@ mechanism:
 dynamics: {{gravity: [0, -9.81], forward: {{duration: 10, start: {{theta: pi/2, theta_velocity: -1}}, rows: 101}}}}
 """
     table = run(text).main
-    assert np.abs(balance(table)).max() < 1e-9 * table["kinetic_energy"].max()
+    assert np.abs(balance(table)).max() < energy * table["kinetic_energy"].max()
     inertia, moment = (count + 1) / 3 + count, (count + 1) / 2 + count
     alone = run(f"""{UNITS}
 mechanism:
@@ -100,7 +104,7 @@ dynamics:
   gravity: [0, {-9.81 * (inertia + 10) / inertia!r}]
   forward: {{duration: 10, start: {{theta: pi/2, theta_velocity: -1}}, rows: 101}}
 """).main
-    assert table["theta"] == pytest.approx(alone["theta"], abs=1e-7)
+    assert table["theta"] == pytest.approx(alone["theta"], abs=angle)
 
 
 def test_a_planetary_train_moves_with_its_reduced_inertia() -> None:
