@@ -164,6 +164,12 @@ def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
     return watch(file, commands or (), Options(command="watch", **said))
 
 
+def _export(study: Path | None, to: str, at: str | None, **said: Any) -> int:
+    from mechdesign.cli.export import export
+
+    return export(study, to, at, Options(command="export", **said))
+
+
 def _compare(**said: Any) -> int:
     from mechdesign.cli.compare import compare
 
@@ -230,6 +236,14 @@ _add(
     ),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
+)
+_add(
+    _export,
+    "export",
+    (given.STUDY, given.TO, given.AT, given.OUT_EXPORT, given.OVERRIDES, given.QUIET, given.STRICT, given.ALLOW_FILES),
+    "Write a file for other tools: parts to cut, a drawing, layers.",
+    "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "
+    "nothing meets.",
 )
 _add(
     _watch,

@@ -102,6 +102,19 @@ OUT_ALL = _out(
     "Folder that gets one folder a command (several studies: <study>/<command>, summary.csv). Default: results/<study>."
 )
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
+OUT_EXPORT = _text(Path, "--out", "PATH", "The file, or a folder for it. Default: results/<study>/export.")
+TO = _parameter(
+    "to",
+    str,
+    Parameter.empty,
+    typer.Option("--to", metavar="NAME", help="Name of the file, e.g. parts.dxf; a wrong name lists them."),
+)
+AT = _text(
+    str,
+    "--at",
+    "POSE",
+    "Pose in which the mechanism is shown, e.g. theta=60 or 'theta1=30, theta2=1 rad'. Default: that of the sketch.",
+)
 OVERRIDES = _text(
     list[str],
     "--set",

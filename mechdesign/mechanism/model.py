@@ -21,8 +21,14 @@ Physical = Literal[
     "mass", "moment_of_inertia", "force", "moment", "stiffness", "rotational_stiffness", "damping", "rotational_damping"
 ]  # fmt: skip
 
-# Prefix of the places of parameters that measures use; no name in a study has a colon.
+# Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
+# in a study has a colon.
 MEASURED = "measures:"
+
+
+def play(coupling: str) -> str:
+    """Name of the place by which the coordinate that follows deviates from a coupling's function; nominally 0."""
+    return f"{MEASURED}{coupling}.play"
 
 
 @dataclass(frozen=True)
@@ -189,6 +195,24 @@ class Coupling:
 
 
 @dataclass(frozen=True)
+class Plates:
+    """Links as flat plates with round ends, and the pins of their joints; lengths are places or numbers.
+
+    `width` and `pin` (the diameter of a pin; None: a part of the width) are those of links and points that `widths` and
+    `pins` do not name. `layers` are the layers of links that have one, from 1 on. A cut takes `kerf`.
+    """
+
+    width: Term
+    pin: Term | None = None
+    thickness: Term | None = None
+    kerf: Term = 0.0
+    sheet: Term | None = None
+    widths: Mapping[str, Term] = field(default_factory=dict)
+    pins: Mapping[str, Term] = field(default_factory=dict)
+    layers: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Limit:
     """Bounds of a distance of two points, a drive, the angle between two links, or a measure."""
 
@@ -221,3 +245,4 @@ class Description:
     springs: Mapping[str, Spring] = field(default_factory=dict)
     couplings: Mapping[str, Coupling] = field(default_factory=dict)
     friction: Mapping[str, Friction] = field(default_factory=dict)
+    plates: Plates | None = None

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from helpers.gallery import meet, point, result_of, study_named, unit
 
+import mechdesign
 from mechdesign.mechanism.wheels import meshes
 from mechdesign.questions.dynamics.analysis import dynamics
+from mechdesign.questions.stiffness.analysis import stiffness
 from mechdesign.questions.workspace.analysis import workspace
 
 
@@ -134,6 +136,22 @@ def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
     assert point(motion, "T") == pytest.approx(point(motion, "P") + 30j, abs=1e-10)
     elbow = 200 * unit(motion["arm"])
     assert elbow + 150 * unit(motion["motor"]) == pytest.approx(point(motion, "P"), abs=1e-10)
+    spans = np.stack([elbow, 150 * unit(motion["motor"])]) * 1j
+    jacobians = np.stack([spans.real, spans.imag])
+    soft = np.array([1 / 2e6, 1 / 2e6 + 1 / (1000 * 20**2)])
+    compliance = stiffness(study_named("belt_scara")).tables["compliance"]
+    for (i, j), name in {(0, 0): "C11", (0, 1): "C12", (1, 1): "C22"}.items():
+        expected = np.einsum("kn,k,kn->n", jacobians[i], soft, jacobians[j])
+        assert compliance[name] == pytest.approx(expected, rel=1e-9)
     region = workspace(study_named("belt_scara"))
     area = float(region.main["area"][0])
     assert area == pytest.approx(4 * np.pi * 200 * 150, rel=1e-9)
+
+
+def test_backlash_of_a_belt_moves_the_scara_across_its_forearm() -> None:
+    """The variances of x and y by it add up to (l2 b)^2/12 at every pose."""
+    study = study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
+    linear = mechdesign.reliability(study).tables["contributions"]
+    own = linear["source"] == "elbow"
+    sigma = linear["derivative"][own] * 0.06 / np.sqrt(12)
+    assert np.hypot(sigma[::2], sigma[1::2]) == pytest.approx(np.full(3, 150 * np.radians(0.06) / np.sqrt(12)))

@@ -71,6 +71,7 @@ class Along:
         columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
         # Efficiencies lose all digits where no power flows: they are those of the poses.
         columns |= {s.name: s.size for s in question.statics if s.name not in EFFICIENCIES}
+        columns |= dict.fromkeys(question.clearances, sizes["length"])
         self._requests, self._within = requests, dict[Part, Along]()
         whole = [request for request in requests if not request.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}

@@ -22,13 +22,16 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
     ("<drive>_effort", "drive effort that balances the loads", "force or moment",
      "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
-     "as the input's length over the output's", "rate of the input/rate of the output"), VALID)  # fmt: skip
+     "as the input's length over the output's", "rate of the input/rate of the output"),
+    ("<a>.<b>.clearance", "distance of the outlines of <a> and <b>, links or pins; where they overlap minus the depth",
+     "length"),
+    ("clearance", "smallest of all clearances between links, and between pins and links", "length"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",
     TIMED, DRIVE, GIVEN,
     ("<a>.<b>.x, <a>.<b>.y", "place of the instant centre of <a> and <b>; inf where one translates against the other",
      "length"), ("<a>.<b>.motion", "how <a> moves against <b>: rotation, translation or rest"), VALID)  # fmt: skip
 EXTREMES = TableKind.of("extremes", f"extremes of the outputs <{OVER}>",
-    ("output", "output, error, effort, mechanical advantage, velocity or acceleration, in its own unit"),
+    ("output", "output, error, effort, mechanical advantage, clearance, velocity or acceleration, in its own unit"),
     ("min", "smallest value over the motion, in `unit`"),
     ("min_at", "<swept> at the smallest value", "as what is swept"),
     ("max", "largest value over the motion, in `unit`"), ("max_at", "<swept> at the largest value", "as what is swept"),

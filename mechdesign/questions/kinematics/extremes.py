@@ -17,7 +17,7 @@ STILL = 1e-12
 
 
 def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
-    """Smallest and largest value of outputs, errors, efforts and rates over the motion, and the ratio of times between.
+    """Smallest and largest value of outputs and other columns over the motion, and the ratio of times between.
 
     Along a motion they are those of all of it, from limit to limit, between its poses too; elsewhere those of the valid
     poses. Efforts and mechanical advantages are infinite at their poles. `time_ratio` is the longer over the shorter
@@ -34,6 +34,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
     curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
     curves |= {static.name: (0.0, static.unit) for static in question.statics}
+    curves |= {name: (sizes["length"], label("length")) for name in question.clearances}
     for name, (quantity, order) in question.orders.items():
         curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]
     if names is not None:

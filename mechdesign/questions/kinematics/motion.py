@@ -11,12 +11,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism import Reason
+from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates, first, second
+from mechdesign.mechanism.plates import CLEARANCE, Clearances
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
@@ -77,6 +78,8 @@ class Motion:
                 self.put(coordinate.name, rows, self.question.poses.values[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
+        if self.question.pairs:
+            self._clearances(configuration, rows)
         linear = study.mechanism.linearize(configuration)
         assembled = configuration.valid | np.equal(configuration.reason, int(Reason.LIMIT))
         conditioning = np.where(assembled, regularity(linear), np.nan)
@@ -97,6 +100,15 @@ class Motion:
             for name, values in borne.items():
                 self.put(name, rows, np.where(regular, values, np.nan))
         return linear
+
+    def _clearances(self, configuration: Configuration, rows: Ints) -> None:
+        mechanism = self.question.study.mechanism
+        assert mechanism.description.plates is not None
+        clearances = Clearances(mechanism, mechanism.description.plates, configuration)
+        gaps = {name: clearances.of(pair.one, pair.other) for name, pair in self.question.pairs.items()}
+        gaps[CLEARANCE] = np.minimum.reduce(np.broadcast_arrays(*gaps.values()))
+        for name, gap in gaps.items():
+            self.put(name, rows, gap)
 
     def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
         assert velocity is not None
@@ -166,6 +178,12 @@ class Motion:
         names = ("det_J", "inverse_condition", "conditioning")
         columns += MOTION.columns(words, **{name: arrays[name] for name in names if name in arrays})
         columns += [MOTION[s.kind].column(arrays[s.name], s.unit, **s.words) for s in question.statics]
+        gap = MOTION["<a>.<b>.clearance"]
+        columns += [gap.column(arrays[name], label("length"), a=pair.one.name, b=pair.other.name)
+                    for name, pair in question.pairs.items()]  # fmt: skip
+        columns += (
+            MOTION.columns(question.study.units.labels, **{CLEARANCE: arrays[CLEARANCE]}) if question.pairs else []
+        )
         return [*columns, VALID.column(self.valid)]
 
     def pose_columns(self) -> list[Column]:

@@ -16,6 +16,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import Linearization, mixes
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
+from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import Friction
@@ -118,6 +119,20 @@ class MotionQuestion:
         """Pairs of links whose instant centres are asked."""
         return [Centre(*pair) for pair in self.section.instant_centres]
 
+    @cached_property
+    def pairs(self) -> dict[str, Pair]:
+        """Plates and pins whose clearances are asked, by the column of each."""
+        asked, every = self.section.collisions, pairs_of(self.study.mechanism.description)
+        if asked is None:
+            return {}
+        pairs = [Pair(plate_of(one), plate_of(other)) for one, other in asked] or every
+        return {pair.name: pair for pair in pairs}
+
+    @property
+    def clearances(self) -> list[str]:
+        """Columns of clearances: of every pair, and the smallest."""
+        return [*self.pairs, CLEARANCE] if self.pairs else []
+
     @property
     def statics(self) -> list[Static]:
         """Efforts of the drives, where there are loads, and mechanical advantages."""
@@ -205,6 +220,8 @@ class MotionQuestion:
         directed = self.friction is not None and any(static.name in names for static in self.statics)
         if not (rates or directed) and borne is None and not coordinates_in(self.study, section.loads):
             unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}
+        if not any(name in names for name in self.clearances):
+            unasked |= {"collisions": None}
         if not any(static.name in names for static in self.statics):
             unasked |= {"loads": (), "mechanical_advantage": {}}
         square = self.square and any(name in ("det_J", "inverse_condition") or "_by_" in name for name in names)

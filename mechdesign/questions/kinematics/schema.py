@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from mechdesign.errors import counted
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.plates import CLEARANCE, pins_of
 from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.loads import Load, check_friction, check_loads
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import failure
 
 HELP_PAGE = "reference/study/kinematics"
 
@@ -22,6 +24,13 @@ PICTURES = {
     "hodographs": "velocities and accelerations of points over the motion, as the ways of their vectors' tips",
     "polygons": "velocity and acceleration polygons of a few poses, or of the listed ones",
 }
+
+
+def _every_pair(raw: Any) -> Any:
+    """Bring ``true`` to an empty list of pairs, which stands for all, and ``false`` to none."""
+    if raw == []:
+        raise failure("name pairs of links, [[crank, ground]], or write true for all that may meet")
+    return ([] if raw else None) if isinstance(raw, bool) else raw
 
 
 class KinematicsSection(MotionSection):
@@ -52,10 +61,19 @@ class KinematicsSection(MotionSection):
     friction; other drives are held. Example: {T.y: grip}
     """
 
+    collisions: Annotated[
+        tuple[TwoLinks, ...] | None, BeforeValidator(_every_pair), fields.OrShort({"type": "boolean"})
+    ] = None
+    """Pairs of links whose clearance is reported: the distance of their outlines by mechanism.plates, negative where
+    they overlap. ``true`` takes all links that no joint joins and whose layers, where both are given, are the same, and
+    pins with the links whose layers they pass. Example: true Example: [[crank, ground]]
+    """
+
     def checked(self, checker: Checker) -> Self:
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
+        self._check_collisions(checker)
         if self.pictures and not self.rates and self.speed is None and self.motion is None:
             shown = " and ".join(self.pictures)
             message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
@@ -72,16 +90,7 @@ class KinematicsSection(MotionSection):
         return super().checked(checker)
 
     def _check_centres(self, checker: Checker) -> None:
-        links, pairs = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
-        for index, pair in enumerate(self.instant_centres):
-            path: KeyPath = ("kinematics", "instant_centres", index)
-            for k, name in enumerate(pair):
-                checker.check_name(name, links, "link", (*path, k))
-            if pair[0] == pair[1]:
-                checker.report(path, f"{pair[0]!r} has an instant centre with another link, not with itself")
-            elif frozenset(pair) in pairs:
-                checker.report(path, f"{' and '.join(pair)} are listed twice")
-            pairs.add(frozenset(pair))
+        self._check_pairs(checker, "instant_centres", "an instant centre")
         drives = len(checker.mechanism.drives)
         moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
         if self.instant_centres and drives > 1 and not moved:
@@ -90,6 +99,38 @@ class KinematicsSection(MotionSection):
                 "'motion'"
             )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
+
+    def _check_collisions(self, checker: Checker) -> None:
+        if self.collisions is None:
+            return
+        path: KeyPath = ("kinematics", "collisions")
+        if checker.mechanism.plates is None:
+            checker.report(
+                path, "clearances are those of plates: give mechanism.plates, such as {width: 20}", at_key=True
+            )
+        if CLEARANCE in checker.mechanism.coordinates:
+            message = f"{CLEARANCE!r} is the column of the smallest clearance: give what has this name another"
+            checker.report(path, message, at_key=True)
+        self._check_pairs(checker, "collisions", "a clearance")
+        pins = [] if checker.compiled is None else pins_of(checker.compiled.description)
+        for index, pair in enumerate(self.collisions):
+            at = next((pin.name for pin in pins if {*pair} <= {*pin.links}), None)
+            if pair[0] != pair[1] and at is not None:
+                message = f"{pair[0]!r} and {pair[1]!r} are joined at {at}: they overlap there, in different layers"
+                checker.report((*path, index), message)
+
+    def _check_pairs(self, checker: Checker, key: str, noun: str) -> None:
+        """Check pairs of two different links, none twice; each has what the noun says."""
+        links, pairs = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
+        for index, pair in enumerate(getattr(self, key)):
+            path: KeyPath = ("kinematics", key, index)
+            for k, name in enumerate(pair):
+                checker.check_name(name, links, "link", (*path, k))
+            if pair[0] == pair[1]:
+                checker.report(path, f"{pair[0]!r} has {noun} with another link, not with itself")
+            elif frozenset(pair) in pairs:
+                checker.report(path, f"{' and '.join(pair)} are listed twice")
+            pairs.add(frozenset(pair))
 
     def _check_advantage(self, checker: Checker) -> None:
         drives = checker.mechanism.drives

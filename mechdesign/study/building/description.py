@@ -27,18 +27,20 @@ from mechdesign.mechanism.model import (
     Link,
     Measure,
     Physical,
+    Plates,
     Prismatic,
     Quantity,
     Slot,
     Spring,
     Term,
+    play,
 )
 from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount
+from mechdesign.study.text.units import Amount, written
 
 # Of teeth as ISO 53 has them (radians).
 PRESSURE_ANGLE = np.radians(20.0)
@@ -61,6 +63,7 @@ def build(builder: Builder) -> Description:
     description = Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
         builder.units.angle_factor, builder.masses, springs, couplings, _friction(builder),
+        _plates(builder),
     )  # fmt: skip
     return _with_phases(builder, description)
 
@@ -373,6 +376,44 @@ def _friction(builder: Builder) -> dict[str, Friction]:
     return friction
 
 
+def _plates(builder: Builder) -> Plates | None:
+    """Plates without mistakes in their names; their numbers become places."""
+    given, path = builder.section.plates, ("plates",)
+    if given is None:
+        return None
+    lengths = {
+        key: builder.place(f"plates.{key}", getattr(given, key))
+        for key in given.given("width", "pin", "thickness", "kerf", "sheet")
+    }
+    widths, layers, pins = dict[str, Term](), dict[str, int](), dict[str, Term]()
+    for name, plate in given.links.items():
+        if not builder.reporter.check_name(name, builder.section.links, "link", (*ROOT, *path, "links", name),
+                                           at_key=True):  # fmt: skip
+            continue
+        if plate.width is not None:
+            widths[name] = builder.place(f"plates.{name}.width", plate.width)
+        if plate.layer is not None:
+            layers[name] = plate.layer
+    for name, diameter in given.pins.items():
+        if builder.reporter.check_name(name, builder.section.owners, "point", (*ROOT, *path, "pins", name),
+                                       at_key=True):  # fmt: skip
+            pins[name] = builder.place(f"plates.{name}.pin", diameter)
+    _check_holes(builder, given)
+    return Plates(**lengths, widths=widths, pins=pins, layers=layers)
+
+
+def _check_holes(builder: Builder, given: models.Plates) -> None:
+    """Check that no hole of a given diameter is as wide as its link."""
+    for point, links in builder.section.owners.items():
+        diameter = given.pins.get(point, given.pin)
+        for link in links:
+            own = given.links.get(link)
+            width = given.width if own is None or own.width is None else own.width
+            if len(links) > 1 and diameter is not None and diameter >= width:
+                message = f"the pin {point!r} has {written(diameter)}, and link {link!r} is only {written(width)} wide"
+                builder.report(("plates",), f"{message}: its hole would cut the link through", at_key=True)
+
+
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
     assert clamp.fixed is not None
     one, other = (builder.section.points_of(link) for link in clamp.fixed)
@@ -403,6 +444,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
+        builder.place(play(name), 0.0, kind)
         couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
     return couplings
 

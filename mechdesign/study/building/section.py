@@ -331,9 +331,9 @@ class Coupling(fields.Model):
 
     wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
     """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
-    radius: fields.PositiveLength | None = None
+    radius: Annotated[float, fields.number("length", 0.0, exclusive=True, fixed=True)] | None = None
     """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
-    pressure_angle: fields.Angle | None = None
+    pressure_angle: Annotated[float, fields.number("angle", fixed=True)] | None = None
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
 
     @model_validator(mode="after")
@@ -361,6 +361,39 @@ class Friction(fields.Model):
     point to the other: the force across it and its moment press on both. Left out: the force across alone counts.
     Example: 40
     """
+
+
+class Plate(fields.Model):
+    """Width and layer of one link as a plate; a number alone is its width."""
+
+    bare, short = "width", (fields.NUMBER_FORM,)
+    width: fields.PositiveLengthPlace | None = None
+    """Width of this link: its ends are round with half of it. Left out: that of all. Example: 12 mm"""
+    layer: Annotated[int, fields.whole(1, 1000)] | None = None
+    """Layer in which this link lies, counted from the bottom. Left out: `mechdesign export --to layers.csv` finds one.
+    Example: 2
+    """
+
+
+class Plates(fields.Model):
+    """Links as flat plates that are cut to size, and the pins that join them."""
+
+    width: fields.PositiveLengthPlace
+    """Width of every link: the outline is as far from its points as half of it. Example: 20 mm"""
+    pin: fields.PositiveLengthPlace | None = None
+    """Diameter of every pin and its holes. Left out: 0.4 of ``width``. Example: 6 mm"""
+    thickness: fields.PositiveLengthPlace | None = None
+    """Thickness of a plate, and so the height of a layer. Left out: 0.25 of ``width``. Example: 5 mm"""
+    pins: dict[fields.PointName, fields.PositiveLengthPlace] = Field(default_factory=dict)
+    """Diameters of pins that differ, by their point. Example: {A: 8 mm}"""
+    links: dict[fields.LinkName, Plate] = Field(default_factory=dict)
+    """Widths and layers of links that differ. Example: {coupler: {width: 12 mm, layer: 2}, crank: 15}"""
+    kerf: fields.NonNegativeLengthPlace | None = None
+    """Width of the cut that laser, water or wire takes away: outlines are larger by half of it, holes smaller. Left
+    out: 0. Example: 0.2 mm
+    """
+    sheet: fields.PositiveLengthPlace | None = None
+    """Width of the sheet on which the parts lie in rows. Left out: 600 mm. Example: 300 mm"""
 
 
 class Limit(fields.Model):
@@ -467,6 +500,10 @@ class MechanismSection(fields.Model):
     friction: dict[fields.JointName, Friction] = Field(default_factory=dict)
     """Friction of joints by the name of a point whose pin turns, a slide, a slot or a telescopic link. Example: {A:
     {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
+    """
+    plates: Plates | None = None
+    """Links as plates: widths, pins and layers, for `mechdesign export` and ``kinematics.collisions``. Example: {width:
+    20 mm, thickness: 5 mm, pin: 6 mm, links: {coupler: {width: 12 mm, layer: 2}}}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""

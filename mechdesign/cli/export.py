@@ -1,0 +1,44 @@
+"""`export`: files of a study for other tools."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mechdesign.cli import terminal
+from mechdesign.cli.annotations import annotate, of_warnings
+from mechdesign.cli.execution import load_study
+from mechdesign.cli.options import Options
+from mechdesign.cli.places import RESULTS
+from mechdesign.errors import OutputError
+from mechdesign.exporting.exports import export_named
+from mechdesign.exporting.view import View
+from mechdesign.files import check_marked, replace
+from mechdesign.report.requirements import on_warnings
+from mechdesign.work.threads import one_thread
+
+
+@one_thread()
+def export(path: Path | None, to: str, at: str | None, options: Options) -> int:
+    """Write one file of a study; returns the exit code."""
+    declared = export_named(to)
+    study = load_study(path, options)
+    content = declared.make(View(study, at))
+    for warning in content.warnings:
+        terminal.say(f"{study.label}: export: warning: {warning} [{warning.kind}]", quiet=options.quiet)
+    annotate("warning", of_warnings(study, "export", content.warnings))
+    unmet = [verdict for verdict in on_warnings(study, content.warnings) if not verdict.met]
+    for verdict in unmet:
+        terminal.say(f"{study.label}: requirement: {verdict}")
+    data = content.data.encode() if isinstance(content.data, str) else content.data
+    target = options.out or RESULTS / study.label / "export"
+    if options.out is None or target.is_dir() or target.suffix != Path(to).suffix:
+        target /= to
+    try:
+        os.makedirs(target.parent, exist_ok=True)
+        check_marked(target, declared.mark)
+        replace(target, [data])
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror or error}") from None
+    terminal.say(f"{study.label}: {target}", quiet=options.quiet)
+    return 1 if unmet else 0

@@ -1,0 +1,77 @@
+"""What can be exported: each is a function that is declared by the names of its files where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from mechdesign import exporting
+from mechdesign.cautions import Caution
+from mechdesign.errors import StudyError, suggestion
+from mechdesign.exporting.view import View
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file holds, and the warnings that belong to it."""
+
+    data: str | bytes
+    warnings: tuple[Caution, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Export:
+    """A file that can be exported.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, such as ``parts.dxf``.
+    meaning : str
+        What it holds, in a few words.
+    order : int
+        Its place in the list of what can be exported.
+    mark : bytes
+        What every file of the kind contains, by which an older one may be replaced.
+    make : callable
+        The function: what it holds, of a study and a pose.
+    """
+
+    name: str
+    meaning: str
+    order: int
+    mark: bytes
+    make: Callable[[View], Content]
+
+
+def export(
+    name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign"
+) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
+    """Declare that a function makes the file of this name from a view; see `Export` for what is said of it."""
+    return lambda make: Export(name, meaning, order, mark, make)
+
+
+@cache
+def exports() -> dict[str, Export]:
+    """Every file that can be exported, by its name: those that the modules of this folder declare."""
+    modules = [import_module(f"{exporting.__name__}.{module.name}") for module in iter_modules(exporting.__path__)]
+    declared = {value for module in modules for value in vars(module).values() if isinstance(value, Export)}
+    return {export.name: export for export in sorted(declared, key=lambda export: (export.order, export.name))}
+
+
+def export_named(name: str) -> Export:
+    """The export of a name.
+
+    Raises
+    ------
+    StudyError
+        If there is none; the message lists all.
+    """
+    listed = exports()
+    if name not in listed:
+        there = ", ".join(f"{other} ({export.meaning})" for other, export in listed.items())
+        raise StudyError(f"--to: there is no {name!r} to export{suggestion(name, listed)}; what there is: {there}")
+    return listed[name]

@@ -1,0 +1,62 @@
+"""The mechanism in a pose at full size, with the paths of its points over the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around, roomiest
+from mechdesign.exporting.dxf import to_dxf
+from mechdesign.exporting.exports import Content, export
+from mechdesign.exporting.svg import to_svg
+from mechdesign.exporting.view import View
+from mechdesign.mechanism.plates import joined
+from mechdesign.report.figures.scene import ranks
+
+# Height of letters as a part of the mechanism's size, and the least one (mm).
+LETTERS, SMALLEST = 0.04, 1.0
+
+
+@export("mechanism.dxf", "the mechanism in a pose and the paths of its points, as DXF", order=30)
+def mechanism_dxf(view: View) -> Content:
+    """The mechanism in a pose as DXF."""
+    return Content(to_dxf(mechanism_drawing(view)), view.assumed + view.unmoved)
+
+
+@export("mechanism.svg", "the mechanism in a pose and the paths of its points, as SVG", order=31)
+def mechanism_svg(view: View) -> Content:
+    """The mechanism in a pose as SVG."""
+    return Content(to_svg(mechanism_drawing(view)), view.assumed + view.unmoved)
+
+
+def mechanism_drawing(view: View) -> Drawing:
+    """Plates of all links in the pose, their pins, and the paths of moving points over the motion."""
+    mechanism, scale = view.mechanism, view.millimetres
+    description, sizes = mechanism.description, view.sizes
+    pinned = joined(description)
+    groups: dict[str, list[Shape]] = {}
+    letters = max(SMALLEST, LETTERS * scale * mechanism.size)
+    for link in description.links:
+        outline = [scale * place for place in view.in_world(link, view.outline(link))]
+        radius = scale * float(sizes.radius(link))
+        shapes: list[Shape] = [around("links", outline, radius)]
+        for slot in view.slots:
+            if slot.link == link:
+                ends = [scale * place for place in view.in_world(link, slot.ends)]
+                shapes.append(around("links", ends, scale * float(sizes.pin(slot.point))))
+        pins = [(scale * complex(view.pose.point(point)), scale * float(sizes.pin(point))) for point in pinned]
+        middle, _ = roomiest(outline, pins, radius)
+        shapes.append(Text("notes", middle, min(0.6 * radius, letters), link, centred=True))
+        groups[link] = shapes
+    for point in pinned:
+        place = scale * complex(view.pose.point(point))
+        groups[f"pin {point}"] = [
+            Circle("links", place, scale * float(sizes.pin(point))),
+            Text("notes", place + 1.4 * scale * float(sizes.pin(point)) * (1 + 1j), letters, point),
+        ]
+    for point, rank in ranks(view.study).items():
+        if rank:
+            places = scale * np.asarray(view.track.configuration.point(point))
+            last = np.flatnonzero(~view.track.follows)
+            curves = [part for part in np.split(places, last + 1) if len(part) > 1]
+            groups[f"path of {point}"] = [Path.line("curves", curve.tolist()) for curve in curves]
+    return Drawing(f"{view.study.name}: the mechanism at {view.posed}", groups)

@@ -1,0 +1,174 @@
+"""Every link as a part to cut at full size: outline, holes, slots, names, in rows on a sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, hull, roomiest
+from mechdesign.exporting.dxf import to_dxf
+from mechdesign.exporting.exports import Content, export
+from mechdesign.exporting.svg import to_svg
+from mechdesign.exporting.view import View
+from mechdesign.mechanism.graph import rod_of
+from mechdesign.mechanism.plates import joined
+from mechdesign.questions.reliability.schema.section import in_words
+
+SHEET = 600.0  # width of the sheet where the study gives none
+SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
+ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
+
+
+@export("parts.dxf", "every link as a part to cut at 1:1, as DXF", order=10)
+def parts_dxf(view: View) -> Content:
+    """All parts as DXF."""
+    return Content(to_dxf(parts_drawing(view)), view.assumed + view.unmoved)
+
+
+@export("parts.svg", "every link as a part to cut at 1:1, as SVG", order=11)
+def parts_svg(view: View) -> Content:
+    """All parts as SVG."""
+    return Content(to_svg(parts_drawing(view)), view.assumed + view.unmoved)
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A hole, or with two ends a slot, by the radius of its pin (mm)."""
+
+    point: str
+    ends: tuple[complex, ...]
+    radius: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part in a frame of its own, in millimetres: places that its outline goes around, and its holes.
+
+    `marks` are places without a hole, and `circles` the radii of pitch circles about its points.
+    """
+
+    name: str
+    places: Sequence[complex]
+    radius: float
+    holes: Sequence[Hole]
+    marks: dict[str, complex]
+    circles: Sequence[tuple[complex, float]] = ()
+
+    @property
+    def turn(self) -> complex:
+        """The turn by which the part is least tall: one of its sides lies level."""
+        corners = hull(self.places)
+        sides = [b - a for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True) if a != b]
+        turns = [abs(side) / side for side in sides] or [1.0 + 0j]
+        return min(turns, key=lambda turn: round(float(np.ptp([(turn * corner).imag for corner in corners])), 9))
+
+    def shapes(self, kerf: float) -> list[Shape]:
+        """What is cut, drilled and engraved; the outline is larger and the holes are smaller by half of the kerf."""
+        turn = self.turn
+        cut: list[Shape] = [around("cut", self.places, self.radius + kerf / 2)]
+        cut += [around("cut", hole.ends, max(hole.radius - kerf / 2, 0.0)) for hole in self.holes]
+        drilled = [Mark("drill", hole.ends[0]) for hole in self.holes if len(hole.ends) == 1]
+        marked = [Mark("engrave", place) for place in self.marks.values()]
+        circles = [Circle("engrave", center, radius) for center, radius in self.circles]
+        turned = [shape.moved(0j, turn) for shape in (*cut, *drilled, *marked, *circles)]
+        return [*turned, *self._name(turn)]
+
+    def _name(self, turn: complex) -> list[Text]:
+        """Its name, where most room is between the holes."""
+        holes = [(turn * end, hole.radius) for hole in self.holes for end in _along(hole.ends)]
+        place, room = roomiest([turn * place for place in self.places], holes, self.radius)
+        share, least, most = ENGRAVED
+        height = min(2 * share * self.radius, most, 1.6 * room / (0.65 * max(len(self.name), 1)))
+        return [Text("engrave", place, height, self.name, centred=True)] if height >= least else []
+
+
+def _along(ends: tuple[complex, ...]) -> list[complex]:
+    """Places along a slot, or the centre of a hole."""
+    return [ends[0] + (ends[-1] - ends[0]) * k / 8 for k in range(9 if len(ends) > 1 else 1)]
+
+
+def parts_of(view: View) -> list[Part]:
+    """Every link as a part, the ground too; of a telescopic link its body, and its rod."""
+    scale, sizes, pins = view.millimetres, view.sizes, joined(view.mechanism.description)
+    parts = []
+    for name, link in view.mechanism.description.links.items():
+        radius = scale * float(sizes.radius(name))
+        points = {point: scale * place for point, place in view.points(name).items()}
+        holes = [
+            Hole(point, (place,), scale * float(sizes.pin(point))) for point, place in points.items() if point in pins
+        ]
+        for slot in view.slots:
+            if slot.link == name:
+                ends = tuple(scale * end for end in slot.ends)
+                holes.append(Hole(slot.point, ends, scale * float(sizes.pin(slot.point))))
+        marks = {point: place for point, place in points.items() if point not in pins}
+        places = [scale * place for place in view.outline(name)]
+        parts.append(Part(name, places, radius, holes, marks, _pitch_circles(view, name)))
+        if link.telescopic and link.ends:
+            tip = Hole(link.ends[1], (0j,), scale * float(sizes.pin(link.ends[1])))
+            parts.append(Part(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
+    return parts
+
+
+def _pitch_circles(view: View, link: str) -> list[tuple[complex, float]]:
+    """Centres and radii of the pitch circles of a link's wheels, in its frame."""
+    mechanism, circles = view.mechanism, []
+    for mesh in mechanism.meshes:
+        for k, radius in enumerate(mesh.radii(view.pose)):
+            size, point = float(radius), mechanism.graph.nodes[mesh.axes[k]]
+            if mesh.links[k] == link and size > 0 and point in view.points(link):
+                circles.append((view.millimetres * view.points(link)[point], round(view.millimetres * size, 9)))
+    return [*dict.fromkeys(circles)]
+
+
+def parts_drawing(view: View) -> Drawing:
+    """All parts on a sheet, each with its name under it."""
+    scale, sizes = view.millimetres, view.sizes
+    parts, kerf = parts_of(view), scale * float(sizes.kerf)
+    width = SHEET if sizes.sheet is None else scale * float(sizes.sheet)
+    groups = nested([(part.name, part.shapes(kerf)) for part in parts], width)
+    return Drawing(f"{view.study.name}: parts", groups, remarks(view, parts))
+
+
+def nested(parts: Iterable[tuple[str, Sequence[Shape]]], width: float) -> dict[str, list[Shape]]:
+    """Parts in rows from the top of a sheet of some width, the tallest first; a part that is wider has its own row."""
+    boxes = [(name, shapes, *box(shapes)) for name, shapes in parts]
+    boxes.sort(key=lambda part: -round((part[3] - part[2]).imag, 6))
+    groups: dict[str, list[Shape]] = {}
+    x = top = tallest = 0.0
+    for name, shapes, low, high in boxes:
+        label = Text("notes", 0j, HEIGHT, name)
+        size = complex(max((high - low).real, label.width), (high - low).imag)
+        if x > 0 and x + size.real > width:
+            x, top = 0.0, top - tallest - SPACING
+            tallest = 0.0
+        by = complex(x - low.real, top - high.imag)
+        under = complex(x, top - size.imag - 1.5 * HEIGHT)
+        groups[name] = [*(shape.moved(by) for shape in shapes), label.moved(under)]
+        x += size.real + SPACING
+        tallest = max(tallest, size.imag + 1.5 * HEIGHT)
+    return groups
+
+
+def remarks(view: View, parts: Sequence[Part]) -> list[str]:
+    """What stands in the file in words: each part with its points, and the tolerances and fits of the study."""
+    study, sizes, scale = view.study, view.sizes, view.millimetres
+    lines = [f"thickness {scale * float(sizes.thickness):.6g} mm, kerf {scale * float(sizes.kerf):.6g} mm"]
+    for part in parts:
+        ends = [(hole.point, hole.ends[0]) for hole in part.holes if len(hole.ends) == 1] + [*part.marks.items()]
+        apart = [f"{one} {other} {abs(b - a):.9g} mm" for (one, a), (other, b) in combinations(ends, 2)]
+        slots = [f"slot of {hole.point} {abs(hole.ends[1] - hole.ends[0]):.6g} mm long between centres"
+                 for hole in part.holes if len(hole.ends) > 1]  # fmt: skip
+        holes = [f"hole {hole.point} {2 * hole.radius:.6g} mm" for hole in part.holes if len(hole.ends) == 1]
+        lines.append(f"{part.name}: {', '.join([*apart, *holes, *slots])}")
+    if study.reliability is not None:
+        for name, dimension in study.reliability.dimensions.items():
+            low, high = dimension.ends(study.sizes.get(name, 0.0))
+            unit = study.unit_of(name) or ""
+            if dimension.varies(study.sizes.get(name, 0.0)) and name not in study.mechanism.drives:
+                lines.append(f"tolerance: {name} {float(low):+.6g} to {float(high):+.6g} {unit}".rstrip())
+        lines += in_words(study.reliability, study.mechanism.graph, study.sizes)
+    return lines

@@ -1,0 +1,222 @@
+"""The layer in which each link lies, so that no plate and no pin meets another over the motion.
+
+A plate fills its layer. A pin passes the layers between those of the links that it joins. What meets in the plane at
+some pose must not share a layer; links that a pin joins always meet. A search with back-tracking finds the fewest
+layers, and among stacks of as many those with the shortest pins.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.exporting.exports import Content, export
+from mechdesign.exporting.view import View
+from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
+
+# Layers that the search for a stack tries at most, one link at a time.
+MOST_TRIED = 100_000
+# A search that allows meetings counts one of two plates as so many of a pin.
+OF_PLATES = 100
+# Meetings that a warning names at most.
+MOST_NAMED = 3
+HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
+
+
+@export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20, mark=b"item,kind,")
+def layers_csv(view: View) -> Content:
+    """A row for each plate and each pin: its layers, and where it begins and ends above the lowest layer."""
+    stack = stack_of(view)
+    thickness = view.millimetres * float(view.sizes.thickness)
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(HEAD)
+    rows = [(link, "plate", layer, layer) for link, layer in stack.layers.items()]
+    for pin in pins_of(view.mechanism.description):
+        layers = [stack.layers[link] for link in pin.links]
+        rows.append((pin.name, "pin", min(layers), max(layers)))
+    for item, kind, first, last in rows:
+        table.writerow((item, kind, first, last, f"{(first - 1) * thickness:.9g}", f"{last * thickness:.9g}"))
+    return Content(text.getvalue(), view.assumed + view.unmoved + stack.cautions)
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Two items that meet in the plane, at a pose in words."""
+
+    one: Item
+    other: Item
+    pose: str
+
+    @property
+    def weight(self) -> int:
+        """How much it counts where it cannot be avoided."""
+        return 1 if self.one.pin or self.other.pin else OF_PLATES
+
+    def broken(self, layers: Mapping[str, int]) -> bool:
+        """Whether both share a layer, of the links that have one."""
+        (begin, end), (first, last) = _span(self.one, layers), _span(self.other, layers)
+        return max(begin, first) < min(end, last)
+
+    def __str__(self) -> str:
+        return f"{self.one} and {self.other} ({self.pose})"
+
+
+def _span(item: Item, layers: Mapping[str, int]) -> tuple[float, float]:
+    """Where an item begins and ends, in layers; nothing of one whose links have none."""
+    placed = [layers[link] for link in item.links if link in layers]
+    if not placed:
+        return 0.0, 0.0
+    # A plate is one layer thick; its pin counts between the plates that it joins.
+    return (min(placed) + 0.5, max(placed) - 0.5) if item.pin else (placed[0] - 0.5, placed[0] + 0.5)
+
+
+@dataclass(frozen=True)
+class Stack:
+    """The layer of each link, from 1 at the bottom, what meets nevertheless, and whether all stacks were looked at."""
+
+    layers: Mapping[str, int]
+    meetings: Sequence[Meeting] = ()
+    complete: bool = True
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """A warning where something meets."""
+        if not self.meetings:
+            return ()
+        named = "; ".join(map(str, self.meetings[:MOST_NAMED]))
+        more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
+        head = "no stack was found in which nothing meets"
+        if self.complete:
+            head = "in whatever layers, something meets"
+        return (Caution("infeasible", f"{head}; here {named}{more}"),)
+
+
+def stack_of(view: View) -> Stack:
+    """The best stack of a study's plates over its motion; layers that the study gives are kept."""
+    description = view.mechanism.description
+    return stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
+
+
+def meetings_of(view: View) -> list[Meeting]:
+    """What meets in the plane over the motion.
+
+    Between two poses a distance changes by no more than the fastest corners move: what could meet there counts.
+    """
+    description, track = view.mechanism.description, view.track
+    corners = {link: tuple(view.outline(link)) for link in description.links}
+    clearances = Clearances(view.mechanism, view.plates, track.configuration, corners)
+    plates, pins = [plate_of(link) for link in description.links], pins_of(description)
+    shared = {frozenset(pair): pin.name for pin in pins for pair in combinations(pin.links, 2)}
+    meetings = []
+    for one, other in combinations([*plates, *pins], 2):
+        common = set(one.links) & set(other.links)
+        if one.pin or other.pin:
+            # A pin and a plate that it joins, or two pins of one plate.
+            pose = "" if common else _first(view, clearances, one, other)
+        else:
+            point = shared.get(frozenset((one.name, other.name)))
+            pose = f"joined at {point}" if point else _first(view, clearances, one, other)
+        if pose:
+            meetings.append(Meeting(one, other, pose))
+    return meetings
+
+
+def _first(view: View, clearances: Clearances, one: Item, other: Item) -> str:
+    """The first pose of the motion at which two items meet, in words; empty if they never do."""
+    count = len(view.track.places)
+    gap = np.broadcast_to(clearances.of(one, other), count)
+    moved = clearances.moved(one) + clearances.moved(other)
+    between = np.where(view.track.follows, (gap[1:] + gap[:-1] - moved) / 2, np.inf)
+    least = np.minimum(gap, np.minimum(np.append(between, np.inf), np.append(np.inf, between)))
+    row = np.flatnonzero(least < 0)
+    return view.words(int(row[0])) if len(row) else ""
+
+
+def stacked(
+    links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
+) -> Stack:  # fmt: skip
+    """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
+    search, most = _Search(links, pins, meetings, given), max([len(links), *given.values()])
+    for count in range(max([1, *given.values()]), most + 1):
+        layers = search.best(count)
+        if layers is not None:
+            return Stack(layers, complete=not search.spent)
+        if search.spent:
+            break
+    layers = _Search(links, pins, meetings, given, strict=False).best(most)
+    assert layers is not None
+    return Stack(layers, [meeting for meeting in meetings if meeting.broken(layers)], not search.spent)
+
+
+class _Search:
+    """Back-tracking over the links, those that meet most of the placed ones first.
+
+    Where it is not `strict`, meetings are allowed, and their number is what counts first.
+    """
+
+    def __init__(
+        self, links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int], *,
+        strict: bool = True,
+    ) -> None:  # fmt: skip
+        self.pins, self.given, self.strict, self.tried = pins, given, strict, 0
+        self.of_link = {
+            link: [meeting for meeting in meetings if link in (*meeting.one.links, *meeting.other.links)]
+            for link in links
+        }
+        self.order = [*links[:1]]
+        while len(self.order) < len(links):
+            left = [link for link in links if link not in self.order]
+            self.order.append(max(left, key=self._met))
+
+    def _met(self, link: str) -> tuple[bool, int]:
+        """How much a link meets the placed ones; given layers come first."""
+        others = [{*meeting.one.links, *meeting.other.links} for meeting in self.of_link[link]]
+        return link in self.given, sum(not placed.isdisjoint(self.order) for placed in others)
+
+    @property
+    def spent(self) -> bool:
+        """Whether it has tried as much as it may."""
+        return self.tried >= MOST_TRIED
+
+    def best(self, count: int) -> dict[str, int] | None:
+        """The best stack of so many layers; None if there is none, or none was found."""
+        self._least: tuple[int, int] | None = None
+        self._found: dict[str, int] | None = None
+        self._place(0, {}, 0, count)
+        return None if self._found is None else {link: self._found[link] for link in self.of_link}
+
+    def _place(self, rank: int, layers: dict[str, int], broken: int, count: int) -> None:
+        cost = broken, self._length(layers)
+        if self.spent or (self._least is not None and cost >= self._least):
+            return
+        if rank == len(self.order):
+            self._least, self._found = cost, dict(layers)
+            return
+        link = self.order[rank]
+        before = self._cost(link, layers)
+        for layer in [self.given[link]] if link in self.given else range(1, count + 1):
+            self.tried += 1
+            layers[link] = layer
+            new = self._cost(link, layers) - before
+            if not (new and self.strict):
+                self._place(rank + 1, layers, broken + new, count)
+            del layers[link]
+
+    def _cost(self, link: str, layers: Mapping[str, int]) -> int:
+        """What the meetings of a link count, in some layers."""
+        return sum(meeting.weight for meeting in self.of_link[link] if meeting.broken(layers))
+
+    def _length(self, layers: Mapping[str, int]) -> int:
+        """Layers that all pins pass."""
+        total = 0
+        for pin in self.pins:
+            placed = [layers[link] for link in pin.links if link in layers]
+            total += max(placed) - min(placed) if placed else 0
+        return total

@@ -1,0 +1,203 @@
+"""Links as flat plates: the convex hull of a link's points, widened on all sides, and discs for pins.
+
+The distance of two convex hulls is the largest separation along any direction u,
+
+    gap = max_u (min_k b_k . u - max_j a_j . u),
+
+negative by the depth of what they have in common where they overlap. It is that along a normal to a side of one of
+them, or along the line between two corners, so that all of these are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.core import Core
+from mechdesign.mechanism.model import Description, Fixed, Link, Plates
+
+# Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
+PIN, THICKNESS = 0.4, 0.25
+# Ending of the columns of clearances, and the column of the smallest.
+CLEARANCE = "clearance"
+
+
+def points_of(link: Link) -> tuple[str, ...]:
+    """Names of a link's points, its ends first; of a telescopic one also the tip."""
+    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
+
+
+def joined(description: Description) -> dict[str, tuple[str, ...]]:
+    """Every point at which a pin, a slide or a clamp joins links, and these links."""
+    links: dict[str, list[str]] = {}
+    for name, link in description.links.items():
+        for point in points_of(link):
+            links.setdefault(point, []).append(name)
+    for joint in description.joints.values():
+        if not isinstance(joint, Fixed) and joint.line.link not in links[joint.point]:
+            links[joint.point].append(joint.line.link)
+    return {point: tuple(names) for point, names in links.items() if len(names) > 1}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Lengths of plates at some dimensions, in the study's unit; see `Plates`."""
+
+    mechanism: Core
+    plates: Plates
+    places: Mapping[str, Value]
+
+    def radius(self, link: str) -> Value:
+        """Radius of the round ends of a link: half of its width."""
+        return self._length(self.plates.widths.get(link, self.plates.width)) / 2
+
+    def pin(self, point: str) -> Value:
+        """Radius of the pin at a point."""
+        diameter = self.plates.pins.get(point, self.plates.pin)
+        return (PIN * self._length(self.plates.width) if diameter is None else self._length(diameter)) / 2
+
+    @property
+    def thickness(self) -> Value:
+        """Thickness of every plate."""
+        given = self.plates.thickness
+        return THICKNESS * self._length(self.plates.width) if given is None else self._length(given)
+
+    @property
+    def kerf(self) -> Value:
+        """Width of a cut."""
+        return self._length(self.plates.kerf)
+
+    @property
+    def sheet(self) -> Value | None:
+        """Width of the sheet on which parts lie; None where the study gives none."""
+        return None if self.plates.sheet is None else self._length(self.plates.sheet)
+
+    def _length(self, term: str | float) -> Value:
+        return self.mechanism.geometry.term(term, self.places)
+
+
+@dataclass(frozen=True)
+class Item:
+    """The plate of a link, or with `pin` the pin at a point, and the links that it joins."""
+
+    name: str
+    links: tuple[str, ...]
+    pin: bool = False
+
+    def __str__(self) -> str:
+        return f"pin {self.name}" if self.pin else self.name
+
+
+def plate_of(link: str) -> Item:
+    """The plate of a link."""
+    return Item(link, (link,))
+
+
+def pins_of(description: Description) -> list[Item]:
+    """The pins of all joints."""
+    return [Item(point, links, pin=True) for point, links in joined(description).items()]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two items that may meet."""
+
+    one: Item
+    other: Item
+
+    @property
+    def name(self) -> str:
+        """Column of their clearance."""
+        return f"{self.one.name}.{self.other.name}.{CLEARANCE}"
+
+
+def pairs_of(description: Description) -> list[Pair]:
+    """What may meet: links that no joint joins, unless their layers differ, and pins with links whose layer they pass.
+
+    A pin passes the layers between those of the links that it joins, if all of these are given.
+    """
+    layers = {} if description.plates is None else description.plates.layers
+    pins = pins_of(description)
+    pairs = [
+        Pair(plate_of(one), plate_of(other))
+        for one, other in combinations(description.links, 2)
+        if not any({one, other} <= {*pin.links} for pin in pins)
+        and (one not in layers or other not in layers or layers[one] == layers[other])
+    ]
+    for pin in pins:
+        if all(link in layers for link in pin.links):
+            ends = [layers[link] for link in pin.links]
+            inside = [link for link, layer in layers.items() if min(ends) < layer < max(ends) and link not in pin.links]
+            pairs += [Pair(pin, plate_of(link)) for link in inside]
+    return pairs
+
+
+@dataclass(frozen=True)
+class Clearances:
+    """Clearances of items at the poses of a configuration.
+
+    `corners` are by link the places, in its frame, that its plate goes around; left out, its points.
+    """
+
+    mechanism: Core
+    plates: Plates
+    configuration: Configuration
+    corners: Mapping[str, Sequence[complex]] = field(default_factory=dict)
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """Lengths of the plates."""
+        return Sizes(self.mechanism, self.plates, self.configuration.places)
+
+    def of(self, one: Item, other: Item) -> Value:
+        """Distance of two outlines; where they overlap minus the depth of it; nan of a pose that fails."""
+        return gap(self.around(one), self.around(other)) - self._radius(one) - self._radius(other)
+
+    def around(self, item: Item) -> list[Vector]:
+        """Places in the world that an item goes around."""
+        if item.pin:
+            return [self._node(item.name)]
+        link = self.mechanism.description.links[item.name]
+        if item.name not in self.corners:
+            return [self._node(point) for point in points_of(link)]
+        base, turn = next(iter(link.points)), self.configuration.body_rotation(item.name)
+        local = self.mechanism.geometry.local(item.name, base, self.configuration.places)
+        tip = [self._node(link.ends[1])] if link.telescopic and link.ends else []
+        return [*(self._node(base) + (corner - local) * turn for corner in self.corners[item.name]), *tip]
+
+    def moved(self, item: Item) -> Value:
+        """The longest way of a place of an item from each pose to the next, shape (n - 1,)."""
+        ways = [np.abs(np.diff(corner)) for corner in self.around(item) if np.ndim(corner)]
+        return np.maximum.reduce(ways) if ways else 0.0
+
+    def _radius(self, item: Item) -> Value:
+        return self.sizes.pin(item.name) if item.pin else self.sizes.radius(item.name)
+
+    def _node(self, point: str) -> Vector:
+        return self.configuration.nodes[self.mechanism.graph.node(point)]
+
+
+@quiet
+def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
+    """Distance of the convex hulls of two sets of corners, arrays that broadcast; minus the depth where they overlap.
+
+    It is exact, continuous, and nan where a corner is nan.
+    """
+    sides = [b - a for corners in (one, other) for a, b in combinations(corners, 2)]
+    directions: list[Vector] = [turn * side for side in sides for turn in (1j, -1j)]
+    directions += [b - a for a in one for b in other]
+    largest: Value = -np.inf
+    for direction in directions:
+        length = np.abs(direction)
+        along = np.conj(np.divide(direction, length))
+        near, far = ([np.real(corner * along) for corner in corners] for corners in (one, other))
+        apart = np.minimum.reduce(np.broadcast_arrays(*far)) - np.maximum.reduce(np.broadcast_arrays(*near))
+        largest = np.where(length > 0, np.fmax(largest, apart), largest)
+    lost = np.isnan(sum(np.abs(corner) for corner in (*one, *other)))
+    return np.where(lost, np.nan, np.where(np.isneginf(largest), 0.0, largest))

@@ -1,0 +1,240 @@
+"""Files for other tools, read back by a small reader of the tests' own."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import mechdesign
+from mechdesign.errors import StudyError
+from mechdesign.exporting.exports import export_named, exports
+from mechdesign.exporting.stack import stack_of
+from mechdesign.exporting.view import View
+from mechdesign.mechanism.plates import points_of
+from tests.helpers.drawings import area, at, distance, entities, parts
+
+FOUR_BAR = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, 30]
+    coupler: {from: A, to: B, length: 90, points: {P: [45, 25]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+  plates: {width: 16, pin: 6, pins: {A: 8}, links: {coupler: {width: 12}}, kerf: 0.2}
+kinematics:
+  sweep: {theta: {from: 0, to: 360, step: 15}}
+  outputs: [P]
+reliability:
+  dimensions: {crank.length: 0.05, rocker.length: js9}
+  clearances: {A: {fit: 8 H7/g6}}
+"""
+# The crank turns between an arm with a slot and the frame, and a ram slides in the frame.
+QUICK_RETURN = """
+mechanism:
+  links:
+    ground: {O: [0, 0], E: [0, -60], G: [0, 60]}
+    crank: [O, A, 25]
+    arm: [E, B, 120]
+    rod: [B, C, 60]
+    ram: {C: [0, 0], T: [40, 0]}
+  joints: {slot: {slot: arm, point: A}, guide: {prismatic: [ground, ram], through: G, point: C}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [25, 0], B: [45, 45], C: [100, 60]}
+  plates: {width: 14, pin: 5}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 5}}, outputs: [T]}
+"""
+
+
+def view(text, at=None, **changes):
+    return View(mechdesign.load(text=text, **changes), at)
+
+
+def exported(text, name, at=None, **changes):
+    """What a file of a study holds."""
+    return export_named(name).make(view(text, at, **changes)).data
+
+
+@pytest.mark.parametrize("name", sorted(exports()))
+def test_everything_that_is_declared_is_made_with_its_mark(name):
+    content = export_named(name).make(view(FOUR_BAR))
+    data = content.data if isinstance(content.data, bytes) else content.data.encode()
+    assert exports()[name].mark in data
+    assert content.warnings == ()
+
+
+def test_every_file_is_told_of_on_its_page():
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "export.md").read_text(encoding="utf-8")
+    assert [name for name in exports() if f"`{name}`" not in page] == []
+
+
+def test_a_wrong_name_lists_those_there_are():
+    with pytest.raises(StudyError, match=r"there is no 'mechanism.dfx' to export; did you mean 'mechanism.dxf'"):
+        export_named("mechanism.dfx")
+
+
+def test_distances_of_holes_are_lengths_of_links_in_millimetres():
+    inches = "units: {length: in}" + re.sub(
+        r"(?<=[ \[])(\d+(?:\.\d+)?)(?=[],}])", r"\1 mm", FOUR_BAR.split("kinematics")[0]
+    )
+    for text in (FOUR_BAR, inches):
+        found = parts(exported(text, "parts.dxf"))
+        assert set(found) == {"ground", "crank", "coupler", "rocker"}
+        for name, length, diameters in (
+            ("ground", 100, [5.8, 5.8]), ("crank", 30, [5.8, 7.8]), ("coupler", 90, [5.8, 7.8]),
+            ("rocker", 60, [5.8, 5.8]),
+        ):  # fmt: skip
+            _, holes, slots = found[name]
+            assert abs(holes[1][0] - holes[0][0]) == pytest.approx(length, abs=1e-6)
+            assert sorted(diameter for _, diameter in holes) == pytest.approx(diameters, abs=1e-6)
+            assert not slots
+
+
+def test_areas_of_outlines_are_those_of_widened_hulls():
+    # By Steiner: area of the hull, its perimeter times the distance, and a whole circle.
+    found = parts(exported(FOUR_BAR, "parts.dxf"))
+    perimeter = 90 + 2 * math.hypot(45, 25)
+    for name, inner, round_about, radius in (
+        ("crank", 0, 60, 8.1), ("rocker", 0, 120, 8.1), ("coupler", 90 * 25 / 2, perimeter, 6.1)
+    ):  # fmt: skip
+        assert area(found[name][0]) == pytest.approx(inner + round_about * radius + math.pi * radius**2, abs=1e-6)
+
+
+def test_slots_are_as_long_as_the_travel_of_their_pins():
+    found = parts(exported(QUICK_RETURN, "parts.dxf"))
+    # The crank's pin is between 35 and 85 from the arm's pivot.
+    (slot,) = found["arm"][2]
+    assert area(slot) == pytest.approx(50 * 5 + math.pi * 2.5**2, abs=1e-3)
+    (guide,) = found["ground"][2]
+    stroke = mechdesign.kinematics(mechdesign.load(text=QUICK_RETURN)).tables["extremes"]["range"][0]
+    assert area(guide) == pytest.approx(stroke * 5 + math.pi * 2.5**2, rel=1e-4)
+
+
+def test_svg_has_the_same_places_and_sizes_in_millimetres():
+    text = exported(FOUR_BAR, "parts.svg")
+    root = ElementTree.parse(io.StringIO(text.partition("?>")[2])).getroot()
+    box = [float(number) for number in root.get("viewBox").split()]
+    assert [root.get("width"), root.get("height")] == [f"{box[2]:.10g}mm", f"{box[3]:.10g}mm"]
+    cut = next(group for group in root if group.get("id") == "cut")
+    circles = [e for e in entities(exported(FOUR_BAR, "parts.dxf")) if e["kind"] == "CIRCLE"]
+    drawn = [complex(float(e.get("cx")), -float(e.get("cy"))) for e in cut.iter() if e.tag.endswith("circle")]
+    assert drawn == pytest.approx([at(circle) for circle in circles], abs=2e-6)
+
+
+def test_tolerances_and_fits_stand_in_the_text():
+    text = exported(FOUR_BAR, "parts.dxf")
+    assert "999\ntolerance: crank.length -0.05 to +0.05 mm\n" in text
+    assert "999\ntolerance: js9 of rocker.length: -0.037 to +0.037\n" in text
+    assert "999\nfit: A, 8 H7/g6: radial clearance 0.0025 to 0.0145\n" in text
+
+
+def test_the_mechanism_is_drawn_at_a_pose_with_the_paths_of_its_points():
+    found = entities(exported(FOUR_BAR, "mechanism.dxf", at="theta=60"))
+    names = {e[1]: at(e) for e in found if e["kind"] == "TEXT"}
+    pins = [at(e) for e in found if e["kind"] == "CIRCLE"]
+    pose = mechdesign.load(text=FOUR_BAR).mechanism.solve({"theta": 60})
+    assert {"O", "A", "B", "D", "crank", "coupler"} <= set(names)
+    for point in "OABD":
+        assert min(abs(pin - complex(pose[f"{point}.x"], pose[f"{point}.y"])) for pin in pins) < 1e-8
+    path = [[at(vertex) for vertex in e["vertices"]] for e in found if e[8] == "curves"]
+    assert min(abs(place - complex(pose["P.x"], pose["P.y"])) for curve in path for place in curve) < 0.2
+
+
+def test_dxf_passes_the_audit_of_ezdxf():
+    ezdxf = pytest.importorskip("ezdxf")
+    for name, text in itertools.product(("parts.dxf", "mechanism.dxf"), (FOUR_BAR, QUICK_RETURN)):
+        document = ezdxf.read(io.StringIO(exported(text, name)))
+        report = document.audit()
+        assert (document.dxfversion, report.errors, report.fixes) == ("AC1009", [], [])
+
+
+def met(study, layers, poses):
+    """Pairs that share a layer and meet at one of some poses: plates, and pins with the plates between their ends."""
+    mechanism = study.mechanism
+    solved = mechanism.solve({mechanism.drives[0]: poses})
+    links = {name: points_of(link) for name, link in mechanism.description.links.items()}
+    width, found = mechanism.nominal["plates.width"], set()
+    radius = {name: mechanism.nominal.get(f"plates.{name}.width", width) / 2 for name in links}
+    pins = {}
+    for name, points in links.items():
+        for point in points:
+            pins.setdefault(point, []).append(name)
+    for k in range(len(poses)):
+        places = {p: complex(solved[f"{p}.x"][k], solved[f"{p}.y"][k]) for p in mechanism.points}
+        hulls = {name: [places[point] for point in points] for name, points in links.items()}
+        for one, other in itertools.combinations(links, 2):
+            if layers[one] == layers[other] and distance(hulls[one], hulls[other]) < radius[one] + radius[other]:
+                found.add((one, other))
+        for point, joined in pins.items():
+            ends = [layers[name] for name in joined]
+            diameter = mechanism.nominal.get(f"plates.{point}.pin", mechanism.nominal["plates.pin"])
+            for name in links:
+                between = min(ends) < layers[name] < max(ends) and name not in joined
+                if between and distance([places[point]], hulls[name]) < diameter / 2 + radius[name]:
+                    found.add((point, name))
+    return found
+
+
+JANSEN = """
+mechanism:
+  links:
+    ground: {O: [38, 7.8], B: [0, 0]}
+    crank: [O, A, 15]
+    j: [A, C, 50]
+    be: {from: B, to: C, length: 41.5, points: {D: [3.7, 39.9]}}
+    k: [A, F, 61.9]
+    c: [B, F, 39.3]
+    f: [D, E, 39.4]
+    gi: {from: F, to: E, length: 36.7, points: {G: [-28.2, -40.2]}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [53, 7.8], C: [18, 42], D: [-39, 16], F: [-8, -39], E: [-36, -22]}
+  plates: {width: 6, pin: 2}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 5}}, outputs: [G]}
+"""
+CROSSED = FOUR_BAR.replace("B: [75, 55]}\n", "B: [75, -55]}\n")
+
+
+@pytest.mark.parametrize("text", [FOUR_BAR, CROSSED, JANSEN], ids=["open", "crossed", "Jansen"])
+def test_nothing_meets_in_the_layers_that_are_found(text):
+    study = mechdesign.load(text=text)
+    stack = stack_of(View(study))
+    poses = [k * 360 / 181 for k in range(181)]
+    assert not stack.meetings
+    assert met(study, stack.layers, poses) == set()
+    # Not by lying in as many layers as there are links.
+    assert max(stack.layers.values()) < len(stack.layers)
+
+
+def test_layers_of_the_study_are_kept():
+    stack = stack_of(view(FOUR_BAR, overrides={"mechanism.plates.links": {"crank": {"layer": 3}}}))
+    assert stack.layers["crank"] == 3
+    assert not stack.meetings
+
+
+def test_what_meets_in_any_layers_is_named_with_the_pose():
+    # Rod and rocker are in one layer, although a pin joins them.
+    both = {"coupler": {"layer": 2}, "rocker": {"layer": 2}}
+    stack = stack_of(view(FOUR_BAR, overrides={"mechanism.plates.links": both}))
+    (warning,) = stack.cautions
+    assert (warning.kind, stack.complete) == ("infeasible", True)
+    assert str(warning) == "in whatever layers, something meets; here coupler and rocker (joined at B)"
+
+
+def test_a_hole_as_wide_as_its_link_is_refused():
+    with pytest.raises(StudyError, match="the pin 'A' has 8, and link 'coupler' is only 8 wide: its hole would cut"):
+        view(FOUR_BAR, overrides={"mechanism.plates.links.coupler.width": 8})
+
+
+def test_a_study_without_plates_or_motion_says_what_is_taken():
+    bare = "mechanism: {links: {ground: {O: [0, 0]}, one: [O, A, 50], two: [A, B, 40]}, drives: [one, two]}"
+    bare = bare.replace("drives", "sketch: {A: [50, 0], B: [50, 40]}, drives")
+    content = export_named("parts.dxf").make(view(bare))
+    assert [warning.kind for warning in content.warnings] == ["assumed", "incomplete"]
+    assert "links are taken as 5 mm wide; give {width: 5 mm}" in str(content.warnings[0])
