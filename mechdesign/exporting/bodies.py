@@ -28,9 +28,9 @@ from mechdesign.mechanism.outputs import pulled
 from mechdesign.study.text.units import measure
 
 # Mass of a body without one, as a part of the smallest mass that the study gives, or in kg where it gives none.
-SMALL_MASS = 1e-3
+SMALL_MASS = 1e-2
 # Radius of gyration of a body without moment of inertia, as a part of the mechanism's size.
-GYRATION = 0.05
+GYRATION = 0.15
 # A coefficient of a coordinate that is smaller is none.
 NONE = 1e-9
 

@@ -23,7 +23,7 @@ STEP, HELD = 5e-4, 1e-3
 # Impedance of the constraints: the part of a deviation's acceleration that they take away.
 IMPEDANCE = 0.9999
 # Natural frequency of a position servo on all masses of the mechanism (1/s).
-SERVO = 2 * math.pi * 10
+SERVO = 20.0
 # Decimals of places (m).
 DECIMALS = 12
 # A side of a range that is left open (rad, m).
@@ -78,13 +78,19 @@ class Model:
         self.colors = link_colors(bodies.mechanism)
         self.bounded: dict[str, tuple[float, float]] = {}
 
+    @property
+    def free(self) -> bool:
+        """Whether the study gives efforts of the drives, so that motors move them; servos hold them elsewhere."""
+        section = self.view.study.dynamics
+        return section is not None and section.forward is not None
+
     def text(self) -> str:
         """The file."""
         bodies, root = self.bodies, self.root
         SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
         SubElement(
-            root, "option", timestep=numbers(STEP), gravity=planar(bodies.gravity), integrator="implicitfast",
-            tolerance="1e-12", iterations="200",
+            root, "option", timestep=numbers(STEP), gravity=planar(bodies.gravity),
+            integrator="RK4" if self.free else "implicitfast", tolerance="1e-12", iterations="200",
         )  # fmt: skip
         defaults = SubElement(root, "default")
         SubElement(
@@ -294,8 +300,6 @@ class Model:
     def _drives(self) -> None:
         """A motor of each drive where the study gives efforts, else a servo that holds a position."""
         bodies, values = self.bodies, list[float]()
-        section = self.view.study.dynamics
-        free = section is not None and section.forward is not None
         mass = sum(body.mass for name, body in bodies.bodies.items() if name != GROUND)
         for name in bodies.mechanism.drives:
             drive = bodies.mechanism.coordinate(name)
@@ -305,7 +309,7 @@ class Model:
             if [*terms.values()] != [1.0]:
                 self._fixed(name, terms)
                 at = {"tendon": name}
-            if free:
+            if self.free:
                 SubElement(self.actuators, "motor", name=name, **at)
                 values.append(0.0)
             else:
