@@ -49,10 +49,16 @@ class _Function:
     angles: Literal["", "takes", "gives"] = ""
 
 
+def _of_power(x: Any, y: Any) -> tuple[Any, Any]:
+    """Partial derivatives of a power; one with the exponent 0 is constant, where its base is 0 as well."""
+    constant = isinstance(y, float) and y == 0.0
+    return 0.0 if constant else y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)
+
+
 _FUNCTIONS: dict[str, _Function] = {
     "sqrt": _Function("square root", np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
     "exp": _Function("exponential function", np.exp, lambda x: (np.exp(x),)),
-    "log": _Function("natural logarithm", np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
+    "log": _Function("natural logarithm", np.log, lambda x: (np.true_divide(1.0, x),)),
     "abs": _Function("absolute value", np.abs, lambda x: (np.sign(x),)),
     "sin": _Function("sine of an angle", np.sin, lambda x: (np.cos(x),), "takes"),
     "cos": _Function("cosine of an angle", np.cos, lambda x: (-np.sin(x),), "takes"),
@@ -87,12 +93,12 @@ _FUNCTIONS: dict[str, _Function] = {
     "min": _Function(
         "the smallest of two numbers or more",
         np.minimum,
-        lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0)),
+        lambda x, y: (np.heaviside(np.subtract(y, x), 1.0), 1.0 - np.heaviside(np.subtract(y, x), 1.0)),
     ),
     "max": _Function(
         "the largest of two numbers or more",
         np.maximum,
-        lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0)),
+        lambda x, y: (np.heaviside(np.subtract(x, y), 1.0), 1.0 - np.heaviside(np.subtract(x, y), 1.0)),
     ),
     "+": _Function("sum", np.add, lambda x, y: (1.0, 1.0)),
     "-": _Function("difference", np.subtract, lambda x, y: (1.0, -1.0)),
@@ -101,7 +107,7 @@ _FUNCTIONS: dict[str, _Function] = {
     "**": _Function(
         "power; groups to the right and binds more tightly than a sign",
         np.float_power,
-        lambda x, y: (y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)),
+        _of_power,
     ),
     "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
@@ -117,6 +123,41 @@ CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
 """Values and meanings of the constants that an expression may name."""
 RESERVED = FUNCTIONS | CONSTANTS.keys()
 """Names that no parameter can have."""
+
+
+# Functions of NumPy in the partial derivatives above, with partial derivatives of their own.
+_PARTIALS: dict[Callable[..., Any], Callable[..., tuple[Any, ...]]] = {
+    **{function.value: function.partials for function in _FUNCTIONS.values()},
+    np.square: lambda x: (2.0 * x,),
+    np.power: _of_power,
+    np.sign: lambda x: (0.0,),
+    np.heaviside: lambda x, y: (0.0, 0.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Dual(np.lib.mixins.NDArrayOperatorsMixin):
+    """A value and its slope along a line, each a number, an array or a dual again: functions of NumPy carry both."""
+
+    value: Any
+    slope: Any
+
+    @staticmethod
+    def parts(number: Any) -> tuple[Any, Any]:
+        """Value and slope of a dual, or of a number that does not change along the line."""
+        return (number.value, number.slope) if isinstance(number, Dual) else (number, 0.0)
+
+    def __array_ufunc__(self, function: Any, method: str, *arguments: Any, **options: Any) -> Any:
+        """The value of a function and its slope, by the chain rule."""
+        if method != "__call__" or function not in _PARTIALS:
+            return NotImplemented
+        values = [argument.value if isinstance(argument, Dual) else argument for argument in arguments]
+        slopes = [
+            partial * argument.slope
+            for partial, argument in zip(_PARTIALS[function](*values), arguments, strict=True)
+            if isinstance(argument, Dual)
+        ]
+        return Dual(function(*values), sum(slopes[1:], start=slopes[0]))
 
 
 @dataclass(frozen=True)
@@ -139,6 +180,8 @@ class Tabulated:
         return CubicSpline(places, values, bc_type="periodic" if self.period else "not-a-knot", extrapolate=False)
 
     def _at(self, x: Any, order: int) -> Any:
+        if isinstance(x, Dual):
+            return Dual(self._at(x.value, order), self._at(x.value, order + 1) * x.slope)
         first = self.rows[0][0]
         return self._spline(first + np.mod(np.subtract(x, first), self.period) if self.period else x, order)
 
@@ -192,12 +235,18 @@ class Expression:
             raise ExpressionError(f"{self.text!r} has no finite value: a division by zero, or too large a power")
         return result
 
-    def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
-        """Exact partial derivative with respect to every variable, at the values of `env` (forward mode)."""
+    def derivatives(self, env: Mapping[str, Any]) -> dict[str, Any]:
+        """Exact partial derivative with respect to every variable, at the values of `env` (forward mode).
+
+        Of variables that are a `Dual`, derivatives are one too, or a number where they do not change.
+        """
         _, partials = self._run(
             lambda value: (value, {}), lambda name: (self._variable(env, name), {name: 1.0}), self._differentiate
         )
-        return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
+        return {
+            name: value if isinstance(value, Dual) else np.asarray(value, dtype=float)[()]
+            for name, value in partials.items()
+        }
 
     @classmethod
     def of_table(cls, text: str, table: Tabulated, name: str, angle_unit: float) -> Expression:
@@ -296,12 +345,14 @@ class Expression:
                     stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
         return stack[0]
 
-    def _variable(self, env: Mapping[str, ArrayLike], name: str) -> Number:
+    def _variable(self, env: Mapping[str, Any], name: str) -> Any:
         try:
             value = env[name]
         except KeyError:
             raise ExpressionError(f"unknown name {name!r}") from None
-        return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)  # type: ignore[arg-type]
+        if isinstance(value, Dual):
+            return value
+        return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)
 
     def _apply(self, name: Called, arguments: list[Any]) -> Number:
         function = _function(name)
@@ -323,7 +374,7 @@ class Expression:
     def _differentiate(self, name: Called, arguments: list[tuple[Any, dict[str, Any]]]) -> tuple[Any, dict[str, Any]]:
         function = _function(name)
         inner, outer = self._angle_factors(function)
-        values = [np.asarray(value) * inner for value, _ in arguments]
+        values = [np.multiply(value, inner) for value, _ in arguments]
         total: dict[str, Any] = {}
         for (_, seeds), partial in zip(arguments, function.partials(*values), strict=True):
             for variable, seed in seeds.items():

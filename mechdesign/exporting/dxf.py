@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from textwrap import wrap
 
 from mechdesign.errors import printable
 from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text
 
+LONGEST = 240  # letters of a line
 Pair = tuple[int, str | float | int]
 
 
@@ -20,13 +22,14 @@ def _written(value: str | float) -> str:
     """A value; letters beyond ASCII as release 12 has them."""
     if isinstance(value, float):
         return f"{round(value, 9) + 0.0:.9f}".rstrip("0").rstrip(".")
-    return printable(str(value)).encode("ascii", "backslashreplace").decode()
+    text = printable(str(value))
+    return "".join(letter if letter.isascii() else f"\\U+{ord(letter):04X}" for letter in text)
 
 
 def _pairs(drawing: Drawing) -> Iterator[Pair]:
     low, high = drawing.box
     for remark in (drawing.title, "made by mechdesign; one unit is 1 mm", *drawing.remarks):
-        yield 999, remark
+        yield from ((999, line) for line in wrap(remark, LONGEST))
     yield from ((0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"))
     for name, corner in (("$EXTMIN", low), ("$EXTMAX", high)):
         yield from ((9, name), (10, corner.real), (20, corner.imag), (30, 0.0))

@@ -73,5 +73,5 @@ def export_named(name: str) -> Export:
     listed = exports()
     if name not in listed:
         there = ", ".join(f"{other} ({export.meaning})" for other, export in listed.items())
-        raise StudyError(f"--to: nothing is exported as {name!r}{suggestion(name, listed)}; there are {there}")
+        raise StudyError(f"--to: there is no {name!r} to export{suggestion(name, listed)}; what there is: {there}")
     return listed[name]

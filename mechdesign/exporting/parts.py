@@ -88,7 +88,7 @@ class Part:
 
         place = max(middles, key=lambda middle: round(room(middle), 9))
         share, least, most = ENGRAVED
-        height = min(2 * share * self.radius, most, 2.0 * room(place) / (0.65 * max(len(self.name), 1)))
+        height = min(2 * share * self.radius, most, 1.6 * room(place) / (0.65 * max(len(self.name), 1)))
         return [Text("engrave", place, height, self.name, centred=True)] if height >= least else []
 
 
@@ -124,10 +124,9 @@ def _pitch_circles(view: View, link: str) -> list[tuple[complex, float]]:
     """Centres and radii of the pitch circles of a link's wheels, in its frame."""
     mechanism, circles = view.mechanism, []
     for mesh in mechanism.meshes:
-        radii = mesh.radii(view.pose)
-        for wheel, axis, radius in zip(mesh.links, mesh.axes, radii, strict=True):
-            size, point = float(np.real(radius)), mechanism.graph.nodes[axis]
-            if wheel == link and size > 0 and point in view.points(link):
+        for k, radius in enumerate(mesh.radii(view.pose)):
+            size, point = float(radius), mechanism.graph.nodes[mesh.axes[k]]
+            if mesh.links[k] == link and size > 0 and point in view.points(link):
                 circles.append((view.millimetres * view.points(link)[point], round(view.millimetres * size, 9)))
     return [*dict.fromkeys(circles)]
 

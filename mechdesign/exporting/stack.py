@@ -94,7 +94,7 @@ class Stack:
         more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
         head = "no stack was found in which nothing meets"
         if self.complete:
-            head = "whatever their layers, some links meet"
+            head = "in whatever layers, something meets"
         return (Caution("infeasible", f"{head}; here {named}{more}"),)
 
 

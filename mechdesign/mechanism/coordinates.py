@@ -10,7 +10,7 @@ from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity
+from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity, play
 
 Kind = Literal["x", "y", "angle", "slide", "distance", "expression", "parameter"]
 
@@ -129,15 +129,15 @@ def _measure(name: str, measure: Measure, description: Description, graph: Graph
 
 
 def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupled:
-    """Coordinates of a coupling; its function and its gap have the unit of the coordinate that follows."""
+    """Coordinates of a coupling; its function, with the play, and its gap have the unit of the one that follows."""
     follower = resolve(coupling.sets, description, graph)
-    parts = _parts(coupling.of, description, graph)
-    gap = Expression(
-        coupling.of.text, (("name", follower.name), *coupling.of.program, ("call", "-")), coupling.of.angle_unit
-    )
+    name = play(coupling.name).removeprefix(MEASURED)
+    with_play = replace(coupling.of, program=(*coupling.of.program, ("name", name), ("call", "+")))
+    parts = _parts(with_play, description, graph)
+    gap = replace(with_play, program=(("name", follower.name), *with_play.program, ("call", "-")))
     function, gap_of = (
         replace(_expression(coupling.name, expression, parts | own), quantity=follower.quantity)
-        for expression, own in ((coupling.of, {}), (gap, {follower.name: follower}))
+        for expression, own in ((with_play, {}), (gap, {follower.name: follower}))
     )
     return Coupled(coupling.name, follower, function, gap_of)
 
@@ -146,10 +146,8 @@ def _parts(expression: Expression, description: Description, graph: Graph) -> di
     """Coordinates and parameters of an expression by name."""
     parts: dict[str, Coordinate] = {}
     for part in sorted(expression.names):
-        own = description.places.get(part)
-        if MEASURED + part in description.places:
-            parts[part] = Coordinate(part, "parameter", "none")
-        elif own is not None and own.in_coupling:
+        own = description.places.get(MEASURED + part) or description.places.get(part)
+        if own is not None and (own.in_coupling or own.name.startswith(MEASURED)):
             parts[part] = Coordinate(part, "parameter", "angle" if own.quantity == "angle" else "none")
         else:
             parts[part] = resolve(part, description, graph)

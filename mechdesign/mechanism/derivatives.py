@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, norm2, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
@@ -233,20 +232,7 @@ class Linearization(Loops):
     def rate_sensitivity(
         self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates
     ) -> tuple[Rates, Rates]:
-        """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`.
-
-        Raises
-        ------
-        MechanismError
-            If a coupling is not linear in angles and slides.
-        """
-        bent = next((function.name for function in self.structure.functions if not function.linear), None)
-        if bent is not None:
-            raise MechanismError(
-                f"the errors of velocities and accelerations are not available analytically with coupling '{bent}', "
-                "which is not linear in angles and slides; use monte_carlo",
-                f"mechanism.couplings.{bent}",
-            )
+        """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`."""
         _, explicit, _ = self._explicit(places)
         none, edges = [0.0] * len(self.structure.given), self.structure.edges
         s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))

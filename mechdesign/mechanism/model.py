@@ -21,8 +21,14 @@ Physical = Literal[
     "mass", "moment_of_inertia", "force", "moment", "stiffness", "rotational_stiffness", "damping", "rotational_damping"
 ]  # fmt: skip
 
-# Prefix of the places of parameters that measures use; no name in a study has a colon.
+# Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
+# in a study has a colon.
 MEASURED = "measures:"
+
+
+def play(coupling: str) -> str:
+    """Name of the place by which the coordinate that follows deviates from a coupling's function; nominally 0."""
+    return f"{MEASURED}{coupling}.play"
 
 
 @dataclass(frozen=True)

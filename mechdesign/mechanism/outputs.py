@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, Vector, dot, largest, norm2, quiet
+from mechdesign.expressions import Dual
+from mechdesign.mechanism.algebra import Value, Vector, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-
-# Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
-GRADIENT_STEP = 1e-6
 
 
 class Pulls(NamedTuple):
@@ -108,15 +106,13 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
         square = norm2(span)
         return (dot(a, b) + dot(span, ab) - dot(span, a) * dot(span, b) / square) / np.sqrt(square)
     if coordinate.kind == "expression":
-        along_one, along_other = (
-            [_user(part, first(configuration, part, rates), coordinate) for part in coordinate.parts]
-            for rates in (one, other)
-        )
-        mixed = [_user(part, second(configuration, part, one, other, both), coordinate) for part in coordinate.parts]
-        values = configuration.user_values(coordinate)
-        gradient, curved = _gradient(coordinate, values), _directional(coordinate, values, along_one)
-        terms = zip(gradient, mixed, curved, along_other, strict=True)
-        return _radians(coordinate, sum(g * m + c * b for g, m, c, b in terms))
+        rate, other_rate = (_by_part(coordinate, partial(first, configuration, rates=rates)) for rates in (one, other))
+        mixed = _by_part(coordinate, partial(second, configuration, one=one, other=other, both=both))
+        total: Value = 0.0
+        for name, slope in _gradient_along(configuration, coordinate, rate).items():
+            gradient, bend = Dual.parts(slope)
+            total = total + gradient * mixed[name] + bend * other_rate[name]
+        return _radians(coordinate, total)
     return first(configuration, coordinate, both)
 
 
@@ -125,20 +121,10 @@ def acceleration_sensitivity(
     configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
     position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
 ) -> Value:  # fmt: skip
-    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis).
-
-    Raises
-    ------
-    MechanismError
-        For an expression that is not linear in angles and slides.
-    """
-    if coordinate.linear:
-        return second(configuration, coordinate, acceleration, position_z, acceleration_z)
+    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis)."""
     if coordinate.kind == "expression":
-        raise MechanismError(
-            f"the acceleration error of '{coordinate.name}' is not available analytically: it is an expression; "
-            "use monte_carlo, or name its parts as outputs",
-            "reliability.outputs",
+        return _curved_sensitivity(
+            configuration, coordinate, velocity, acceleration, position_z, velocity_z, acceleration_z
         )
     if coordinate.kind == "distance":
         rate, rate_z = first(configuration, coordinate, velocity), first(configuration, coordinate, position_z)
@@ -152,6 +138,35 @@ def acceleration_sensitivity(
         )
         return (top - 2 * rate * mixed - rate_z * bend) / np.sqrt(norm2(span))
     return first(configuration, coordinate, acceleration_z)
+
+
+def _curved_sensitivity(
+    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
+    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+) -> Value:  # fmt: skip
+    """`acceleration_sensitivity` of an expression f of parts p.
+
+    f''_z = sum_i f_i p_i''_z + 2 sum_ij f_ij p_i' p_j'_z + sum_ij f_ij p_i'' p_j_z + sum_ijk f_ijk p_i' p_j' p_k_z
+    """
+    by_part = partial(_by_part, coordinate)
+    rate, shift = (by_part(partial(first, configuration, rates=rates)) for rates in (velocity, position_z))
+    rise, rate_z = (
+        by_part(partial(second, configuration, one=velocity, other=other, both=both))
+        for other, both in ((velocity, acceleration), (position_z, velocity_z))
+    )
+    rise_z = by_part(
+        partial(
+            acceleration_sensitivity, configuration, velocity=velocity, acceleration=acceleration,
+            position_z=position_z, velocity_z=velocity_z, acceleration_z=acceleration_z,
+        )
+    )  # fmt: skip
+    by_rise = _gradient_along(configuration, coordinate, rise)
+    total: Value = 0.0
+    for name, slope in _gradient_along(configuration, coordinate, rate, twice=True).items():
+        start, bends = Dual.parts(slope)
+        (gradient, bend), (_, twist), (_, rising) = map(Dual.parts, (start, bends, by_rise[name]))
+        total = total + gradient * rise_z[name] + 2 * bend * rate_z[name] + (rising + twist) * shift[name]
+    return _radians(coordinate, total)
 
 
 def _span(nodes: Sequence[Vector], coordinate: Coordinate) -> Vector:
@@ -175,16 +190,17 @@ def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
     return [partials.get(part.name, 0.0) for part in coordinate.parts]
 
 
-def _directional(coordinate: Coordinate, values: dict[str, Value], direction: list[Value]) -> list[Value]:
-    """Derivative of an expression's gradient along a direction, by a central difference of the exact gradient."""
-    fastest = largest(direction)
-    scale = largest(values.values(), 1.0)
-    # A pose that does not move takes any step: both sides are the same.
-    step = GRADIENT_STEP * scale / np.where(fastest > 0, fastest, 1.0)
-    sides = [
-        _gradient(
-            coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}
-        )
-        for h in (step, -step)
-    ]
-    return [(a - b) / (2 * step) for a, b in zip(*sides, strict=True)]
+def _by_part(coordinate: Coordinate, derivative: Callable[[Coordinate], Value]) -> dict[str, Value]:
+    """By name, a derivative of each part of an expression, in the units that its text expects."""
+    return {part.name: _user(part, derivative(part), coordinate) for part in coordinate.parts}
+
+
+def _gradient_along(
+    configuration: Configuration, coordinate: Coordinate, rate: Mapping[str, Value], *, twice: bool = False
+) -> dict[str, Any]:
+    """Gradient of an expression with its slope along a change of its parts, and with that of the slope if `twice`."""
+    assert coordinate.expression is not None
+    duals = {name: Dual(value, rate[name]) for name, value in configuration.user_values(coordinate).items()}
+    if twice:
+        duals = {name: Dual(dual, Dual(rate[name], 0.0)) for name, dual in duals.items()}
+    return coordinate.expression.derivatives(duals)

@@ -24,6 +24,8 @@ from mechdesign.mechanism.model import Description, Fixed, Link, Plates
 
 # Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
 PIN, THICKNESS = 0.4, 0.25
+# Ending of the columns of clearances, and the column of the smallest.
+CLEARANCE = "clearance"
 
 
 def points_of(link: Link) -> tuple[str, ...]:
@@ -112,7 +114,7 @@ class Pair:
     @property
     def name(self) -> str:
         """Column of their clearance."""
-        return f"{self.one.name}.{self.other.name}.clearance"
+        return f"{self.one.name}.{self.other.name}.{CLEARANCE}"
 
 
 def pairs_of(description: Description) -> list[Pair]:

@@ -91,7 +91,7 @@ def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Valu
         force: Vector = along * (apart * np.abs(effort / radius))
     else:
         place, along = mesh.contact(configuration)
-        force = along * (effort if mesh.slide >= 0 else effort / radius)
+        force = along * (effort * mesh.weight(configuration) if mesh.slide >= 0 else effort / radius)
         inside = np.logical_and(mesh.slide < 0, mesh.ratio(configuration) > 1)
         outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
         away = 1j * along * np.where(outwards != inside, 1.0, -1.0)

@@ -1,16 +1,17 @@
 """Wheels of couplings: the pitch circles that two gears, two pulleys or a pinion and its rack roll on.
 
-They follow from the ratio of two angles against the link that carries both axes (Willis), or from that of a slide to
-an angle. With the rates w of wheels a and b and of their carrier c, the distance e of the axes, and the rate v of a
-rack:
+They follow from the ratio of two angles against the link that carries both axes (Willis), or from that of slides to
+an angle against the link that carries the pinion, on which the rack slides or which slides on the rack. With the rates
+w of wheels a and b and of their carrier c, the distance e of the axes, and the rate v of a rack, both against c:
 
-    w_b - w_c = i (w_a - w_c),  r_a = |i| r_b,  r_a + r_b = e for i < 0, |r_a - r_b| = e for i > 0;   v = r w
+    w_b - w_c = i (w_a - w_c),  r_a = |i| r_b,  r_a + r_b = e for i < 0, |r_a - r_b| = e for i > 0;   v = r (w - w_c)
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +19,14 @@ from mechdesign.mechanism.algebra import Value, Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description
+from mechdesign.mechanism.model import Description, Prismatic
 from mechdesign.mechanism.outputs import pulled
 
-# Links of a mesh, its carrier and the nodes of its axes.
-Axes = tuple[tuple[str, str], str, tuple[int, int]]
+if TYPE_CHECKING:
+    from mechdesign.mechanism.core import Core
+
+# Links of a mesh, its carrier, the nodes of its axes, and of a rack a slide and its sense.
+Axes = tuple[tuple[str, str], str, tuple[int, int], int, float]
 # Rates that differ by less are one rate.
 SAME_RATE = 1e-9
 # Radius of the larger pulley of a belt, as a part of the distance of the axes.
@@ -38,13 +42,15 @@ class Mesh:
     coupling, index : str, int
         Name and number of the coupling, whose `gap` is zero.
     links : tuple of str
-        The link that follows, a wheel or what slides with a rack, then the wheel that it follows.
+        The link that follows, a wheel or a rack, then the wheel that it follows.
     carrier : str
-        The link that carries the axes, or the guide of a rack.
+        The link that carries the axes, or the pinion of a rack.
     axes : tuple of int
         Nodes of the axes of both wheels; of a rack a point of it.
     slide : int
-        The slide of a rack; -1 of two wheels.
+        A slide by which a rack moves against the carrier; -1 of two wheels.
+    sense : float
+        1 where the slide counts in the direction in which the rack moves by it, -1 where in the other.
     belt : bool
         Whether a belt joins the wheels.
     pressure_angle : float
@@ -60,6 +66,7 @@ class Mesh:
     carrier: str
     axes: tuple[int, int]
     slide: int
+    sense: float
     belt: bool
     pressure_angle: float
     radius: float
@@ -71,7 +78,14 @@ class Mesh:
 
     def ratio(self, configuration: Configuration) -> Value:
         """Rate of the link that follows per rate of the wheel, both against the carrier; of a rack a length."""
-        return _ratio(_rates(self.gap, configuration), self.links[1], self.carrier)
+        bodies, by_class = configuration.graph.bodies, _rates(self.gap, configuration)
+        if self.slide >= 0:
+            return -1.0 * by_class[bodies[self.links[1]][0]] / self.weight(configuration)
+        return _ratio(by_class, bodies[self.links[1]][0], bodies[self.carrier][0])
+
+    def weight(self, configuration: Configuration) -> Value:
+        """What the coupling's gap changes by for each unit of the rack's displacement."""
+        return pulled(configuration, self.gap, 1.0).slides[self.slide]
 
     def radii(self, configuration: Configuration) -> tuple[Value, Value]:
         """Radii of the pitch circles of both links; 0 of a rack."""
@@ -90,9 +104,7 @@ class Mesh:
         """Where the pitch circles touch, and the unit vector in which the link that follows moves there by its rate."""
         centre, ratio = configuration.nodes[self.axes[1]], self.ratio(configuration)
         if self.slide >= 0:
-            along = configuration.direction(
-                next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == self.slide)
-            )
+            along = self.sense * configuration.direction(_edge_of(configuration.graph, self.slide))
             return centre - 1j * along * ratio, along
         driven = configuration.nodes[self.axes[0]]
         way = (driven - centre) / np.abs(driven - centre)
@@ -122,52 +134,100 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
         given = description.couplings[coupling.name]
         if given.wheels == "none":
             continue
-        if coupling.follower.kind == "slide":
-            axes = _rack(description, graph, coupling)
-        else:
-            axes = _wheels(description, graph, coupling, drawn)
+        if not coupling.function.linear:
+            continue
+        slides = pulled(drawn, coupling.gap, 1.0).slides
+        axes = (_rack if slides else _wheels)(description, graph, coupling, drawn)
         if axes is not None:
-            links, carrier, nodes = axes
-            slide = coupling.follower.slide
-            equal = slide < 0 and abs(float(_ratio(_rates(coupling.gap, drawn), links[1], carrier)) - 1.0) < SAME_RATE
-            belt = given.wheels == "belt" or equal
-            looks = belt, given.pressure_angle, given.radius
-            wheels.append(Mesh(coupling.name, index, coupling.gap, links, carrier, nodes, slide, *looks))
+            mesh = Mesh(coupling.name, index, coupling.gap, *axes, False, given.pressure_angle, given.radius)
+            equal = not slides and abs(float(mesh.ratio(drawn)) - 1.0) < SAME_RATE
+            wheels.append(replace(mesh, belt=given.wheels == "belt" or equal))
     return wheels
 
 
-def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:
-    follower = coupling.follower
-    if follower.kind != "angle" or not coupling.function.linear:
+def pitch_radius(mechanism: Core, coupling: str, places: Mapping[str, Value]) -> Value | None:
+    """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
+
+    None where it is not known.
+    """
+    mesh = next((mesh for mesh in mechanism.pressing if mesh.coupling == coupling), None)
+    if mesh is None:
         return None
-    rates = _rates(coupling.gap, drawn)
-    others = [body for body in rates if body not in (follower.body, GROUND)]
+    # Where the carrier's frame is the world, its axes are where its points are.
+    graph, nodes = mechanism.graph, list(mechanism.sketch_configuration.nodes)
+    for axis in mesh.axes:
+        if (mesh.carrier, graph.nodes[axis]) in graph.points:
+            nodes[axis] = mechanism.geometry.place(mesh.carrier, graph.nodes[axis], places)
+    vectors = mechanism.geometry.vectors(places)
+    radii = mesh.radii(replace(mechanism.sketch_configuration, vectors=vectors, nodes=nodes))
+    follower = mechanism.couplings[mesh.index].follower.body
+    return dict(zip(mesh.links, radii, strict=True)).get(follower)
+
+
+def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:
+    follower, rates = coupling.follower, _rates(coupling.gap, drawn)
+    class_of = {body: frame for body, (frame, _) in graph.bodies.items()}
+    others = [body for body in pulled(drawn, coupling.gap, 1.0).bodies if body not in (follower.body, GROUND)]
     for driving in (*others, GROUND):
         for carrier in description.links:
             axes = _axis(graph, follower.body, carrier), _axis(graph, driving, carrier)
             if carrier in (follower.body, driving) or min(axes) < 0 or axes[0] == axes[1]:
                 continue
-            ratio = _ratio(rates, driving, carrier)
+            ratio = float(_ratio(rates, class_of[driving], class_of[carrier]))
             # Against the carrier nothing else may turn.
-            left = {body: float(rates.get(body, 0.0)) for body in {*others, carrier} - {GROUND}}
-            left[driving] = left.get(driving, 0.0) + float(ratio)
-            left[carrier] = left.get(carrier, 0.0) + 1.0 - float(ratio)
-            if all(abs(rate) < SAME_RATE for body, rate in left.items() if body != GROUND):
-                return (follower.body, driving), carrier, axes
+            rolling = {class_of[follower.body]: 1.0, class_of[carrier]: ratio - 1.0}
+            rolling[class_of[driving]] = rolling.get(class_of[driving], 0.0) - ratio
+            if _same(rates, rolling):
+                return (follower.body, driving), carrier, axes, -1, 1.0
     return None
 
 
-def _rack(description: Description, graph: Graph, coupling: Coupled) -> Axes | None:
-    angles = [part for part in coupling.function.parts if part.kind != "parameter"]
-    name = graph.slides[coupling.follower.slide]
-    if len(angles) != 1 or angles[0].kind != "angle" or name not in description.joints or not coupling.function.linear:
-        return None
-    wheel, (guide, *sliders) = angles[0], description.joints[name].links
-    axis = _axis(graph, wheel.body, guide)
-    if axis < 0 or wheel.reference != guide or not sliders:
-        return None
-    edge = next(edge for edge in graph.edges if edge.slide == coupling.follower.slide)
-    return (sliders[0], wheel.body), guide, (edge.head, axis)
+def _rack(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:
+    """A pinion on a carrier, against which the rack moves by the slides of the coupling, all along one line."""
+    rates, moved = _rates(coupling.gap, drawn), pulled(drawn, coupling.gap, 1.0)
+    class_of = {body: frame for body, (frame, _) in graph.bodies.items()}
+    first, *_ = moved.slides
+    for wheel in moved.bodies:
+        turning = float(rates[class_of[wheel]])
+        for carrier in description.links:
+            axis = _axis(graph, wheel, carrier)
+            if axis < 0 or turning == 0.0 or not _same(rates, {class_of[wheel]: turning, class_of[carrier]: -turning}):
+                continue
+            rack, senses = _along(description, graph, carrier, moved.slides)
+            lines = [
+                complex(sense * drawn.direction(_edge_of(graph, slide)) / moved.slides[slide])
+                for slide, sense in senses.items()
+            ]
+            if lines and all(abs(line - lines[0]) < SAME_RATE * abs(lines[0]) for line in lines):
+                last, sense = [*senses.items()][-1]
+                edge = graph.edges[_edge_of(graph, last)]
+                node = edge.head if sense > 0 else edge.tail
+                return (rack, wheel), carrier, (node, axis), first, senses[first]
+    return None
+
+
+def _along(
+    description: Description, graph: Graph, carrier: str, slides: Collection[int]
+) -> tuple[str, dict[int, float]]:  # fmt: skip
+    """The link to which slides lead from a carrier, one after the other, and the sense of each on this way.
+
+    There are no senses where they lead to no link.
+    """
+    link, senses = carrier, dict[int, float]()
+    joints = {slide: description.joints.get(graph.slides[slide]) for slide in slides}
+    while len(senses) < len(slides):
+        rest = [(k, j) for k, j in joints.items() if k not in senses and isinstance(j, Prismatic) and link in j.links]
+        if not rest:
+            return link, {}
+        slide, joint = rest[0]
+        senses[slide], link = (1.0, joint.slider) if joint.line.link == link else (-1.0, joint.line.link)
+    return link, senses
+
+
+def _same(rates: Mapping[int, Value], rolling: Mapping[int, float]) -> bool:
+    """Whether rates are those of rolling, by class of angles; the ground does not turn."""
+    classes = {*rates, *rolling} - {0}
+    return all(abs(float(rates.get(k, 0.0)) - rolling.get(k, 0.0)) < SAME_RATE for k in classes)
 
 
 def _axis(graph: Graph, wheel: str, carrier: str) -> int:
@@ -178,10 +238,19 @@ def _axis(graph: Graph, wheel: str, carrier: str) -> int:
     return nodes[0] if nodes else -1
 
 
-def _rates(gap: Coordinate, configuration: Configuration) -> dict[str, Value]:
-    """By link, the derivative of a coupling's gap with respect to the link's angle (radians)."""
-    return pulled(configuration, gap, 1.0).bodies
+def _edge_of(graph: Graph, slide: int) -> int:
+    return next(k for k, edge in enumerate(graph.edges) if edge.slide == slide)
 
 
-def _ratio(rates: Mapping[str, Value], driving: str, carrier: str) -> Value:
-    return 1.0 + rates.get(carrier, 0.0) if driving == GROUND else -1.0 * rates.get(driving, 0.0)
+def _rates(gap: Coordinate, configuration: Configuration) -> dict[int, Value]:
+    """By class of angles, the derivative of a coupling's gap with respect to the angle (radians)."""
+    rates: dict[int, Value] = {}
+    for body, rate in pulled(configuration, gap, 1.0).bodies.items():
+        frame = configuration.graph.bodies[body][0]
+        rates[frame] = rates.get(frame, 0.0) + rate
+    return rates
+
+
+def _ratio(rates: Mapping[int, Value], driving: int, carrier: int) -> Value:
+    """Ratio of wheels by the classes of the one that drives and of the carrier; class 0 is the ground's."""
+    return 1.0 + rates.get(carrier, 0.0) if driving == 0 else -1.0 * rates.get(driving, 0.0)

@@ -55,7 +55,7 @@ def test_several_words_and_one_that_nobody_knows(invoke):
     assert invoke("docs", "sweep", "GRI").stdout.count("GRI (") == 1
     done = invoke("docs", "sweep", "clearence")
     assert (done.exit_code, done.stdout) == (2, "")
-    assert "the reference has no 'clearence'; did you mean 'clearances'?" in done.stderr
+    assert "the reference has no 'clearence'; did you mean 'clearance'?" in done.stderr
 
 
 ARM = """\

@@ -6,6 +6,7 @@ import io
 import itertools
 import math
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -69,8 +70,13 @@ def test_everything_that_is_declared_is_made_with_its_mark(name):
     assert content.warnings == ()
 
 
+def test_every_file_is_told_of_on_its_page():
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "export.md").read_text(encoding="utf-8")
+    assert [name for name in exports() if f"`{name}`" not in page] == []
+
+
 def test_a_wrong_name_lists_those_there_are():
-    with pytest.raises(StudyError, match=r"nothing is exported as 'mechanism.dfx'; did you mean 'mechanism.dxf'"):
+    with pytest.raises(StudyError, match=r"there is no 'mechanism.dfx' to export; did you mean 'mechanism.dxf'"):
         export_named("mechanism.dfx")
 
 
@@ -218,7 +224,12 @@ def test_what_meets_in_any_layers_is_named_with_the_pose():
     stack = stack_of(view(FOUR_BAR, overrides={"mechanism.plates.links": both}))
     (warning,) = stack.cautions
     assert (warning.kind, stack.complete) == ("infeasible", True)
-    assert str(warning) == "whatever their layers, some links meet; here coupler and rocker (joined at B)"
+    assert str(warning) == "in whatever layers, something meets; here coupler and rocker (joined at B)"
+
+
+def test_a_hole_as_wide_as_its_link_is_refused():
+    with pytest.raises(StudyError, match="the pin 'A' has 8, and link 'coupler' is only 8 wide: its hole would cut"):
+        view(FOUR_BAR, overrides={"mechanism.plates.links.coupler.width": 8})
 
 
 def test_a_study_without_plates_or_motion_says_what_is_taken():

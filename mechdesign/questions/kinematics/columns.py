@@ -25,7 +25,7 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
      "as the input's length over the output's", "rate of the input/rate of the output"),
     ("<a>.<b>.clearance", "distance of the outlines of <a> and <b>, links or pins; where they overlap minus the depth",
      "length"),
-    ("clearance", "smallest of all clearances", "length"), VALID)  # fmt: skip
+    ("clearance", "smallest of all clearances between links, and between pins and links", "length"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",
     TIMED, DRIVE, GIVEN,
     ("<a>.<b>.x, <a>.<b>.y", "place of the instant centre of <a> and <b>; inf where one translates against the other",

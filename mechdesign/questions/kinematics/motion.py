@@ -17,13 +17,13 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates, first, second
-from mechdesign.mechanism.plates import Clearances
+from mechdesign.mechanism.plates import CLEARANCE, Clearances
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.columns import DRIVE, VALID, power_of_length
 from mechdesign.questions.kinematics.columns import MOTION
-from mechdesign.questions.kinematics.question import SMALLEST, MotionQuestion, characteristic_length
+from mechdesign.questions.kinematics.question import MotionQuestion, characteristic_length
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.targets import Error, errors, totals
 from mechdesign.questions.loads import Loading
@@ -106,7 +106,7 @@ class Motion:
         assert mechanism.description.plates is not None
         clearances = Clearances(mechanism, mechanism.description.plates, configuration)
         gaps = {name: clearances.of(pair.one, pair.other) for name, pair in self.question.pairs.items()}
-        gaps[SMALLEST] = np.minimum.reduce(np.broadcast_arrays(*gaps.values()))
+        gaps[CLEARANCE] = np.minimum.reduce(np.broadcast_arrays(*gaps.values()))
         for name, gap in gaps.items():
             self.put(name, rows, gap)
 
@@ -181,7 +181,9 @@ class Motion:
         gap = MOTION["<a>.<b>.clearance"]
         columns += [gap.column(arrays[name], label("length"), a=pair.one.name, b=pair.other.name)
                     for name, pair in question.pairs.items()]  # fmt: skip
-        columns += MOTION.columns(question.study.units.labels, **{SMALLEST: arrays[SMALLEST]}) if question.pairs else []
+        columns += (
+            MOTION.columns(question.study.units.labels, **{CLEARANCE: arrays[CLEARANCE]}) if question.pairs else []
+        )
         return [*columns, VALID.column(self.valid)]
 
     def pose_columns(self) -> list[Column]:

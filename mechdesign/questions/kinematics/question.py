@@ -16,7 +16,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import Linearization, mixes
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
-from mechdesign.mechanism.plates import Pair, pairs_of, plate_of
+from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import Friction
@@ -30,9 +30,6 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.loads import joints_of
-
-# Column of the smallest clearance.
-SMALLEST = "clearance"
 
 
 def characteristic_length(study: Study) -> float | None:
@@ -134,7 +131,7 @@ class MotionQuestion:
     @property
     def clearances(self) -> list[str]:
         """Columns of clearances: of every pair, and the smallest."""
-        return [*self.pairs, SMALLEST] if self.pairs else []
+        return [*self.pairs, CLEARANCE] if self.pairs else []
 
     @property
     def statics(self) -> list[Static]:

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 
 from mechdesign.errors import counted
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.plates import pins_of
+from mechdesign.mechanism.plates import CLEARANCE, pins_of
 from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.loads import Load, check_friction, check_loads
@@ -64,9 +64,9 @@ class KinematicsSection(MotionSection):
     collisions: Annotated[
         tuple[TwoLinks, ...] | None, BeforeValidator(_every_pair), fields.OrShort({"type": "boolean"})
     ] = None
-    """Whether clearances are reported, distances of the outlines of mechanism.plates, negative where they overlap; or
-    the pairs of links whose are. ``true``: of all links that no joint joins and whose layers, where given, are the
-    same, and of pins with links whose layer they pass. Example: true Example: [[crank, ground]]
+    """Pairs of links whose clearance is reported: the distance of their outlines by mechanism.plates, negative where
+    they overlap. ``true`` takes all links that no joint joins and whose layers, where both are given, are the same, and
+    pins with the links whose layers they pass. Example: true Example: [[crank, ground]]
     """
 
     def checked(self, checker: Checker) -> Self:
@@ -108,6 +108,9 @@ class KinematicsSection(MotionSection):
             checker.report(
                 path, "clearances are those of plates: give mechanism.plates, such as {width: 20}", at_key=True
             )
+        if CLEARANCE in checker.mechanism.coordinates:
+            message = f"{CLEARANCE!r} is the column of the smallest clearance: give what has this name another"
+            checker.report(path, message, at_key=True)
         self._check_pairs(checker, "collisions", "a clearance")
         pins = [] if checker.compiled is None else pins_of(checker.compiled.description)
         for index, pair in enumerate(self.collisions):

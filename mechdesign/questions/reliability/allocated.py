@@ -12,6 +12,7 @@ from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study import Study
 from mechdesign.study.text.document import plain
+from mechdesign.study.text.units import kind_of
 
 
 def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
@@ -62,9 +63,11 @@ def _dimension(raw: Any, tolerance: Tolerance, scale: float, study: Study) -> An
 
 def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:
     """A clearance with its radius or diameter times a factor, and the tolerance of that in proportion."""
-    key = "radial" if clearance.radial is not None else "diametral"
-    size = clearance.radius if clearance.radial is not None else 2.0 * clearance.radius
-    new = {**raw, key: _number(size * scale)}
+    size = _number(clearance.size * scale)
+    new = {**raw, clearance.kind: size}
+    if clearance.backlash is not None and kind_of(clearance.backlash) is not None:
+        # A length along a pitch circle is told from an angle by its unit.
+        new["backlash"] = f"{size:.12g} {tolerance.unit}"
     if isinstance(raw.get("tolerance"), list):
         new["tolerance"] = [_number(scale * end, 12) for end in clearance.tolerance]
     elif raw.get("tolerance") is not None and clearance.tolerance[1]:

@@ -45,8 +45,9 @@ class Tolerance:
     """The tolerance of one source, in the study's units; `cost` is None where it is not allocated but held.
 
     `given` is, by `kind`: half the width of a ``tolerance``, a ``sigma``, the standard deviation of ``measured``
-    values, or the mean radial ``clearance``. `middle` is the middle of a tolerance. `grades` maps the names of the
-    allowed standard grades onto half their widths, from the finest on; empty where any width is allowed.
+    values, or a ``clearance``: the mean radial one, or the backlash. `middle` is the middle of a tolerance. `grades`
+    maps the names of the allowed standard grades onto half their widths, from the finest on; empty where any width is
+    allowed.
     """
 
     name: str
@@ -104,8 +105,9 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         rows.append(Tolerance(scalar.name, half, 0.5 * (low + high), dimension.kind, scalar.unit or "", cost, grades))
     for pin in sources.pins:
         cost = costs.get(pin.name) if pin.radius > 0 else None
-        radius = float(pin.radius)
-        rows.append(Tolerance(pin.name, radius, 0.0, "clearance", study.units.label("length"), cost))
+        clearance = section.clearances[pin.name]
+        size = float(clearance.radius if clearance.backlash is None else clearance.backlash)
+        rows.append(Tolerance(pin.name, size, 0.0, "clearance", study.units.label(pin.quantity), cost))
     return rows
 
 

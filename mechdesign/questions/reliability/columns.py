@@ -46,7 +46,7 @@ CAPABILITY = TableKind.of("capability", "process capability of each limited outp
     ("ppm_high", "upper end of its interval, 99.7 %, where samples are counted"),
     ("unit", "unit of the five columns from lsl to sigma"), VALID)  # fmt: skip
 CONTRIBUTIONS = TableKind.of("contributions", "what the errors come from",
-    TIMED, GIVEN, ("source", "parameter, dimension, drive, or joint's clearance"), OUTPUT, ORDER,
+    TIMED, GIVEN, ("source", "parameter, dimension, drive, or clearance of a joint or coupling"), OUTPUT, ORDER,
     ("on", "links whose point the output is, where its pin has a clearance or gives; of several, midway"),
     ("sensitivity", "derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)", "",
      "d output/d source"), ("derivative", "the same for one unit of the source as the study counts it, in `unit`"),
@@ -85,7 +85,8 @@ ESTIMATE = TableKind.of("estimate", "probability of failure with the number of s
     ("failure_high", "upper end of its interval, 99.7 %, Clopper-Pearson"))  # fmt: skip
 ALLOCATION = TableKind.of("allocation", "the cheapest tolerances that reach what is asked",
     ("source", "what varies"),
-    ("kind", "tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one"),
+    ("kind",
+     "tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one, or the backlash"),
     ("given", "as the study gives it, in `unit`"), ("allocated", "the cheapest, in `unit`"),
     ("unit", "unit of the two columns before"),
     ("grade", "standard grade of ISO 286-1 that it is, half to either side; empty where it is held"),

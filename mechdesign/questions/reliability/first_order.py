@@ -195,11 +195,6 @@ def derivatives(
 
     `elastic` has these configurations, or the single nominal pose of all of them. `forces` are those of the
     configurations, and the derivatives of these are difference quotients.
-
-    Raises
-    ------
-    MechanismError
-        For the acceleration of a measure that is an expression.
     """
     # If only loads vary, the batch is the single nominal mechanism.
     slopes = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
@@ -246,7 +241,7 @@ def linear_errors(
     elastic: Elastic | None = None,
     forces: ForceModel | None = None,
 ) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations with fixed drives; raises as `derivatives`."""
+    """Linear error model at a flat batch of nominal configurations with fixed drives."""
     names, slopes = _directions(sources)
     by_name = derivatives(mechanism, configuration, channels, names, rates, elastic, forces)
     offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset

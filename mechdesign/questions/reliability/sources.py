@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -56,12 +56,14 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Pin:
-    """A clearance of a pin or a slide: its mean radius, and the law of its deviation.
+    """A clearance of a pin or a slide, or the backlash of a coupling: its mean radius, and the law of its deviation.
 
     `analytic` and `sampled` name the laws of its place for the analytic methods and for those that sample. The place
-    has two components: x and y of a pin, or the two ends of a slider. `directions` has, for each component that changes
+    has two components: x and y of a pin, or the two ends of a slider; a coupling, or a pin in a slot, has the first
+    alone. `directions` has, for each component that changes
     the geometry, the derivatives of the places: of the offsets of the pin's point in its link, of the link's length, or
-    of the slide's offset and angle. `kind` is ``offset``, ``length`` or ``slide``.
+    of the slide's offset and angle, or of the coupling's play. `kind` is ``offset``, ``length``, or ``slide`` of all
+    that lies between two ends. Its radius is a length, or an angle (radians) by its `quantity`.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Pin:
     sampled: str
     kind: str
     directions: tuple[Mapping[str, Number], ...]
+    quantity: Literal["length", "angle"] = "length"
 
     def take(self, rows: Sequence[int] | Ints) -> Pin:
         """At some of many poses."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
-from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
+from mechdesign.mechanism.model import MEASURED, Joint, Prismatic, play
+from mechdesign.mechanism.wheels import pitch_radius
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law
@@ -23,6 +25,7 @@ from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
 from mechdesign.questions.reliability.sources import Pin, Scalar, Sources, geometric
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.text.units import kind_of
 
 # Largest deviation, in radians or in sizes of the mechanism.
 MAX_DEVIATION = 1e6
@@ -80,7 +83,7 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
         words = f"{parameters} several dimensions together: {'; '.join(together)}"
         warnings.append(Caution("assumed", words))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
-    pins = tuple(_pin(study, name, clearance) for name, clearance in section.clearances.items())
+    pins = tuple(_pin(study, name, clearance, poses) for name, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(section, scalars))
     _check_sizes(sources)
     return sources, warnings
@@ -122,8 +125,9 @@ def _check_sizes(sources: Sources) -> None:
                 message = f"varies by more than {words}; look at its unit"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not np.max(pin.ends[1]) <= MAX_DEVIATION * size:
-            message = "is more than a million times the size of the mechanism; look at its unit"
+        allowed, words = most[pin.quantity]
+        if not np.max(pin.ends[1]) <= allowed:
+            message = f"is more than {words}; look at its unit"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 
 
@@ -149,13 +153,15 @@ def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Corr
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
-def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
+def _pin(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pin:
     if flaw := clearance.flaw():
         raise StudyError((study.problem(flaw, "reliability", "clearances", name),))
     joints, spread, radius = study.mechanism.description.joints, clearance.radius_spread, clearance.radius
     law = None if spread is None else spread.law(radius)
     if clearance.fit is not None:
         law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
+    if clearance.backlash is not None:
+        return _backlash(study, name, clearance, poses)
     kind = "slide" if name in joints else clearance.effect
     pin = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
     if kind == "slide":
@@ -164,6 +170,24 @@ def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
         raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
     moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
     return replace(pin, directions=tuple({place: 1.0} for place in moved))
+
+
+def _backlash(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pin:
+    """The play of a coupling, half its backlash to each side of its function."""
+    mechanism, section = study.mechanism, study.reliability
+    assert section is not None
+    moved = mechanism.description.places[play(name)]
+    slope: Number = 1.0
+    quantity: Literal["length", "angle"] = "angle" if moved.quantity == "angle" else "length"
+    if quantity == "angle" and kind_of(section.clearances[name].backlash) == "length":
+        radius = pitch_radius(mechanism, name, poses.places)
+        assert radius is not None
+        quantity, slope = "length", np.asarray(1.0 / radius, dtype=float)
+    factor = study.units.angle_factor if quantity == "angle" else 1.0
+    spread, size = clearance.radius_spread, factor * clearance.radius
+    law = None if spread is None else spread.law(size, factor)
+    laws = clearance.pin.analytic, clearance.pin.monte_carlo
+    return Pin(name, size, law, *laws, "slide", ({moved.name: slope},), quantity)
 
 
 def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...]:

@@ -180,11 +180,12 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
     names = np.array([source.name for source in task.sources.all])
-    pins, study = len(task.sources.pins), task.study
-    factors = np.array([scalar.factor for scalar in task.sources.scalars] + [1.0] * pins)
+    pins, study = [pin.quantity for pin in task.sources.pins], task.study
+    turned = [study.units.angle_factor if quantity == "angle" else 1.0 for quantity in pins]
+    factors = np.array([scalar.factor for scalar in task.sources.scalars] + turned)
     # A parameter without a known unit appears by its name in the derivative's unit.
     below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
-    below += [study.units.label("length")] * pins
+    below += [study.units.label(quantity) for quantity in pins]
     units = np.array(
         [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
     )

@@ -33,13 +33,14 @@ from mechdesign.mechanism.model import (
     Slot,
     Spring,
     Term,
+    play,
 )
 from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount
+from mechdesign.study.text.units import Amount, written
 
 # Of teeth as ISO 53 has them (radians).
 PRESSURE_ANGLE = np.radians(20.0)
@@ -397,7 +398,20 @@ def _plates(builder: Builder) -> Plates | None:
         if builder.reporter.check_name(name, builder.section.owners, "point", (*ROOT, *path, "pins", name),
                                        at_key=True):  # fmt: skip
             pins[name] = builder.place(f"plates.{name}.pin", diameter)
+    _check_holes(builder, given)
     return Plates(**lengths, widths=widths, pins=pins, layers=layers)
+
+
+def _check_holes(builder: Builder, given: models.Plates) -> None:
+    """Check that no hole of a given diameter is as wide as its link."""
+    for point, links in builder.section.owners.items():
+        diameter = given.pins.get(point, given.pin)
+        for link in links:
+            own = given.links.get(link)
+            width = given.width if own is None or own.width is None else own.width
+            if len(links) > 1 and diameter is not None and diameter >= width:
+                message = f"the pin {point!r} has {written(diameter)}, and link {link!r} is only {written(width)} wide"
+                builder.report(("plates",), f"{message}: its hole would cut the link through", at_key=True)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
@@ -430,6 +444,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
+        builder.place(play(name), 0.0, kind)
         couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
     return couplings
 

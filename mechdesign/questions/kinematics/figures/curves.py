@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
@@ -41,7 +42,7 @@ _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"  # of poses that are not valid
 # Kinds of panels in their order; a name has the same colour in all of its own.
 _ORDERS = ("velocity", "acceleration", "error", "effort")
-_RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
+_RANKS = ("position", *_ORDERS, "clearance", "det_J", "inverse_condition")
 _OF_ONE_COLOR = ("position", "velocity", "acceleration", "error")
 _STILL = 1e-9  # part of its size by which a column changes that does not change
 _FLAT = 0.05  # part of the range of a panel below which a curve that moves has another panel
@@ -177,7 +178,8 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
     outputs = section is not None and section.outputs
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): mechanism.size}
     # The condition of a single number is 1, that of each pose is for its table.
-    left_out = {"conditioning"} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
+    # The smallest clearance is that of one of the pairs.
+    left_out = {"conditioning", CLEARANCE} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
     groups: dict[tuple[str, str], list[_Curve]] = {}
     for column in table.columns:
         if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
@@ -188,6 +190,8 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
         of = column.name.removesuffix(f"_{order}")
         if column.name in _RANKS:
             order = of = column.name
+        elif column.name.endswith(f".{CLEARANCE}"):
+            order, of = "clearance", column.name.removesuffix(f".{CLEARANCE}")
         position = table.column(of) if of in table else None
         values = column.values if position is None else position.values
         if order in ("position", "velocity", "acceleration") and swept and _still(values - x, float(np.ptp(x))):

@@ -101,7 +101,7 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
 
 def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     """Step of each component, from its standard deviation `sigma` and from how far it moves the mechanism."""
-    length = sources.study.mechanism.size or 1.0
+    length, places = sources.study.mechanism.size or 1.0, sources.study.mechanism.description.places
     scale = np.full(len(sigma), length)
     for k, scalar in enumerate(sources.scalars):
         reach = [(1.0 if quantity == "angle" else length) / abs(float(slope))
@@ -109,9 +109,10 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
         scale[k] = min(reach, default=1.0)
     for k, pin in enumerate(sources.pins):
         first = len(sources.scalars) + 2 * k
-        # The end of a slider moves its offset, and turns it (the last of its places) by 1/length.
-        turn = abs(float([*pin.directions[0].values()][-1])) if len(pin.directions[0]) > 1 else 0.0
-        scale[first : first + 2] = min(length, 1.0 / turn) if turn else length
+        # The end of a slider moves its offset, and turns it by 1/length; the play of gears turns one of them.
+        turns = [abs(float(slope)) for place, slope in pin.directions[0].items()
+                 if place in places and places[place].quantity == "angle"]  # fmt: skip
+        scale[first : first + 2] = min([length, *(1.0 / turn for turn in turns)])
     steps = np.clip(_PART * sigma, _SHORTEST * scale, _LONGEST * scale)
     # Deflections are linear in the loads, and the longest step leaves the least rounding.
     loads = [k for k, scalar in enumerate(sources.scalars) if scalar.kind == "load"]

@@ -1,4 +1,4 @@
-"""Clearances of pins and slides, as the study file gives them."""
+"""Clearances of pins and slides, and backlash of couplings, as the study file gives them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
+from mechdesign.mechanism.model import play
+from mechdesign.mechanism.wheels import pitch_radius
 from mechdesign.questions.reliability.laws import FITS, LAWS
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
 from mechdesign.questions.reliability.schema.methods import METHODS
@@ -15,14 +17,19 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
+from mechdesign.study.text.units import kind_of
 
 HELP_PAGE = "theory/reliability"
 
 PIN_MODELS = {
-    "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
-    "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",
-    "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
-    "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
+    "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end, of a coupling "
+    "half its backlash",
+    "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls, of a coupling at "
+    "the flanks",
+    "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls, of a coupling "
+    "between the flanks",
+    "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other, of a "
+    "coupling at one flank or the other",
 }
 # Methods by the pin model that they take.
 BY_MOMENTS = ", ".join(method.name for method in METHODS.values() if method.pin == "analytic")
@@ -85,24 +92,35 @@ class PinModel(fields.Model):
 
 
 class Clearance(fields.Model):
-    """Clearance of a pin or slide: one of ``radial``, ``diametral`` and ``fit``. Coordinates of a pin's point are those
-    of the links in which it does not move; an output may name its link, coupler.P.x.
+    """Clearance of a pin or slide, one of ``radial``, ``diametral`` and ``fit``, or the ``backlash`` of a coupling.
+    Coordinates of a pin's point are those of the links in which it does not move; an output may name its link,
+    coupler.P.x.
     """
 
-    one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
+    one_of = (
+        "a clearance needs either 'radial' or 'diametral', a 'fit', or of a coupling its 'backlash'",
+        "radial", "diametral", "fit", "backlash",
+    )  # fmt: skip
     radial: fields.NonNegativeLength | None = None
     """Mean radial clearance: half the difference of the diameters; of a slide its play on either side. Example: 0.03"""
     diametral: fields.NonNegativeLength | None = None
     """Mean difference of the diameters of hole and pin. Example: 0.06"""
     fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
     """Fit of ISO 286-1 with its size in mm; tolerances of hole and shaft follow. Example: 20 H7/g6"""
+    backlash: fields.NonNegative | None = None
+    """Play of a coupling from one flank to the other: in the unit of the coordinate that follows, or of an angle as a
+    length along the pitch circle of its wheel. It lies to both sides of the function. Example: 0.1 deg Example: 0.08 mm
+    """
     tolerance: Tolerance = (0.0, 0.0)
-    """How far the clearance given (radial or diametral) deviates: a half-width, or the lowest and highest. A fit has
-    its own. Example: 0.01
+    """How far the clearance given (radial, diametral or backlash) deviates: a half-width, or the lowest and highest. A
+    fit has its own. Example: 0.01
     """
     distribution: Annotated[str, fields.choice(_LAWS, "distribution")] = "normal"
     """Distribution of the clearance over its tolerance; of a fit |LAWS_OF_FITS|."""
     pin: PinModel = PinModel()
+    """How a pin lies in its hole, a slider in its guide, or a coupling between its flanks. Left out: normal, and of a
+    coupling uniform. Example: normal_in_disc Example: {analytic: normal, monte_carlo: uniform}
+    """
     link: fields.LinkName | None = None
     """Link in which the pin moves. Left out: the last link at the joint that no output is said to be of. Example:
     forearm
@@ -116,11 +134,14 @@ class Clearance(fields.Model):
 
     @property
     def radius(self) -> float:
-        """Mean radial clearance, half the difference of the diameters."""
-        if self.radial is not None:
-            return self.radial
-        diametral = self.fit.diametral if self.fit is not None else self.diametral
-        return 0.0 if diametral is None else 0.5 * diametral
+        """Mean radial clearance, half the difference of the diameters or half the backlash."""
+        return self.size if self.radial is not None else 0.5 * self.size
+
+    @property
+    def size(self) -> float:
+        """What is given: the mean radial or diametral clearance, or the backlash."""
+        given = (self.radial, self.diametral, self.backlash, self.fit.diametral if self.fit is not None else None)
+        return next((size for size in given if size is not None), 0.0)
 
     @property
     def radius_spread(self) -> Dimension | None:
@@ -140,7 +161,8 @@ class Clearance(fields.Model):
         least = int(np.argmin(size + low))
         if size[least] + low[least] < -CLEARANCE_ROUNDING:
             size, low = ((1.0 if self.radial is not None else 2.0) * part[least] for part in (size, low))
-            return f"a clearance of {size:g} that is {-low:g} smaller is negative: such a pin does not go in its hole"
+            jams = "such a pin does not go in its hole" if self.backlash is None else "such teeth jam"
+            return f"a clearance of {size:g} that is {-low:g} smaller is negative: {jams}"
         return spread.flaw(self.radius)
 
 
@@ -148,10 +170,16 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, named: s
     """A clearance with the link that its pin moves in, not the one `named` by outputs; None without its joint."""
     path: KeyPath = ("reliability", "clearances", point)
     mechanism, report = checker.mechanism, checker.report
-    _check_radius(checker, clearance, path)
+    if point in mechanism.couplings:
+        return _check_backlash(checker, point, clearance, path)
+    if clearance.backlash is not None and point in (*mechanism.owners, *mechanism.slides):
+        message = "is the play of a coupling; of a pin or a slide give 'radial', 'diametral' or a 'fit'"
+        report((*path, "backlash"), message, at_key=True)
+    _check_radius(checker, clearance, path, "length")
     if point in mechanism.slides:
         return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
-    if not checker.check_name(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
+    names = [*mechanism.owners, *mechanism.slides, *mechanism.couplings]
+    if not checker.check_name(point, names, "point, slide or coupling", path, at_key=True):
         return None
     if clearance.length is not None:
         report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
@@ -182,10 +210,38 @@ def _check_slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath
     return clearance
 
 
-def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
-    """Check the variation of the clearance."""
+def _check_backlash(checker: Checker, coupling: str, clearance: Clearance, path: KeyPath) -> Clearance | None:
+    """The backlash of a coupling, uniform where the study does not say; None where that of a pin is given."""
+    for key in {"link", "effect", "length"} & clearance.model_fields_set:
+        checker.report((*path, key), f"the backlash of a coupling has no {key!r}; leave it out", at_key=True)
+    if clearance.backlash is None:
+        message = f"{coupling!r} is a coupling: give its play from one flank to the other as 'backlash'"
+        checker.report((*path, clearance.kind), message, at_key=True)
+        return None
+    place = checker.places.get(play(coupling))
+    if place is None:  # the coupling itself has a mistake
+        return None
+    kind: str = place.quantity
+    if kind == "angle" and kind_of(clearance.backlash) == "length":
+        kind = "length"
+        mechanism = checker.compiled
+        if mechanism is not None and pitch_radius(mechanism, coupling, {}) is None:
+            message = (
+                f"is a length along a pitch circle, and that of {coupling!r} is not known: its axes are on no common "
+                "link, or a belt has no 'radius'; give an angle"
+            )
+            checker.report((*path, "backlash"), message)
+    checker.kind((*path, "backlash"), kind)
+    _check_radius(checker, clearance, path, kind)
+    left_out = {"analytic", "monte_carlo"} - clearance.pin.model_fields_set
+    pin = clearance.pin.model_copy(update=dict.fromkeys(left_out, "uniform"))
+    return clearance.model_copy(update={"pin": pin})
+
+
+def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath, kind: str) -> None:
+    """Check the variation of the clearance, an angle or a length."""
     report = checker.report
-    checker.kind((*path, "tolerance"), "length")
+    checker.kind((*path, "tolerance"), kind)
     if clearance.fit is not None:
         if "tolerance" in clearance.model_fields_set:
             report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")

@@ -98,8 +98,8 @@ class ReliabilitySection(MotionSection):
     theta: 0.01}
     """
     clearances: dict[str, Clearance] = Field(default_factory=dict)
-    """Clearances of pins, by their point, and of slides, by their joint. Example: {E: {radial: 0.03, tolerance: 0.01,
-    pin: normal_in_disc}}
+    """Clearances of pins, by their point, and of slides, by their joint; backlash of couplings by their names.
+    Example: {E: {radial: 0.03, tolerance: 0.01, pin: normal_in_disc}, gears: {backlash: 0.1 deg}}
     """
     correlation: tuple[Annotated[Correlated, fields.Read(_correlation, _CORRELATION)], ...] = ()
     """Pairs of names in ``dimensions`` and the correlation coefficient of their deviations, between -1 and 1. Left out:
@@ -157,12 +157,12 @@ class ReliabilitySection(MotionSection):
         for index, method in enumerate(self.methods):
             if method in self.methods[:index]:
                 checker.report(("reliability", "methods", index), f"{method!r} is given twice")
-            slides = set(clearances).intersection(checker.mechanism.slides)
-            at_walls = sorted(name for name in slides if clearances[name].pin.monte_carlo == "contact")
+            ends = set(clearances).difference(checker.mechanism.owners)
+            at_walls = sorted(name for name in ends if clearances[name].pin.monte_carlo == "contact")
             if at_walls and (METHODS[method].step or METHODS[method].precise):
                 message = (
-                    f"what slides in {at_walls[0]!r} is at one wall or at the other, and {method} needs errors that "
-                    "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
+                    f"the play of {at_walls[0]!r} is at one end or at the other, and {method} needs errors that change "
+                    "gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
         if self.shown is not None and not any(METHODS[method].sampled for method in self.methods):
@@ -337,7 +337,7 @@ def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tup
     """Of each point with a clearance the link that its pin moves in, and those whose point its coordinates are."""
     joined: dict[str, tuple[str, list[str]]] = {}
     for point, clearance in (section.clearances if section is not None else {}).items():
-        if point in graph.slides:
+        if point in graph.slides or clearance.backlash is not None:
             continue
         joined[point] = clearance.link or "", [link for link in graph.links_at(point) if link != clearance.link]
     return joined
@@ -375,6 +375,8 @@ def in_words(section: ReliabilitySection | None, graph: Graph, sizes: Mapping[st
         if name in graph.slides:
             tilts = ", and tilts as its ends do" if clearance.length is not None else ""
             lines.append(f"clearance: the slider of {name} shifts across its line{tilts}")
+        if clearance.backlash is not None:
+            lines.append(f"clearance: the coupling {name} plays from one flank to the other by its backlash")
         if clearance.fit is not None:
             half = 0.5 * (clearance.fit.hole + clearance.fit.shaft)
             lines.append(
