@@ -243,8 +243,16 @@ _add(
     _export,
     "export",
     (
-        given.STUDY, given.TO, given.AT, given.RATE, given.PAPER, given.OUT_EXPORT, given.OVERRIDES, given.QUIET,
-        given.STRICT, given.ALLOW_FILES,
+        given.STUDY,
+        given.TO,
+        given.AT,
+        given.RATE,
+        given.PAPER,
+        given.OUT_EXPORT,
+        given.OVERRIDES,
+        given.QUIET,
+        given.STRICT,
+        given.ALLOW_FILES,
     ),
     "Write a file for other tools: parts to cut, a drawing, a simulator's model.",
     "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "

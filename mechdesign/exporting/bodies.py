@@ -1,14 +1,15 @@
 """The mechanism as rigid bodies for simulators: a tree of joints, the joints that close its loops, in SI units.
 
 Slides and clamps come first into the tree, then pins that are drives, then other pins; each joint that would close a
-loop stands among the `closures`. A pin in a slot is pinned to a block of its own that slides there. Where a slide closes
-a loop, such a block is clamped to its slider instead. A joint's coordinate is the angle of its child against its parent,
-or the displacement of its slide, so that every angle of a link is a sum of coordinates along the tree.
+loop stands among the `closures`. A pin in a slot is pinned to a block of its own that slides there. Where a slide
+closes a loop, such a block is clamped to its slider instead. A joint's coordinate is the angle of its child against its
+parent, or the displacement of its slide, so that every angle of a link is a sum of coordinates along the tree.
 """
 
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +22,10 @@ from mechdesign.cautions import Caution
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.forces import Forces, center
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Fixed, Mass, Prismatic
+from mechdesign.mechanism.model import Fixed, Mass, Prismatic, Spring
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.study.text.units import measure
 
@@ -31,6 +33,10 @@ from mechdesign.study.text.units import measure
 SMALL_MASS = 1e-2
 # Radius of gyration of a body without moment of inertia, as a part of the mechanism's size.
 GYRATION = 0.15
+# Natural frequency of a position servo on all masses of the mechanism (1/s).
+SERVO = 20.0
+# A side of a range that is left open (rad, m).
+OPEN = 1e6
 # A coefficient of a coordinate that is smaller is none.
 NONE = 1e-9
 
@@ -92,6 +98,20 @@ class Body:
     def local(self, place: complex) -> complex:
         """A place of the world in its frame."""
         return (place - self.origin) * self.turn.conjugate()
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A spring and damper between two points, or with `terms` on a sum of coordinates x, in SI units.
+
+    It pulls back with ``stiffness (x - rest) + damping x' + constant``, x without terms the distance of the points.
+    """
+
+    terms: Sum | None
+    stiffness: float
+    rest: float
+    damping: float
+    constant: float
 
 
 class Components:
@@ -189,6 +209,55 @@ class Bodies:
     def value(self, terms: Sum) -> float:
         """Value of a sum of coordinates in the pose that is shown."""
         return sum(rate * self.joints[name].value for name, rate in terms.items())
+
+    def range_of(self, bound: Bound, terms: Sum) -> tuple[float, float]:
+        """Range of the sum of joint coordinates that a limit bounds."""
+        coordinate = bound.coordinate
+        scale = self.scales.length if coordinate.quantity == "length" else 1.0
+        low, high = (
+            side * OPEN if end is None else scale * float(end)
+            for side, end in zip((-1, 1), bound.ends(self.mechanism.nominal), strict=True)
+        )
+        value = scale * float(self.view.pose.value(coordinate))
+        if bound.of_angle:
+            turn = TURN * round((value - (low + high) / 2) / TURN)
+            low, high = low + turn, high + turn
+        away = self.value(terms) - value
+        return low + away, high + away
+
+    def pull_of(self, spring: Spring) -> Pull:
+        """A spring and damper in SI units."""
+        scales, geometry = self.scales, self.mechanism.geometry
+        stiffness, free, preload, push, damping = (
+            float(geometry.term(term, {}))
+            for term in (spring.stiffness, spring.free, spring.preload, spring.push, spring.damping)
+        )
+        # Of a moment per radian, or of a force per length.
+        arm = scales.length if spring.turning else 1.0 / scales.length
+        pull = (preload - push) * scales.force * (arm if spring.turning else 1.0)
+        stiffness, damping = stiffness * scales.force * arm, damping * scales.force * scales.time * arm
+        terms, rest = None, free * scales.length
+        if spring.turning:
+            one, other = (self.angle(link) for link in spring.between)
+            terms = {name: other.get(name, 0.0) - one.get(name, 0.0) for name in {**other, **one}}
+            terms = {name: rate for name, rate in terms.items() if rate}
+            before, behind = (complex(self.view.pose.body_rotation(link)) for link in spring.between)
+            rest = self.value(terms) - math.remainder(cmath.phase(behind * before.conjugate()) - free, TURN)
+        if stiffness:
+            rest, pull = rest - pull / stiffness, 0.0
+        return Pull(terms, stiffness, rest, damping, pull)
+
+    @property
+    def free(self) -> bool:
+        """Whether the study gives efforts of the drives, so that motors move them; servos hold them elsewhere."""
+        section = self.view.study.dynamics
+        return section is not None and section.forward is not None
+
+    def servo(self, drive: Coordinate) -> tuple[float, float]:
+        """Stiffness and damping of a position servo, critically damped with all masses of the mechanism at its size."""
+        mass = sum(body.mass for name, body in self.bodies.items() if name != GROUND)
+        inertia = mass * (self.size**2 if drive.quantity == "angle" else 1.0)
+        return inertia * SERVO**2, 2 * inertia * SERVO
 
     def place(self, node: int) -> complex:
         """Place of a node in the world (m)."""
@@ -305,9 +374,7 @@ class Bodies:
             return complex(pose.body_rotation(self._blocks.get(body, (body, ""))[0]))
 
         def put(joint: Joint, value: float) -> None:
-            tree[joint.name] = Joint(
-                joint.name, joint.kind, joint.parent, joint.child, joint.place, joint.along, value
-            )
+            tree[joint.name] = Joint(joint.name, joint.kind, joint.parent, joint.child, joint.place, joint.along, value)
 
         for joint in [*tree.values()]:
             if joint.kind == "hinge":

@@ -55,9 +55,7 @@ def curve_csv(view: View) -> Content:
     outputs = expand_outputs(study, (*(asked or default_outputs(mechanism)), *points))
     names = dict.fromkeys([*given, *(output.name for output in outputs)])
     for coordinate in map(mechanism.coordinate, names):
-        values = np.broadcast_to(
-            in_study_units(study, coordinate, track.configuration.value(coordinate)), parts.shape
-        )
+        values = np.broadcast_to(in_study_units(study, coordinate, track.configuration.value(coordinate)), parts.shape)
         label = study.units.label(coordinate.quantity)
         columns.append(GIVEN.column(values, label, coordinate=coordinate.name))
     return Content(to_csv(Table("curve", tuple(columns))), view.unmoved)
@@ -133,7 +131,9 @@ class Timed:
         study, mechanism = self.study, self.study.mechanism
         poses = study_poses(study, self.section.command)
         if not poses.followed:
-            raise StudyError("listed poses and grids are no motion: give a 'sweep' of one coordinate, a path or a motion")
+            raise StudyError(
+                "listed poses and grids are no motion: give a 'sweep' of one coordinate, a path or a motion"
+            )
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         plan = mechanism.plan(poses.groups[0].names)
         curve = Curve(study, poses, followed_angles(mechanism, plan, drives))
@@ -143,8 +143,8 @@ class Timed:
         if not configuration.valid.all():
             row = int(np.argmin(configuration.valid))
             raise AssemblyError(
-                f"at {times[row]:.6g} {study.units.label('time')} ({pose_in_words(study, along, row)}) the motion has no "
-                "valid pose; a controller needs all of them"
+                f"at {times[row]:.6g} {study.units.label('time')} ({pose_in_words(study, along, row)}) the motion has "
+                "no valid pose; a controller needs all of them"
             )
         solved = SolvedPoses(np.arange(len(times)), poses.groups[0].names, configuration)
         rates = drive_rates(study, self.section, along, solved, mechanism.linearize(configuration))
@@ -187,10 +187,11 @@ class Timed:
         if any(self.section.accelerations.values()):
             raise StudyError("'accelerations' are those of single poses: give a 'motion' over time instead")
         if swept is None or not rates.get(swept) or any(rate for name, rate in rates.items() if name != swept):
-            moved = " and ".join(name for name, rate in rates.items() if rate) or "nothing"
+            rated = " and ".join(name for name, rate in rates.items() if rate) or "nothing"
+            moved = swept or " and ".join(poses.moving) or "nothing"
             raise StudyError(
-                f"'rates' move {moved}, while the poses move {swept or ' and '.join(poses.moving) or 'nothing'}: give a "
-                "rate of the one coordinate that is swept, or a 'motion' over time"
+                f"'rates' move {rated}, while the poses move {moved}: give a rate of the one coordinate that is "
+                "swept, or a 'motion' over time"
             )
         values = poses.along(line, places).values[swept]
         clock = (values - poses.values[swept][0]) / rates[swept]
@@ -212,4 +213,3 @@ def _forward(study: Study, step: float) -> Table:
     table = forward(moving, NULL)[0].tables["forward"]
     names = [(drive, *(f"{drive}_{word}" for word in ORDERS)) for drive in study.mechanism.drives]
     return Table("motion", tuple(table.column(name) for name in ("time", *sum(names, ()))))
-
