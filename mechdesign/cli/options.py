@@ -113,13 +113,13 @@ RATE = _text(
     str,
     "--rate",
     "RATE",
-    "Rate at which motion.csv tells where the drives are, e.g. '500 Hz', or a step of time, e.g. '2 ms'. Default: 1 kHz.",
+    "Rate at which motion.csv tells the drives, e.g. '500 Hz', or a step of time, e.g. '2 ms'. Default: 1 kHz.",
 )
 PAPER = _text(
     str,
     "--paper",
     "SIZE",
-    "Size of the drawing sheet sheet.pdf: A4 or A3. Default: A4, or A3 where a link has many numbers or little room.",
+    "Size of the drawing sheet sheet.pdf: A4 or A3. Default: A4, or A3 where the drawing would be crowded.",
 )
 AT = _text(
     str,
