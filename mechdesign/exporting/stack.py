@@ -100,7 +100,8 @@ class Stack:
 
 def stack_of(view: View) -> Stack:
     """The best stack of a study's plates over its motion; layers that the study gives are kept."""
-    return stacked(tuple(view.mechanism.description.links), meetings_of(view), view.plates.layers)
+    description = view.mechanism.description
+    return stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
 
 
 def meetings_of(view: View) -> list[Meeting]:
@@ -138,19 +139,20 @@ def _first(view: View, clearances: Clearances, one: Item, other: Item) -> str:
     return view.words(int(row[0])) if len(row) else ""
 
 
-def stacked(links: Sequence[str], meetings: Sequence[Meeting], given: Mapping[str, int]) -> Stack:
+def stacked(
+    links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
+) -> Stack:  # fmt: skip
     """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
-    search = _Search(links, meetings, given)
-    for count in range(max([1, *given.values()]), max([len(links), *given.values()]) + 1):
+    search, most = _Search(links, pins, meetings, given), max([len(links), *given.values()])
+    for count in range(max([1, *given.values()]), most + 1):
         layers = search.best(count)
         if layers is not None:
             return Stack(layers, complete=not search.spent)
         if search.spent:
             break
-    complete = not search.spent
-    layers = _Search(links, meetings, given, strict=False).best(max([len(links), *given.values()]))
+    layers = _Search(links, pins, meetings, given, strict=False).best(most)
     assert layers is not None
-    return Stack(layers, [meeting for meeting in meetings if meeting.broken(layers)], complete)
+    return Stack(layers, [meeting for meeting in meetings if meeting.broken(layers)], not search.spent)
 
 
 class _Search:
@@ -160,10 +162,10 @@ class _Search:
     """
 
     def __init__(
-        self, links: Sequence[str], meetings: Sequence[Meeting], given: Mapping[str, int], *, strict: bool = True
-    ) -> None:
-        self.given, self.strict, self.tried = given, strict, 0
-        self.pins = list({item.name: item for m in meetings for item in (m.one, m.other) if item.pin}.values())
+        self, links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int], *,
+        strict: bool = True,
+    ) -> None:  # fmt: skip
+        self.pins, self.given, self.strict, self.tried = pins, given, strict, 0
         self.of_link = {
             link: [meeting for meeting in meetings if link in (*meeting.one.links, *meeting.other.links)]
             for link in links
@@ -188,12 +190,7 @@ class _Search:
         self._least: tuple[int, int] | None = None
         self._found: dict[str, int] | None = None
         self._place(0, {}, 0, count)
-        return (
-            None if self._found is None else {link: self._found[link] for link in sorted(self._found, key=self._rank)}
-        )
-
-    def _rank(self, link: str) -> int:
-        return [*self.of_link].index(link)
+        return None if self._found is None else {link: self._found[link] for link in self.of_link}
 
     def _place(self, rank: int, layers: dict[str, int], broken: int, count: int) -> None:
         cost = broken, self._length(layers)

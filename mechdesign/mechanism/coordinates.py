@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -104,6 +104,14 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
             return Coordinate(name, "slide", "length", slide=slide)
     hint = suggestion(name, all_names(description, graph))
     raise MechanismError(f"'{name}' is not a coordinate of this mechanism{hint}", name)
+
+
+def leaves(coordinate: Coordinate) -> Iterator[Coordinate]:
+    """The coordinates of an expression, without its parameters; another coordinate itself."""
+    if coordinate.kind not in ("expression", "parameter"):
+        yield coordinate
+    for part in coordinate.parts:
+        yield from leaves(part)
 
 
 def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:

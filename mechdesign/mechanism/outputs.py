@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
@@ -69,29 +69,36 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Pulls:
     """Forces and moments whose work on any `rates` is ``effort * first(coordinate, rates)``: the adjoint of `first`."""
     pulls = Pulls({}, {}, {})
-    _pull(pulls, configuration, coordinate, effort)
+    for part, share in shares(configuration, coordinate, effort):
+        for node, force in node_forces(configuration, part, share):
+            pulls.nodes[node] = pulls.nodes.get(node, 0.0) + force
+        if part.kind == "slide":
+            pulls.slides[part.slide] = pulls.slides.get(part.slide, 0.0) + share
+        elif part.kind == "angle":
+            for body, moment in ((part.body, share), (part.reference, -1.0 * share)):
+                pulls.bodies[body] = pulls.bodies.get(body, 0.0) + moment
     return pulls
 
 
-def _pull(pulls: Pulls, configuration: Configuration, coordinate: Coordinate, effort: Value) -> None:
-    kind = coordinate.kind
-    if kind in ("x", "y", "distance"):
-        forces: list[tuple[int, Vector]] = [(coordinate.node, effort * (1.0 if kind == "x" else 1j))]
-        if kind == "distance":
-            span = _span(configuration.nodes, coordinate)
-            along = span * (effort / np.sqrt(norm2(span)))
-            forces = [(coordinate.other, along), (coordinate.node, -along)]
-        for node, force in forces:
-            pulls.nodes[node] = pulls.nodes.get(node, 0.0) + force
-    elif kind == "slide":
-        pulls.slides[coordinate.slide] = pulls.slides.get(coordinate.slide, 0.0) + effort
-    elif kind == "angle":
-        for body, moment in ((coordinate.body, effort), (coordinate.reference, -1.0 * effort)):
-            pulls.bodies[body] = pulls.bodies.get(body, 0.0) + moment
-    elif kind == "expression":
-        slopes = _gradient(coordinate, configuration.user_values(coordinate))
-        for slope, part in zip(slopes, coordinate.parts, strict=True):
-            _pull(pulls, configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
+def shares(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Iterator[tuple[Coordinate, Value]]:
+    """The `leaves` of a coordinate, with the effort on each; together they do the work of the effort."""
+    if coordinate.kind not in ("expression", "parameter"):
+        yield coordinate, effort
+    if coordinate.kind != "expression":
+        return
+    slopes = _gradient(coordinate, configuration.user_values(coordinate))
+    for slope, part in zip(slopes, coordinate.parts, strict=True):
+        yield from shares(configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
+
+
+def node_forces(configuration: Configuration, coordinate: Coordinate, effort: Value) -> list[tuple[int, Vector]]:
+    """Forces at nodes by an effort on an x, a y or a distance, in the order of its `ends`; none of another."""
+    if coordinate.kind == "distance":
+        span = _span(configuration.nodes, coordinate)
+        along = span * (effort / np.sqrt(norm2(span)))
+        return [(coordinate.node, -along), (coordinate.other, along)]
+    ways: dict[str, complex] = {"x": 1.0 + 0j, "y": 1j}
+    return [(coordinate.node, effort * ways[coordinate.kind])] if coordinate.kind in ways else []
 
 
 @quiet

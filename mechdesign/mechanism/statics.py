@@ -69,21 +69,30 @@ def balance(
         return held
     # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
     teeth = Forces(linear.configuration)
-    pressing = {}
+    borne = {}
     for mesh in meshes:
         effort = held.couplings[mesh.index]
         apart = 1.0 if pressed is None else np.sign(effort * pressed[mesh.index])
-        pressing[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
-    return replace(_balance(linear, forces.plus(teeth)), teeth=pressing)
+        borne[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
+    return replace(_balance(linear, forces.plus(teeth)), teeth=borne)
 
 
 def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Value) -> Vector:
-    """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
+    """Add the forces of a mesh to `teeth`; see `pressing`. Returns the force on the link that follows."""
+    place, force = pressing(mesh, teeth.configuration, effort, pressed, apart)
+    for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
+        teeth.on_body(link, sign * force, arm=place - teeth.configuration.nodes[teeth.bases[link]])
+    return force
+
+
+def pressing(
+    mesh: Mesh, configuration: Configuration, effort: Value, pressed: Value, apart: Value
+) -> tuple[Vector, Vector]:  # fmt: skip
+    """The force of a mesh on the link that follows, by an effort on this link, and a place on its line.
 
     Teeth press each other `apart` by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt
     only pulls, and its pretension is not known.
     """
-    configuration = teeth.configuration
     radius = mesh.radii(configuration)[0]
     if mesh.belt:
         # Its tight part pulls.
@@ -96,9 +105,7 @@ def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Valu
         outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
         away = 1j * along * np.where(outwards != inside, 1.0, -1.0)
         force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * away
-    for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
-        teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
-    return force
+    return place, force
 
 
 @quiet

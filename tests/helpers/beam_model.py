@@ -83,6 +83,13 @@ class Frame:
         u = direction / abs(direction)
         self._spring([(a, 0, u.real), (a, 1, u.imag), (b, 0, -u.real), (b, 1, -u.imag)], stiffness)
 
+    def couple(self, terms: list[tuple[int, int, float]], stiffness: float | None) -> None:
+        """A sum of displacements (node, axis, factor) is zero, or that of a spring."""
+        if stiffness is None:
+            self._constrain(*terms)
+        else:
+            self._spring(terms, stiffness)
+
     def _spring(self, terms: list[tuple[int, int, float]], stiffness: float) -> None:
         (number,) = self._deform(1)
         self._constrain(*terms, give={number: stiffness**-0.5})

@@ -6,20 +6,22 @@ is welded there, where it is in this pose, to the nearest place of these beams b
 stiff body, and so is an elastic one that has no two points for a beam to lie between. An elastic telescopic leg is a
 cantilever from its beginning, where its actuator and its bearing sit; a motor sits at the joint of its two links, or
 else at their first points; the bearing of a pin is between its two links, of a compound pin between each link and the
-pin, at a fixed pin between each link and the ground.
+pin, at a fixed pin between each link and the ground. A coupling without wheels keeps the sum of its coordinates' turns
+and slides; teeth keep the displacements of their wheels, discs welded to the links at their axes, along a line.
 """
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.model import Fixed, Link, Prismatic
-from mechdesign.questions.stiffness.schema import Profile
+from mechdesign.mechanism.model import Coupling, Fixed, Link, Prismatic
+from mechdesign.questions.stiffness.schema import CouplingStiffness, Profile
 from mechdesign.study import Study
 
 GROUND = "ground"
@@ -41,22 +43,35 @@ def stiffnesses(profile: Profile) -> tuple[float, float, float]:
     return profile.E * area, profile.E * inertia, shearing
 
 
+class Teeth(NamedTuple):
+    """Two wheels, each given by its link and axis, and the forces on the first by the other: place and size of each."""
+
+    wheels: tuple[tuple[str, str], tuple[str, str]]
+    pushes: tuple[tuple[complex, complex], ...]
+
+
 class Structure:
     """A mechanism in one pose of a batch (its `row`) as a frame; `asked` is the node whose compliance is asked."""
 
-    def __init__(self, study: Study, poses: Configuration, row: int = 0) -> None:
+    def __init__(self, study: Study, poses: Configuration, row: int = 0, teeth: dict[str, Teeth] | None = None) -> None:
         self.study, self.pose, self.frame = study, poses.take(np.array([row])), Frame()
         self.section, self.description = study.stiffness, study.mechanism.description
         self.nodes: dict[tuple[str, str], int] = {}  # of each link: at its points, and where each line's slider is
         self.there: dict[str, list[int]] = {}  # nodes at each point, before joints join them
         self.pins: dict[str, int] = {}  # each in the middle of what it joins
         self.clamps: list[tuple[int, int]] = []
+        self.guides: dict[str, tuple[int, int, complex]] = {}
         for link in self.description.links.values():
             self._link(link)
         self._joints()
         self.asked = self._pins()
         for name in self.description.drives:
             self._drive(name)
+        for name, coupling in self.description.couplings.items():
+            if name in (teeth or {}):
+                self._teeth(teeth[name], self.section.couplings.get(name))
+            else:
+                self._coupling(coupling, self.section.couplings.get(name))
 
     # Links.
 
@@ -170,6 +185,7 @@ class Structure:
 
     def _guide(self, name: str, a: int, b: int, along: complex) -> None:
         """A slide, its drive and its bearing."""
+        self.guides[name] = a, b, along / abs(along)
         drive = next((d for d in self.description.drives.values() if d.kind != "angle" and d.target == name), None)
         if drive is not None and drive.name in self.section.actuators:
             self.frame.sliding_spring(a, b, along, self.section.actuators[drive.name])
@@ -223,6 +239,44 @@ class Structure:
             self.frame.turning_spring(a, b, self.section.actuators[name])
         else:
             self.frame.turn_together(a, b)
+
+    def _teeth(self, teeth: Teeth, gives: CouplingStiffness | None) -> None:
+        """`force` is along the line of the teeth here."""
+        terms = []
+        for sign, (link, axis) in zip((1, -1), teeth.wheels, strict=True):
+            node = self.nodes[link, axis]
+            for place, push in teeth.pushes:
+                way, arm = sign * push, place - self.place(axis)
+                terms += [(node, 0, way.real), (node, 1, way.imag), (node, 2, (np.conj(arm) * way).imag)]
+        self.frame.couple(terms, None if gives is None else gives.force)
+
+    def _coupling(self, coupling: Coupling, gives: CouplingStiffness | None) -> None:
+        unit, names = coupling.of.angle_unit, sorted(coupling.of.names)
+        values = {
+            name: float(np.ravel(self.pose.value(self.study.mechanism.coordinate(name)))[0])
+            / (unit if name.endswith(".angle") else 1.0)
+            for name in names
+        }  # fmt: skip
+
+        def moved(name: str, step: float) -> float:
+            return float(coupling.of.evaluate(values | {name: values[name] + step}))
+
+        factors = {coupling.sets: 1.0}
+        for name in names:
+            slope = (moved(name, 1e-4) - moved(name, -1e-4)) / 2e-4
+            units = [unit if other.endswith(".angle") else 1.0 for other in (coupling.sets, name)]
+            factors[name] = -slope * units[0] / units[1]
+        terms = []
+        for name, factor in factors.items():
+            owner, _, kind = name.rpartition(".")
+            if kind == "angle":
+                a, b = self._ends(owner, GROUND)
+                terms += [(a, 2, factor), (b, 2, -factor)]
+                continue
+            guide, slider, along = self.guides[owner]
+            for node, way in ((slider, factor * along), (guide, -factor * along)):
+                terms += [(node, 0, way.real), (node, 1, way.imag)]
+        self.frame.couple(terms, None if gives is None else gives.moment or gives.force)
 
     def _ends(self, one: str, two: str) -> tuple[int, int]:
         """Where a motor holds two links: at the pin that joins them, themselves or what is clamped to them there."""

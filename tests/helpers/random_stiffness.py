@@ -50,6 +50,11 @@ class Sprung:
         for slide in some(slides, share):
             kinds = rng.choice([["radial"], ["moment"], ["radial", "moment"]])
             self.bearings[slide] = {kind: 10 ** rng.uniform(3, 5) for kind in kinds}
+        #: Of each coupling what it gives; some are rigid.
+        self.couplings = {
+            name: {"moment" if coupling.coordinate[0] == "angle" else "force": 10 ** rng.uniform(2, 4)}
+            for name, coupling in layout.couplings.items() if rng.random() < 0.6
+        }  # fmt: skip
         self.link, self.at = "", ""
         free = [point for point in pins if GROUND not in layout.owners(point)]
         if free and rng.random() < 0.3:
@@ -79,6 +84,7 @@ class Sprung:
             "elastic": named(self.elastic),
             "actuators": named(self.actuators),
             "bearings": named(self.bearings),
+            "couplings": named(self.couplings),
             "poses": [named(layout.pose(layout.drives))],
         }
         if self.link:

@@ -59,6 +59,14 @@ def test_compliance_is_that_of_finite_elements(case: Sprung) -> None:
 
 
 @pytest.mark.nightly
+@settings(max_examples=50)
+@given(sprung(coupled=True))
+def test_compliance_with_a_coupling_is_that_of_finite_elements(case: Sprung) -> None:
+    text = case.text()
+    agree(matrix(ask_stiffness(text), "C"), Structure(*posed(text)).compliance(), 1e-6)
+
+
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung())
 def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) -> None:

@@ -8,6 +8,7 @@ from helpers.gallery import meet, point, result_of, study_named, unit
 
 from mechdesign.mechanism.wheels import meshes
 from mechdesign.questions.dynamics.analysis import dynamics
+from mechdesign.questions.stiffness.analysis import stiffness
 from mechdesign.questions.workspace.analysis import workspace
 
 
@@ -134,6 +135,13 @@ def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
     assert point(motion, "T") == pytest.approx(point(motion, "P") + 30j, abs=1e-10)
     elbow = 200 * unit(motion["arm"])
     assert elbow + 150 * unit(motion["motor"]) == pytest.approx(point(motion, "P"), abs=1e-10)
+    spans = np.stack([elbow, 150 * unit(motion["motor"])]) * 1j
+    jacobians = np.stack([spans.real, spans.imag])
+    soft = np.array([1 / 2e6, 1 / 2e6 + 1 / (1000 * 20**2)])
+    compliance = stiffness(study_named("belt_scara")).tables["compliance"]
+    for (i, j), name in {(0, 0): "C11", (0, 1): "C12", (1, 1): "C22"}.items():
+        expected = np.einsum("kn,k,kn->n", jacobians[i], soft, jacobians[j])
+        assert compliance[name] == pytest.approx(expected, rel=1e-9)
     region = workspace(study_named("belt_scara"))
     area = float(region.main["area"][0])
     assert area == pytest.approx(4 * np.pi * 200 * 150, rel=1e-9)

@@ -53,11 +53,6 @@ def test_mistakes_are_named(coupling: str, message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_a_stiffness_is_refused() -> None:
-    with pytest.raises(StudyError, match=r"a mechanism with couplings \(mesh\) is not available"):
-        study_of(FIVE_BAR % "{set: g2, of: g1, ratio: 1}" + "stiffness: {at: B, actuators: {g1: 100}}\n")
-
-
 def test_a_phase_that_is_left_out_is_that_of_the_sketch() -> None:
     mechanism = five_bar("{set: g2, of: g1, ratio: -1.5}")
     drawn = np.degrees(np.arctan2(30, 17))

@@ -123,6 +123,30 @@ stiffness:
 """
 )
 
+# A geared five-bar, whose cranks bend under their teeth and its own motion.
+GEARED = """
+mechanism:
+  parameters: {ratio: -2, c: 5e3, k: 2e3, h: 15, pull: 50}
+  links:
+    ground: {O: [0, 0], C: [100, 0]}
+    one: [O, A, 30]
+    two: [C, D, 35]
+    left: [A, B, 80]
+    right: [D, B, 85]
+  drives: [one]
+  couplings: {gears: {set: two, of: one, ratio: ratio, phase: 80}}
+  sketch: {A: [30, 5], D: [117, 30], B: [50, 90]}
+stiffness:
+  at: B
+  sections: {bar: {E: 2e5, width: 10, height: h, density: 7850 kg/m^3}}
+  elastic: {one: bar, two: bar, right: bar}
+  actuators: {one: k}
+  couplings: {gears: {force: c, moment: 1e6}}
+  loads: [[0, pull], {at: D, force: [pull, 10]}]
+  dynamics: true
+dynamics: {poses: [{one: 15}, {one: 35}], rates: {one: 600 rpm}}
+"""
+
 
 def designs_of(text: str, *names: str, count: int = COUNT, width: float = 0.05) -> Designs:
     """Designs of a study about its own, in parameters or places."""
@@ -142,7 +166,8 @@ def designs_of(text: str, *names: str, count: int = COUNT, width: float = 0.05) 
     + [(PRESS, names.split()) for names in ("a", "i", "across", "tilt", "pin", "k", "load", "r", "sweep",
                                             "a i across tilt pin k load r sweep")]
     + [(FIVE_BAR, names.split()) for names in ("k", "x", "bore", "span", "k x bore span b")]
-    + [(PLATFORM, names.split()) for names in ("t", "k h", "t k h platform.B3.x")],
+    + [(PLATFORM, names.split()) for names in ("t", "k h", "t k h platform.B3.x")]
+    + [(GEARED, names.split()) for names in ("ratio", "c", "ratio c k h pull one.length")],
     ids=lambda given: None if isinstance(given, str) else "-".join(given),
 )  # fmt: skip
 def test_every_design_is_answered_as_if_it_were_asked_alone(text: str, names: Sequence[str]) -> None:

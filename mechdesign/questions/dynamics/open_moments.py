@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints, Reaction
@@ -34,18 +35,25 @@ def chain_network(joints: Joints, mechanism: Mechanism, section: StiffnessSectio
 
 
 def with_open_moments(
-    reactions: Sequence[Reaction], joints: Joints, applied: Applied, section: StiffnessSection, length: float
+    reactions: Sequence[Reaction], joints: Joints, applied: Applied, section: StiffnessSection, length: float,
+    efforts: Sequence[Value],
 ) -> list[Reaction]:  # fmt: skip
     """Reactions with the moments that elasticity determines; those of a chain in which nothing gives stay nan.
 
-    A radian counts as `length`.
+    A radian counts as `length`; `efforts` are those of the couplings, whose signs say which flanks of teeth press.
     """
     network, configuration = applied.network, applied.configuration
-    twists = twists_of(network, section, configuration, length, applied)
+    signs = [np.broadcast_to(np.sign(effort), configuration.shape) for effort in efforts]
+    sides = np.stack(signs, axis=-1) * network.one_sided if signs else None
+    twists = twists_of(network, section, configuration, length, applied, sides)
     # Poses that are not known are solved as if nothing moved.
     finite = np.isfinite(twists.twist).all(axis=(1, 2))
     twist, compliance = (np.where(finite, part.T, 0.0).T for part in (twists.twist, twists.compliance))
-    loaded = load(replace(twists, twist=twist, compliance=compliance), 3)
+    couplings = twists.couplings
+    if couplings is not None:
+        through, acting = (np.where(finite, part.T, 0.0).T for part in (couplings.through, couplings.acting))
+        couplings = replace(couplings, through=through, acting=acting)
+    loaded = load(replace(twists, twist=twist, compliance=compliance, couplings=couplings), 3)
     origin, completed = configuration.point(section.at), list(reactions)
     for position, contact in enumerate(joints.contacts):
         if contact.joint in joints.open and not contact.turns:

@@ -113,11 +113,13 @@ class ForceQuestion:
         columns, held = self._held(poses, linear, rows, moving)
         if self.subset is None or not self.subset.isdisjoint(self.forces):
             borne, stiffness = self._borne(held), self.study.stiffness
-            if self.subset is None and self.joints.open and stiffness is not None and self.friction is None:
+            if self.subset is None and self.joints.open and stiffness is not None and isinstance(held, Balance):
                 section = poses.section(stiffness, rows)
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
                 self.apply(applied, 0, poses, rows, moving)
-                borne = with_open_moments(borne, self.joints, applied, section, self.study.mechanism.size or 1.0)
+                borne = with_open_moments(
+                    borne, self.joints, applied, section, self.study.mechanism.size or 1.0, held.couplings
+                )  # fmt: skip
             for name, reaction in zip(self.forces, borne, strict=True):
                 columns |= self._parts(name, reaction) if self.subset is None else {name: np.abs(reaction.force)}
         return columns

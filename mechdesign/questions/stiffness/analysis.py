@@ -28,10 +28,10 @@ from mechdesign.questions.poses import (
     solve_poses,
     study_poses,
 )
-from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold, pushes
+from mechdesign.questions.stiffness.body import Body, ask, hold, pushes, under_loads
 from mechdesign.questions.stiffness.compliance import Held, put
+from mechdesign.questions.stiffness.effects import Effects, effects_of
 from mechdesign.questions.stiffness.elements import Guide, Hinge
-from mechdesign.questions.stiffness.force_method import Effects, effects_of
 from mechdesign.questions.stiffness.tables import (
     Springs,
     compliance_table,
@@ -185,8 +185,11 @@ def _drawn_pose(body: Body, poses: Poses, solved: Solved, pose: Pose | None) -> 
         return None
     row, configuration = pose
     body = body.at(poses, np.array([row]))
-    moved = by_forces(body, configuration, loads=True).displacements if body.given.wrenches else {}
-    twists = {vertex: (twist @ body.summed(configuration))[0] for vertex, twist in moved.items()}
+    parts = under_loads(body, configuration)[1] if body.given.wrenches else []
+    twists = {
+        vertex: np.concatenate([(part.displacements[vertex] @ applied)[0] for part, applied in parts], axis=1)
+        for vertex in (body.network.paths if parts else ())
+    }
     springs = solved.springs.take(solved.springs.row == row)
     return DrawnPose(body, row, configuration, springs, twists, pushes(body, configuration))
 
@@ -202,8 +205,8 @@ def solve(
     held = Held.unknown(poses.count, body.size)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
-    # Deflections under loads elsewhere are effects, too.
-    loads = len(body.given.wrenches) if effects or body.others else 0
+    # Deflections under loads elsewhere, and by the flanks of teeth that a load presses, are effects, too.
+    loads = len(body.given.wrenches) if effects or body.uneven else 0
     all_effects = Effects.unknown(body.network, poses.count, loads, body.size) if loads else None
     first: Pose | None = None
     loose: Pose | None = None
@@ -255,7 +258,7 @@ def tables(
     if legs is not None:
         makers["springs"] = lambda: springs_table(study, poses, [leg.name for leg in legs], solved.springs)
     if loads is not None:
-        moved = effects.moved if effects is not None and body.others else None
+        moved = effects.moved if effects is not None and body.uneven else None
         makers["deflections"] = lambda: deflections_table(study, poses, loads, soft, moved)
     if effects is not None:
         makers["forces"] = lambda: forces_table(study, poses, body.network, effects)
@@ -270,9 +273,16 @@ def _evaluate(
     body, configuration = batch
     if not effects:
         return *hold(body, configuration), None
-    loaded = by_forces(body, configuration, loads=True)
+    loaded, parts = under_loads(body, configuration)
     held, springs = (loaded.held, ()) if body.legs is None else hold(body, configuration)
-    return held, springs, effects_of(body.network, loaded, body.given.at, configuration, body.summed(configuration))
+    soft = loaded.held.compliance
+    return (
+        held,
+        springs,
+        Effects.joined(
+            [effects_of(body.network, part, body.given.at, configuration, applied, soft) for part, applied in parts]
+        ),
+    )
 
 
 class _Cautions:

@@ -7,7 +7,7 @@ that of three forces on each piece, at its Gauss points: what they do is of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -122,6 +122,15 @@ class Applied:
 
     def _all(self, place: Vector) -> Complexes:
         return np.broadcast_to(np.asarray(place, dtype=complex), self.configuration.shape)
+
+
+def borne(network: Network, vertices: Iterable[tuple[str, Wrench]], cases: int, origin: Complexes) -> Floats:
+    """Wrenches about an origin, shape (n, edges, 3, cases), on the edges from the ground to their vertices."""
+    through = np.zeros((len(origin), len(network.edges), 3, cases))
+    for vertex, wrench in vertices:
+        for k, sign in network.paths[vertex]:
+            through[:, k, :, wrench.case] += sign * wrench.about(origin).T
+    return through
 
 
 def _gauss(case: int, density: Density, piece: Piece) -> Iterator[tuple[Floats, Wrench]]:

@@ -24,6 +24,7 @@ from mechdesign.questions.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.questions.stiffness.legs import Leg, find_legs, hold_by_legs
 from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
+from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import Springs
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -88,6 +89,11 @@ class Body:
         wrenches = [wrench or (0.0, 0.0, 0.0) for wrench in self.section.wrenches]
         parts = np.broadcast_arrays(*(part for wrench in wrenches for part in wrench))
         return np.stack(parts, axis=-1).reshape(-1, len(wrenches), 3)
+
+    @property
+    def uneven(self) -> bool:
+        """Whether loads move the asked point by more than its compliance times the load on it; see `Effects.moved`."""
+        return bool(self.others) or any(self.network.one_sided)
 
     @property
     def others(self) -> list[int]:
@@ -169,6 +175,26 @@ def by_forces(body: Body, configuration: Configuration, *, loads: bool = False) 
     applied = _applied(body, configuration) if loads and body.others else None
     length = body.length(configuration)
     return load(twists_of(body.network, body.section, configuration, length, applied), body.size)
+
+
+def under_loads(body: Body, configuration: Configuration) -> tuple[Loaded, list[tuple[Loaded, Floats]]]:
+    """The body as `by_forces` has it with the study's loads; and how it is under these, with each load as in `summed`.
+
+    Under each load those flanks of teeth and strands of belts work that it presses or pulls.
+    """
+    loaded, applied = by_forces(body, configuration, loads=True), body.summed(configuration)
+    if not any(body.network.one_sided):
+        return loaded, [(loaded, applied)]
+    parts, length = [], body.length(configuration)
+    elsewhere = _applied(body, configuration) if body.others else None
+    for k in range(applied.shape[2]):
+        own = applied[:, :, k : k + 1]
+        effort, size = loaded.efforts @ own, np.abs(loaded.stress).max(axis=1, keepdims=True) @ np.abs(own)
+        # An effort that is rounding presses no flank.
+        sides = np.where(np.abs(effort) > RIGID * size, np.sign(effort), 0.0)[:, :, 0] * body.network.one_sided
+        twists = twists_of(body.network, body.section, configuration, length, elsewhere, sides)
+        parts.append((load(twists, body.size), own))
+    return loaded, parts
 
 
 def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[complex, complex, float]]]:

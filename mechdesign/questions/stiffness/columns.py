@@ -45,7 +45,7 @@ DISPLACEMENTS = TableKind.of("displacements", "displacements of all points under
     TIMED, GIVEN, LOAD, ("link", "link"), ("point", "its point"), ("x, y", "place without a load", "length"),
     ("dx, dy", "displacement", "length"))  # fmt: skip
 FORCES = TableKind.of("forces", "what the joints bear under the study's loads",
-    TIMED, GIVEN, LOAD, ("joint", "point or slide"),
+    TIMED, GIVEN, LOAD, ("joint", "point, slide or coupling"),
     ("on", "what the force acts on: a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several "
      "links ('pin:')"), ("by", "what exerts it; in a telescopic leg its rod, on the part at its first end"),
     ("fx, fy", "force on the one by the other, axes of the world", "force"),

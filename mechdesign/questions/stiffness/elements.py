@@ -218,7 +218,7 @@ def freedoms(
             yield from _bearing_freedoms(element, section, configuration, at)
         else:
             twist = (
-                slide_twist(_slide_direction(element.slide, configuration))
+                slide_twist(slide_direction(element.slide, configuration))
                 if isinstance(element, Guide)
                 else hinge_twist(configuration.point(element.point) - at)
             )
@@ -230,7 +230,7 @@ def _bearing_freedoms(
 ) -> Iterator[tuple[Floats, Value]]:
     """Twists and compliances of a joint's own displacements and rotation."""
     stiffness = section.bearings[bearing.name]
-    across = [1.0 + 0j, 1j] if bearing.slide is None else [1j * _slide_direction(bearing.slide, configuration)]
+    across = [1.0 + 0j, 1j] if bearing.slide is None else [1j * slide_direction(bearing.slide, configuration)]
     if stiffness.radial is not None:
         for direction in across:
             yield slide_twist(np.broadcast_to(direction, configuration.shape)), bearing.give / stiffness.radial
@@ -238,7 +238,7 @@ def _bearing_freedoms(
         yield hinge_twist(configuration.point(bearing.point) - at), bearing.give / stiffness.moment
 
 
-def _slide_direction(slide: int, configuration: Configuration) -> Complexes:
+def slide_direction(slide: int, configuration: Configuration) -> Complexes:
     """Unit vector of a slide of the graph in each pose, shape (n,)."""
     k = next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == slide)
     direction = configuration.direction(k)

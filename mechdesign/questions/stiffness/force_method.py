@@ -1,7 +1,8 @@
 """How a network of joints and beams holds one of its bodies, by the force method: forces first, then displacements.
 
 A_p and A_e are the twists of the free and the elastic joints around all loops; B_p and B_e those on the path to the
-asked body. A load w is in equilibrium with loop wrenches l where
+asked body. A coupling is one more row of A_p and A_e: how much its gap closes by each freedom, and by a freedom of its
+own where it gives; its entry of l is its effort. A load w is in equilibrium with loop wrenches and efforts l where
 
     A_p^T l = B_p^T w.
 
@@ -23,8 +24,9 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
-from mechdesign.questions.stiffness.applied import Applied
+from mechdesign.questions.stiffness.applied import Applied, borne
 from mechdesign.questions.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, scales, stiffness_of
+from mechdesign.questions.stiffness.couplings import Efforts, compliance_of, efforts_on
 from mechdesign.questions.stiffness.elements import beam_line, freedoms, piece_freedoms, screw_origin
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -77,6 +79,8 @@ class Twists:
         Length as which a radian counts.
     elsewhere : Elsewhere or None
         What loads that act anywhere do to edges and freedoms.
+    couplings : Efforts or None
+        What unit efforts on couplings do to edges and freedoms; None without couplings.
     """
 
     network: Network
@@ -87,6 +91,7 @@ class Twists:
     arm: Complexes
     length: Value
     elsewhere: Elsewhere | None = None
+    couplings: Efforts | None = None
 
     @property
     def scale(self) -> Floats:
@@ -102,11 +107,11 @@ class Loaded:
 
     Parameters
     ----------
-    stress : ndarray, shape (n, 3 loops, loads)
-        Wrenches of the loops under scaled unit loads, and under the others.
+    stress : ndarray, shape (n, 3 loops and couplings, loads)
+        Wrenches of the loops and efforts of couplings under scaled unit loads, and under the others.
     shift : ndarray, shape (n, freedoms, loads)
         Displacements in all freedoms under the same loads.
-    rigid : ndarray, shape (n, 3 loops, 3 loops), or None
+    rigid : ndarray, shape (n, 3 loops and couplings, as many), or None
         Projector onto the states of self-stress that store no energy; None where no pose has any.
     """
 
@@ -127,7 +132,7 @@ class Loaded:
         size, scale = self.size, self.twists.scale
         _, onward = _ways(self.twists.network)
         around = self._around(self.stress)
-        # The load on the edges of its path to the ground, less the wrenches of the loops.
+        # The load on the edges of its path to the ground, less the wrenches of the loops and couplings.
         through = onward[:, None, None] * np.eye(3)[:, :size] - around[..., :size]
         unscaled = through / scale[:, None, :, None] * scale[:, None, None, :size]
         units = np.asarray(self._back @ unscaled @ self._loads[:, None])
@@ -135,6 +140,17 @@ class Loaded:
             return units
         others = self.twists.elsewhere.through - around[..., size:] / scale[:, None, :, None]
         return np.concatenate([units, self._back @ others], axis=3)
+
+    @property
+    def efforts(self) -> Floats:
+        """Effort of each coupling on the coordinate that it sets, a column for each load, shape (n, couplings, loads).
+
+        A moment is divided by the length as which a radian counts.
+        """
+        size, (around, _) = self.size, _ways(self.twists.network)
+        efforts = self.stress[:, 3 * len(around) :]
+        units = (efforts[:, :, :size] * self.twists.scale[:, None, :size]) @ self._loads
+        return np.concatenate([units, efforts[:, :, size:]], axis=2)
 
     @cached_property
     def open_wrenches(self) -> Floats:
@@ -159,10 +175,15 @@ class Loaded:
         return twists_of_vertices
 
     def _around(self, stress: Floats) -> Floats:
-        """What each edge bears of the scaled wrenches of the loops that it is in, shape (n, edges, 3, loads)."""
+        """What each edge takes of the scaled wrenches of its loops and of couplings, shape (n, edges, 3, loads)."""
         around, _ = _ways(self.twists.network)
-        of_loops = stress.reshape(len(stress), len(around), 3, stress.shape[2])
-        return np.asarray(np.einsum("le,nlis->neis", around, of_loops))
+        rows = 3 * len(around)
+        of_loops = stress[:, :rows].reshape(len(stress), len(around), 3, stress.shape[2])
+        taken = np.asarray(np.einsum("le,nlis->neis", around, of_loops))
+        if self.twists.couplings is not None:
+            through = self.twists.couplings.through * self.twists.scale[:, None, :, None]
+            taken -= through @ stress[:, None, rows:]
+        return taken
 
     @property
     def _back(self) -> Floats:
@@ -178,9 +199,13 @@ class Loaded:
 
 def twists_of(
     network: Network, section: StiffnessSection, configuration: Configuration, length: Value,
-    applied: Applied | None = None,
+    applied: Applied | None = None, sides: Floats | None = None,
 ) -> Twists:  # fmt: skip
-    """Freedoms of all edges, and what loads do to them; a radian counts as `length`, one for all poses or each."""
+    """Freedoms of all edges and couplings, and what loads do to them; a radian counts as `length`, one for all poses or
+    each.
+
+    `sides` of couplings, shape (n, couplings), are those of `mechdesign.questions.stiffness.couplings`.
+    """
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
@@ -191,6 +216,10 @@ def twists_of(
     ]  # fmt: skip
     for edges in network.edges_along_beams:
         rows += _beam_freedoms(network, edges, section, configuration, origin, applied)
+    giving = [compliance_of(coupling, section, configuration, length) for coupling in network.transmissions]
+    first = len(rows)
+    rows += [(np.zeros((len(network.edges), 1)), np.zeros((3, 1)), soft, None, None)
+             for soft in giving if soft is not None]  # fmt: skip
     twist = np.zeros((n, 3, len(rows)))
     compliance = np.zeros((n, len(rows)))
     within = np.zeros((max((over.shape[1] for over, *_ in rows), default=1), len(network.edges), len(rows)))
@@ -199,13 +228,20 @@ def twists_of(
         twist[:, :, j] = np.broadcast_to(allowed, (3, n)).T
         if soft is not None:
             compliance[:, j] = soft
-    elsewhere = None
+
+    def put_on(through: Floats) -> Floats:
+        every = np.broadcast_to(within, (n, *within.shape[1:]))
+        return np.asarray(np.einsum("nej,neic,nij->njc", every, through, twist))
+
+    elsewhere = couplings = None
+    if network.transmissions:
+        through, teeth = efforts_on(network, configuration, origin, length, sides)
+        couplings = Efforts(through, put_on(through), teeth)
+        soft_ones = [k for k, soft in enumerate(giving) if soft is not None]
+        couplings.acting[:, first + np.arange(len(soft_ones)), soft_ones] = 1.0
     if applied is not None:
-        through = np.zeros((n, len(network.edges), 3, applied.cases))
-        for vertex, wrench in applied.vertices:
-            for k, sign in network.paths[vertex]:
-                through[:, k, :, wrench.case] += sign * wrench.about(origin).T
-        acting = np.einsum("nej,neic,nij->njc", np.broadcast_to(within, (n, *within.shape[1:])), through, twist)
+        through = borne(network, applied.vertices, applied.cases, origin)
+        acting = put_on(through)
         initial = np.zeros(acting.shape)
         for j, (*_, own, strain) in enumerate(rows):
             if own is not None and strain is not None:
@@ -214,7 +250,7 @@ def twists_of(
         elsewhere = Elsewhere(through, acting, initial)
     twist[:, 2] *= np.reshape(length, (-1, 1))
     free = np.array([soft is None for _, _, soft, *_ in rows], dtype=bool)
-    return Twists(network, twist, compliance, free, within, at - origin, length, elsewhere)
+    return Twists(network, twist, compliance, free, within, at - origin, length, elsewhere, couplings)
 
 
 def _beam_freedoms(
@@ -263,7 +299,10 @@ def load(twists: Twists, size: int) -> Loaded:
         path = (onward @ within)[:, None] * twist[:, :size]
         if others is not None:
             path = np.concatenate([path, others.acting[:, chosen].swapaxes(1, 2)], axis=1)
-        return loops.reshape(n, 3 * len(around), twist.shape[2]), path
+        loops = loops.reshape(n, 3 * len(around), twist.shape[2])
+        if twists.couplings is not None:
+            loops = np.concatenate([loops, -twists.couplings.acting[:, chosen].swapaxes(1, 2)], axis=1)
+        return loops, path
 
     compliance = twists.compliance[:, ~twists.free]
     initial = None if others is None else others.initial[:, ~twists.free]
@@ -431,63 +470,6 @@ def _held(compliance: Floats, statics: _Statics, length: Value, size: int) -> He
     return Held(stiffness / outer, compliance * outer, size - freedom, twist, statics.margin)
 
 
-@dataclass(frozen=True, eq=False)
-class Effects:
-    """Effects of loads in n poses.
-
-    Parameters
-    ----------
-    forces : ndarray, shape (n, joints, loads, 3)
-        Force and moment about the joint's place, exerted on the first body by the second; joints as in `joints_of`.
-    places : complex ndarray, shape (n, points)
-        Places without a load of the points that `points_of` lists.
-    moves : complex ndarray, shape (n, points, loads)
-        Displacements of these points.
-    moved : ndarray, shape (n, loads, size)
-        Displacement of the asked point by loads that do not act on it alone.
-    """
-
-    forces: Floats
-    places: Complexes
-    moves: Complexes
-    moved: Floats
-
-    @staticmethod
-    def unknown(network: Network, poses: int, loads: int, size: int) -> Effects:
-        """A record of effects to be filled, all nan."""
-        nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
-        forces, moved = np.full((poses, len(joints_of(network)), loads, 3), np.nan), np.zeros((poses, loads, size))
-        return Effects(forces, nowhere[:, :, 0].copy(), nowhere, moved)
-
-
-def joints_of(network: Network) -> list[int]:
-    """Numbers of the network's edges that are joints, not beams."""
-    return [k for k, edge in enumerate(network.edges) if not edge.beam]
-
-
-def points_of(network: Network) -> list[tuple[str, str, str]]:
-    """Link, point and vertex of every point of the moving links."""
-    return [(link, point, vertex) for link, points in network.points.items() for point, vertex in points]
-
-
 def moments_about(arm: Complexes, wrenches: Floats) -> Floats:
     """Moments, shape (n, loads), of wrenches (n, 3, loads) about a place at an arm (n,) from where they are taken."""
     return np.asarray(wrenches[:, 2] - (arm.real[:, None] * wrenches[:, 1] - arm.imag[:, None] * wrenches[:, 0]))
-
-
-def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configuration, applied: Floats) -> Effects:
-    """Effects of loads in a batch of poses, each a sum of those of `Loaded`, shape (n, its loads, loads)."""
-    size = loaded.size
-    origin = configuration.point(at)
-    effects = Effects.unknown(network, len(applied), applied.shape[2], size)
-    for row, k in enumerate(joints_of(network)):
-        wrench = loaded.wrenches[:, k] @ applied
-        moment = moments_about(configuration.point(network.edges[k].point) - origin, wrench)
-        effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
-    for row, (_, point, vertex) in enumerate(points_of(network)):
-        dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
-        effects.places[:, row] = configuration.point(point)
-        effects.moves[:, row] = dx + 1j * dy + 1j * turn * (effects.places[:, row] - origin)[:, None]
-    others = loaded.displacements[network.target][:, :size, size:] @ applied[:, size:]
-    effects.moved[:] = others.swapaxes(1, 2)
-    return effects

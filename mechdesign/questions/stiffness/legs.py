@@ -43,7 +43,9 @@ class Leg:
 
 
 def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
-    """The legs that carry the asked body, in the order of their `links`; None where they are not serial."""
+    """The legs that carry the asked body, in the order of their `links`; None where they are not serial, or coupled."""
+    if bodies.transmissions:
+        return None
     legs: list[tuple[int, Leg]] = []
     for piece in _pieces(bodies.carrying, bodies.target):
         ends = {end for edge in piece for end in (edge.a, edge.b)}

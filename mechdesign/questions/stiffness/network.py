@@ -18,10 +18,12 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.mechanism.coordinates import Coordinate, Coupled, leaves
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.statics import PIN
+from mechdesign.mechanism.wheels import Mesh
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -56,9 +58,27 @@ class NetworkEdge:
         return next((element for element in self.elements if isinstance(element, Beam)), None)
 
 
+@dataclass(frozen=True, eq=False)
+class Transmission:
+    """A coupling between bodies.
+
+    Parameters
+    ----------
+    mesh : Mesh or None
+        The wheels that press or pull each other; None of a coupling without wheels.
+    seats : mapping of str to tuple of str
+        Vertices of the wheel that follows and of the other, by the coupling's name; or by each coordinate of the gap
+        those of both links of an angle, of a slider and its guide, or of points.
+    """
+
+    coupling: Coupled
+    mesh: Mesh | None
+    seats: Mapping[str, tuple[str, ...]]
+
+
 @dataclass(frozen=True)
 class Bodies:
-    """Bodies of a mechanism and the edges that connect them.
+    """Bodies of a mechanism and the edges and couplings that connect them.
 
     Parameters
     ----------
@@ -77,14 +97,19 @@ class Bodies:
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str]
+    transmissions: tuple[Transmission, ...] = ()
 
     @cached_property
     def carrying(self) -> list[NetworkEdge]:
-        """Edges that can carry a load of the asked body: vertices with a single edge are removed, again and again."""
+        """Edges that can carry a load of the asked body: vertices with a single edge and no coupling are removed, again
+        and again.
+        """
         edges = list(self.edges)
+        coupled = {vertex for t in self.transmissions for seats in t.seats.values() for vertex in seats}
         while True:
             degree = Counter(end for edge in edges for end in (edge.a, edge.b))
-            loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, self.target)}
+            stays = {GROUND, self.target, *coupled}
+            loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in stays}
             if not loose:
                 return edges
             edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
@@ -112,6 +137,7 @@ def build_bodies(
 
     holder = graph.holder
     target = TARGET if link is None or link in section.elastic else holder(link, at)
+    loaded = {*loaded, *(graph.nodes[node] for c in mechanism.couplings for link, node in c.gap.ends if not link)}
     builder = _Builder(mechanism, section, target, loaded)
     holders: dict[str, list[str]] = {}
     for body, point in graph.points:
@@ -149,7 +175,8 @@ def build_bodies(
         builder.spring(spring, holders)
     for name in section.elastic:
         builder.beams(name)
-    return Bodies(tuple(builder.edges), target, link, builder.points(), builder.pins)
+    transmissions = builder.transmissions()
+    return Bodies(tuple(builder.edges), target, link, builder.points(), builder.pins, transmissions)
 
 
 @dataclass
@@ -250,6 +277,43 @@ class _Builder:
             beam = Beam(link, root, points[seat], section)
             self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, points[seat]))
 
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """The couplings, each with the vertices on which it acts."""
+        graph, wheels = self.mechanism.graph, {mesh.coupling: mesh for mesh in self.mechanism.meshes}
+        transmissions = []
+        for coupling in self.mechanism.couplings:
+            mesh = wheels.get(coupling.name)
+            if mesh is not None:
+                axes = zip(mesh.links, mesh.axes, strict=True)
+                seats = {coupling.name: tuple(self._on_link(link, graph.nodes[axis]) for link, axis in axes)}
+            else:
+                seats = {part.name: self._seats(part) for part in leaves(coupling.gap)}
+            transmissions.append(Transmission(coupling, mesh, seats))
+        return tuple(transmissions)
+
+    def _seats(self, part: Coordinate) -> tuple[str, ...]:
+        """Vertices on which an effort on a coordinate acts.
+
+        That on an angle acts at the pin that both links share, or else on each at its first point.
+        """
+        graph = self.mechanism.graph
+        if part.kind == "slide":
+            return next((edge.b, edge.a) for edge in self.edges if edge.name == graph.slides[part.slide])
+        if part.kind == "angle":
+            bodies = part.body, part.reference
+            one, other = ([p for body, p in graph.points if body == b and ":" not in p] for b in bodies)
+            shared = [point for point in one if point in other]
+            seats = (next(iter(shared or points), "") for points in (one, other))
+            return tuple(self._node(body, seat) for body, seat in zip(bodies, seats, strict=True))
+        ends = [(link, graph.nodes[node]) for link, node in part.ends]
+        return tuple(self._on_link(link, point) if link else self.pins[point] for link, point in ends)
+
+    def _on_link(self, link: str, point: str) -> str:
+        """The vertex of a link at a point; at its first point where that is the origin of its frame."""
+        if ":" in point:
+            return self._node(link, next(iter(self.mechanism.description.links[link].points), ""))
+        return self._node(self.mechanism.graph.holder(link, point), point)
+
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
         """Points of each moving link, with their vertices."""
         points = {}
@@ -331,6 +395,13 @@ class Network:
     loops: tuple[EdgePath, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str] = field(default_factory=dict)
+    transmissions: tuple[Transmission, ...] = ()
+
+    @cached_property
+    def one_sided(self) -> list[bool]:
+        """Of each coupling whether the sign of its effort says which flanks of teeth press, or which strand pulls."""
+        meshes = [transmission.mesh for transmission in self.transmissions]
+        return [mesh is not None and mesh.presses for mesh in meshes]
 
     @cached_property
     def edges_along_beams(self) -> tuple[tuple[int, ...], ...]:
@@ -417,4 +488,4 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
                 for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
-    return Network(edges, bodies.target, paths, tuple(loops), bodies.points, bodies.pins)
+    return Network(edges, bodies.target, paths, tuple(loops), bodies.points, bodies.pins, bodies.transmissions)

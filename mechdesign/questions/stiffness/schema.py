@@ -108,6 +108,24 @@ class Bearing(fields.Model):
         return self
 
 
+class CouplingStiffness(fields.Model):
+    """Stiffness of a coupling; a number alone is ``force``. What is given is in series."""
+
+    bare, short = "force", (fields.NUMBER_FORM,)
+    force: fields.PositiveNumber | None = None
+    """Force per displacement: of teeth along the pitch circles, of a belt or rack along it, of a slide or length that
+    follows a cam or a controller. Example: 2e4 N/mm
+    """
+    moment: fields.PositiveNumber | None = None
+    """Moment per radian of the angle that follows. Example: 1e4 N*m/rad"""
+
+    @model_validator(mode="after")
+    def _some(self) -> CouplingStiffness:
+        if not self.given("force", "moment"):
+            raise failure("a coupling that gives has a 'force' stiffness or, where an angle follows, one of 'moment'")
+        return self
+
+
 def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
     parts = {f"k{number}": read_number(entry, context) for number, entry in enumerate(fields.as_list(raw))}
@@ -164,6 +182,10 @@ class StiffnessSection(PoseSection):
     bearings: dict[fields.BearingName, Bearing] = Field(default_factory=dict)
     """Stiffness of pins (by their point) and slides (by their joint or telescopic link); others are rigid. Every link
     at a pin that gives has an end of it, rod.B. Example: {B: 1e5 N/mm, guide: {radial: 2e5 N/mm, moment: 1e6 N*m/rad}}
+    """
+    couplings: dict[fields.CouplingName, CouplingStiffness] = Field(default_factory=dict)
+    """Stiffness of each coupling that gives; others are rigid. Example: {gears: 5e4 N/mm, belt: 300 N/mm} Example:
+    {wrist: {moment: 1e4 N*m/rad}}
     """
     direction: fields.Angle | None = None
     """Angle from the world's x axis of the direction whose stiffness is k_direction. Left out: that column is not
@@ -223,10 +245,6 @@ class StiffnessSection(PoseSection):
     def checked(self, checker: Checker) -> Self:
         """Also check names, the units of stiffnesses, and loads."""
         root: KeyPath = ("stiffness",)
-        if checker.mechanism.couplings:
-            couplings = ", ".join(checker.mechanism.couplings)
-            message = f"a stiffness of a mechanism with couplings ({couplings}) is not available; leave out 'stiffness'"
-            checker.report(root, message, at_key=True)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))
         if right and GROUND in (owners[self.at] if self.bearer is None else [self.bearer]):
@@ -263,10 +281,31 @@ class StiffnessSection(PoseSection):
                 checker.kind((*path, "moment"), "rotational_stiffness")
                 if joint not in slides:
                     checker.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
+        self._check_couplings(checker)
         check_loads(checker, self.loads, (*root, "loads"), moving=False, timed=False)
         if self.dynamics:
             self._check_dynamics(checker)
         return super().checked(checker)
+
+    def _check_couplings(self, checker: Checker) -> None:
+        """Check names and units of stiffnesses of couplings, and that those along wheels have wheels."""
+        couplings, compiled = checker.mechanism.couplings, checker.compiled
+        for name, given in self.couplings.items():
+            path: KeyPath = ("stiffness", "couplings", name)
+            if not checker.check_name(name, couplings, "coupling", path, at_key=True):
+                continue
+            sets = checker.mechanism.coordinate_named(couplings[name].set_)
+            angle = checker.mechanism.coordinates.get(sets) == "angle"
+            if given.force is not None:
+                checker.kind((*path, "force"), "stiffness")
+                wheels = compiled is None or any(m.coupling == name and m.presses for m in compiled.meshes)
+                if angle and not wheels:
+                    message = "it has no pitch circles, and a belt no radius: give {moment: stiffness per radian}"
+                    checker.report(path, message)
+            if given.moment is not None:
+                checker.kind((*path, "moment"), "rotational_stiffness")
+                if not angle:
+                    checker.report((*path, "moment"), f"no angle follows, but {sets}: give a force per displacement")
 
     def _check_dynamics(self, checker: Checker) -> None:
         """Check that there is a section of that name, and that its rates are known at the poses."""

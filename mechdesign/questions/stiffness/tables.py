@@ -21,7 +21,7 @@ from mechdesign.questions.stiffness.columns import (
     STIFFNESS,
 )
 from mechdesign.questions.stiffness.compliance import Held, directional, scales
-from mechdesign.questions.stiffness.force_method import Effects, joints_of, points_of
+from mechdesign.questions.stiffness.effects import Effects, joints_of, points_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import principal
 from mechdesign.results import Column, Table, TableKind
@@ -137,14 +137,14 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats, o
 
 
 def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
-    """``forces.csv``: what every joint bears, a row for each pose, load and joint."""
-    edges = [network.edges[k] for k in joints_of(network)]
+    """``forces.csv``: what every joint bears, a row for each pose, load and joint, and of each for teeth or a belt."""
+    edges = (network.edges[k] for k in joints_of(network))
+    meshes = (transmission.mesh for transmission in network.transmissions if transmission.mesh is not None)
+    pairs = [(edge.name, _link(edge.a), _link(edge.b)) for edge in edges]
+    pairs += [(mesh.coupling, *mesh.links) for mesh in meshes if mesh.presses]
     count, joints, loads, _ = effects.forces.shape
     fx, fy, mz = effects.forces.swapaxes(1, 2).reshape(-1, 3).T
-    words = {
-        "joint": [edge.name for edge in edges], "on": [_link(edge.a) for edge in edges],
-        "by": [_link(edge.b) for edge in edges],
-    }  # fmt: skip
+    words = dict(zip(("joint", "on", "by"), zip(*pairs, strict=True), strict=True))
     tiled = {name: np.tile(texts, count * loads) for name, texts in words.items()}
     columns = FORCES.columns(study.units.labels, **tiled, fx=fx, fy=fy, mz=mz)
     return FORCES.table([*_of_loads(study, poses, loads, joints), *columns])

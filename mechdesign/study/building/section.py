@@ -331,9 +331,9 @@ class Coupling(fields.Model):
 
     wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
     """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
-    radius: fields.PositiveLength | None = None
+    radius: Annotated[float, fields.number("length", 0.0, exclusive=True, fixed=True)] | None = None
     """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
-    pressure_angle: fields.Angle | None = None
+    pressure_angle: Annotated[float, fields.number("angle", fixed=True)] | None = None
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
 
     @model_validator(mode="after")

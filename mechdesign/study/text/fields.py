@@ -54,7 +54,7 @@ class Context:
     """What numbers are read with: units, values of the parameters (nan where one is wrong) and those not known yet.
 
     `quantities` are the texts of parameters that have a unit; `used` gathers the names in expressions that were read,
-    `fixed` those in whole numbers, which are the same for every design.
+    `fixed` those in numbers that are the same for all designs that are answered together, such as whole numbers.
     """
 
     units: Units = field(default_factory=Units)
@@ -224,16 +224,20 @@ def reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
 
 
 def number(
-    kind: str | None = None, minimum: float | None = None, *, exclusive: bool = False, place: bool = False
-) -> Read:
+    kind: str | None = None, minimum: float | None = None, *, exclusive: bool = False, place: bool = False,
+    fixed: bool = False,
+) -> Read:  # fmt: skip
     """Annotation of a number: its kind in `units.KINDS`, if that is the same everywhere, and its least value.
 
-    It becomes an `Amount`. What is a `place` of the geometry judges the parameters in it by itself.
+    It becomes an `Amount`. What is a `place` of the geometry judges the parameters in it by itself. One that is `fixed`
+    is the same for all designs that are answered together.
     """
     smallest = MIN_LENGTH if kind == "length" else MIN_NUMBER
 
     def read(raw: Any, context: Context) -> Amount:
         size = read_number(raw, context, kind)
+        if fixed and size.expression:
+            context.fixed.update(size.expression.names)
         if kind and not place and size.expression and size.text:
             # Parameters in a place are checked by the geometry.
             _check_kind(size.text, kind)

@@ -1,0 +1,122 @@
+"""Couplings of a network: the wrenches by which they act on its vertices, and how much they give.
+
+An effort on the gap of a coupling does the work of these wrenches on any displacement of the network [virtual work]. Of
+gears and a rack they are the forces between their teeth, of a belt the pulls of its strands; of others the moments,
+forces along slides and forces at points whose work is that of the effort. A wheel is a rigid disc on its link at its
+axis, a rack at its joint's point.
+
+Which flank of the teeth, or strand of a belt, takes an effort depends on its sign. Those of a side 1 or -1 take it
+alone. A side 0 is their mean, which is linear: teeth that touch on both flanks, a belt whose pretension keeps both
+strands tight. Their mean is along the pitch circles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.outputs import node_forces, shares
+from mechdesign.mechanism.statics import pressing
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.questions.stiffness.applied import Wrench, borne
+from mechdesign.questions.stiffness.elements import slide_direction
+from mechdesign.questions.stiffness.network import Network, Transmission
+from mechdesign.questions.stiffness.schema import StiffnessSection
+
+
+@dataclass(frozen=True, eq=False)
+class Efforts:
+    """What unit efforts on the couplings of a network do in n poses; a radian counts as a length, which makes them
+    forces.
+
+    Parameters
+    ----------
+    through : ndarray, shape (n, edges, 3, couplings)
+        Wrench about the origin of the twists on each edge of the tree.
+    acting : ndarray, shape (n, freedoms, couplings)
+        What they put on each freedom, and on that of the coupling itself where it gives.
+    teeth : complex ndarray, shape (n, couplings)
+        Force of teeth or of a belt on the link that follows; 0 without wheels.
+    """
+
+    through: Floats
+    acting: Floats
+    teeth: Complexes
+
+
+@quiet
+def efforts_on(
+    network: Network, configuration: Configuration, origin: Complexes, length: Value, sides: Floats | None
+) -> tuple[Floats, Complexes]:
+    """Wrenches about an origin on each edge of the tree, and forces of teeth, of `Efforts`.
+
+    `sides` are those of each coupling in each pose, shape (n, couplings); None where all are 0.
+    """
+    vertices: list[tuple[str, Wrench]] = []
+    teeth = np.zeros((*configuration.shape, len(network.transmissions)), dtype=complex)
+    for case, transmission in enumerate(network.transmissions):
+        side = np.zeros(configuration.shape) if sides is None else sides[:, case]
+        wrenches = list(_wrenches(transmission, configuration, case, _unit(transmission, length), side))
+        vertices += wrenches
+        if transmission.mesh is not None:
+            # Those on the link that follows come first of each pair.
+            teeth[:, case] = sum(wrench.force for _, wrench in wrenches[::2])
+    return borne(network, vertices, len(network.transmissions), origin), teeth
+
+
+def compliance_of(
+    transmission: Transmission, section: StiffnessSection, configuration: Configuration, length: Value
+) -> Value | None:
+    """Compliance of a coupling to its unit effort; None where it is rigid."""
+    given = section.couplings.get(transmission.coupling.name)
+    if given is None:
+        return None
+    soft: list[Value] = []
+    if given.force is not None:
+        mesh = transmission.mesh
+        tangential: Value = 1.0
+        if mesh is not None:
+            racked = mesh.slide >= 0
+            tangential = mesh.weight(configuration) if racked else 1 / mesh.radii(configuration)[0]
+        soft.append(tangential**2 / given.force)
+    if given.moment is not None:
+        soft.append(1 / given.moment)
+    return sum(soft) * _unit(transmission, length) ** 2
+
+
+def _unit(transmission: Transmission, length: Value) -> Value:
+    """The effort that counts as a force of 1: a moment on an angle."""
+    return length if transmission.coupling.gap.quantity == "angle" else 1.0
+
+
+def _wrenches(
+    transmission: Transmission, configuration: Configuration, case: int, effort: Value, side: Floats
+) -> Iterator[tuple[str, Wrench]]:
+    """Wrenches on vertices by an effort on the gap of a coupling."""
+    mesh = transmission.mesh
+
+    def at(place: Vector, force: Vector, moment: Value = 0.0) -> Wrench:
+        return Wrench(case, np.broadcast_to(np.asarray(place, dtype=complex), configuration.shape), force, moment)
+
+    if mesh is not None:
+        follower, wheel = transmission.seats[mesh.coupling]
+        for way in (1.0, -1.0):
+            place, force = pressing(mesh, configuration, effort * (1 + way * side) / 2, way, way)
+            yield follower, at(place, force)
+            yield wheel, at(place, -1.0 * force)
+        return
+    for part, share in shares(configuration, transmission.coupling.gap, effort):
+        seats = transmission.seats[part.name]
+        for seat, (node, force) in zip(seats, node_forces(configuration, part, share), strict=False):
+            yield seat, at(configuration.nodes[node], force)
+        for seat, sign in zip(seats, (1.0, -1.0), strict=False):
+            if part.kind == "angle":
+                yield seat, at(0.0, 0.0, sign * share)
+            elif part.kind == "slide":
+                head = next(edge.head for edge in configuration.graph.edges if edge.slide == part.slide)
+                along = slide_direction(part.slide, configuration)
+                yield seat, at(configuration.nodes[head], sign * share * along)
