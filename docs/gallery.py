@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Container, Iterable
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -24,7 +25,7 @@ GROUPS = {
     "Straight lines": ("chebyshev", "hoeken", "hart", "peaucellier", "watt_parallel_motion", "pantograph",
                        "acrylic_leg"),
     "Gears, belts and cams": ("geared_five_bar", "planetary", "differential", "one_tooth_difference", "cycloidal_crank",
-                              "rack_slider", "parallel_gripper", "cam_dwell", "belt_scara"),
+                              "rack_slider", "parallel_gripper", "cam_dwell", "cam_arm", "belt_scara"),
     "Robots": ("five_bar", "two_rpr", "two_rrr", "two_rpr_printed", "two_rrr_printed", "robot_arm", "scara",
                "rrr_platform", "rrr_orientations"),
     "Reliability": ("two_link_arm", "two_link_arm_uniform", "slider_crank_tolerances", "function_generator_made",
@@ -75,6 +76,7 @@ def picture(folder: Path) -> Path | None:
     return next((found[name] for name in PICTURES if name in found), None)
 
 
+@cache
 def title(path: Path) -> str:
     """What a study is called."""
     return str(yaml.safe_load(path.read_text(encoding="utf-8")).get("name") or path.stem)

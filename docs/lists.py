@@ -213,6 +213,7 @@ def messages_page(known: Mapping[str, str]) -> str:
     return _page("Messages", parts)
 
 
+@cache
 def pages() -> dict[str, str]:
     """The texts of all pages by their paths in the folder of the site."""
     known = entries()

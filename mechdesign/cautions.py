@@ -28,6 +28,10 @@ KINDS = {
         "poses in which friction holds what the loads would move, as it shall in a screw, a wedge or a clamp",
         "howto/friction",
     ),
+    "cam": Kind(
+        "a cam that is undercut, does not close or has a large pressure angle, or whose follower lifts off",
+        "howto/gears_and_cams",
+    ),
     "disagree": Kind(
         "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
     ),

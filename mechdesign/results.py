@@ -137,7 +137,8 @@ class KeyNumber:
     table: TableKind
     column: str  #: its kind, by its declared name; empty: any
     label: str  #: with the words of the row, the column's `name` and its `meaning` at its places in braces
-    row: Literal["first", "each", "largest", "smallest", "size"] = "each"  #: size: the largest, whatever its sign
+    #: Size is the largest and least the smallest, whatever their signs.
+    row: Literal["first", "each", "largest", "smallest", "size", "least"] = "each"
     by: tuple[str, ...] = ()  #: columns of words of which each value counts by itself
     bounds: tuple[str, str] | None = None  #: columns of the ends between which it lies
     interval: str = "from {low} to {high}"

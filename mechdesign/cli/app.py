@@ -299,6 +299,23 @@ def new(
         emit(template_text(template) if template else template_text())
 
 
+@app.command("import", short_help="Make a study of another tool's file or share address.")
+def import_(
+    source: Annotated[str, given.SOURCE],
+    out: Annotated[Path | None, given.OUT_STUDY] = None,
+    drive: Annotated[list[str] | None, given.DRIVE] = None,
+    unit: Annotated[str | None, given.UNIT] = None,
+    scale: Annotated[float | None, given.SCALE] = None,
+) -> None:
+    """Make a commented study that runs of a mechanism that PMKS+, Linkage or pylinkage has saved, of tables of joints
+    and links, or of a DXF sketch. Nothing is fetched: a share address holds the whole mechanism.
+    """
+    with _guard():
+        from mechdesign.cli.importing import import_study
+
+        import_study(source, out, drive or (), unit, scale)
+
+
 def _words(incomplete: str) -> list[str]:
     """Commands and options that complete a word; completing keys of the study would take a second."""
     commands = _group().commands

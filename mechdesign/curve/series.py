@@ -18,6 +18,9 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 # A series is exact if its truncation error is less than this part of the function's size; near a singularity, where
 # functions have fewer digits, less than this part over the conditioning.
 EXACT = 2e-15
+# A truncation error below this part of the size, and not four times smaller in either half of the piece, is rounding,
+# as of a load that begins on a short way; no halving would make it smaller. Of a corner one half has none.
+ROUNDING = 1e-11
 # Error of means, as a part of the function's size.
 MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
@@ -104,6 +107,7 @@ class Series:
         self._scale = np.zeros((len(self.names), lines))
         self._divisor_scale = np.zeros((len(self.names), lines))
         best = np.full((2, len(self.names), lines), -np.inf)
+        before: Floats | None = None
         span = max(float(self.curve.poses.end), 1.0)
         while len(pending.line):
             spent += chebyshev.COUNT * np.bincount(pending.line, minlength=lines)
@@ -118,6 +122,9 @@ class Series:
             scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
             rest = chebyshev.remainder(chebyshev.series(values))
             rough = ~(rest <= exact * scale) & finite.any(axis=2)
+            if before is not None:
+                rounding = np.minimum(*np.split(rest, 2, axis=1)) > before / 4
+                rough &= ~(np.tile(rounding, 2) & (rest <= ROUNDING * scale))
             with np.errstate(invalid="ignore"):
                 steps = np.abs(np.diff(finite_values, axis=2))
                 steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
@@ -141,7 +148,7 @@ class Series:
             self.unresolved |= np.bincount(pending.line[halve], minlength=lines).astype(bool) & (spent > BUDGET)
             halve &= spent[pending.line] <= BUDGET
             done.append((pending.take(~halve), values[:, ~halve], divisors[:, ~halve], exact[~halve], rough[:, ~halve]))
-            pending = pending.take(halve).halves()
+            pending, before = pending.take(halve).halves(), rest[:, halve]
             if len(pending.line):
                 values, divisors, exact = self._sampled(pending)
         parts = list(zip(*done, strict=True)) if done else None

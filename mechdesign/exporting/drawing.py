@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 
 @dataclass(frozen=True)
@@ -197,6 +198,22 @@ def hull(places: Iterable[complex]) -> list[complex]:
 def _left(a: complex, b: complex, c: complex) -> float:
     """Twice the area of a triangle, positive counter-clockwise."""
     return ((b - a).conjugate() * (c - a)).imag
+
+
+def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], empty: float) -> tuple[complex, float]:
+    """The place for a name among the middles of `places` that is farthest from any hole, and that distance.
+
+    `holes` are centres and radii; without any the distance is `empty`.
+    """
+    holes = [*holes]
+    middles = [(a + b) / 2 for a, b in combinations(places, 2)] or [*places]
+    middles.append(sum(places) / len(places))
+
+    def room(place: complex) -> float:
+        return min((abs(place - center) - radius for center, radius in holes), default=empty)
+
+    place = max(middles, key=lambda middle: round(room(middle), 9))
+    return place, room(place)
 
 
 def around(layer: str, places: Iterable[complex], radius: float) -> Path | Circle:

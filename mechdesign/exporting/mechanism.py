@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around
+from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around, roomiest
 from mechdesign.exporting.dxf import to_dxf
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.svg import to_svg
@@ -32,6 +32,7 @@ def mechanism_drawing(view: View) -> Drawing:
     """Plates of all links in the pose, their pins, and the paths of moving points over the motion."""
     mechanism, scale = view.mechanism, view.millimetres
     description, sizes = mechanism.description, view.sizes
+    pinned = joined(description)
     groups: dict[str, list[Shape]] = {}
     letters = max(SMALLEST, LETTERS * scale * mechanism.size)
     for link in description.links:
@@ -42,10 +43,11 @@ def mechanism_drawing(view: View) -> Drawing:
             if slot.link == link:
                 ends = [scale * place for place in view.in_world(link, slot.ends)]
                 shapes.append(around("links", ends, scale * float(sizes.pin(slot.point))))
-        middle = sum(outline) / len(outline)
+        pins = [(scale * complex(view.pose.point(point)), scale * float(sizes.pin(point))) for point in pinned]
+        middle, _ = roomiest(outline, pins, radius)
         shapes.append(Text("notes", middle, min(0.6 * radius, letters), link, centred=True))
         groups[link] = shapes
-    for point in joined(description):
+    for point in pinned:
         place = scale * complex(view.pose.point(point))
         groups[f"pin {point}"] = [
             Circle("links", place, scale * float(sizes.pin(point))),

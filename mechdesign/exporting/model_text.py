@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement
 
 from mechdesign import __version__
@@ -31,7 +32,7 @@ def planar(place: complex) -> str:
     return numbers(round(place.real, DECIMALS), round(place.imag, DECIMALS), 0.0)
 
 
-def comment(words: Iterable[str]) -> Element:
+def comment(words: Iterable[str]) -> Any:
     """Lines as a comment, in which no two hyphens follow each other."""
     return Comment("".join(f"\n  {line.replace('--', '- -')}" for line in words) + "\n")
 

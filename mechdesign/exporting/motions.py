@@ -116,7 +116,7 @@ def _instants(end: float, step: float) -> Floats:
     count = int(end / step * (1 + ROUNDING)) + 1
     if count > MOST_INSTANTS:
         raise StudyError(f"{count} instants; at most {MOST_INSTANTS} are possible: ask for a lower --rate")
-    return step * np.arange(count)
+    return np.asarray(step * np.arange(count), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

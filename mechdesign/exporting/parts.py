@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, hull
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, hull, roomiest
 from mechdesign.exporting.dxf import to_dxf
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.svg import to_svg
@@ -78,17 +78,10 @@ class Part:
 
     def _name(self, turn: complex) -> list[Text]:
         """Its name, where most room is between the holes."""
-        corners = [turn * place for place in self.places]
         holes = [(turn * end, hole.radius) for hole in self.holes for end in _along(hole.ends)]
-        middles = [(a + b) / 2 for a, b in combinations(corners, 2)] or corners
-        middles.append(sum(corners) / len(corners))
-
-        def room(place: complex) -> float:
-            return min((abs(place - center) - radius for center, radius in holes), default=self.radius)
-
-        place = max(middles, key=lambda middle: round(room(middle), 9))
+        place, room = roomiest([turn * place for place in self.places], holes, self.radius)
         share, least, most = ENGRAVED
-        height = min(2 * share * self.radius, most, 1.6 * room(place) / (0.65 * max(len(self.name), 1)))
+        height = min(2 * share * self.radius, most, 1.6 * room / (0.65 * max(len(self.name), 1)))
         return [Text("engrave", place, height, self.name, centred=True)] if height >= least else []
 
 

@@ -84,7 +84,7 @@ def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[s
     yield "pins", _pins(view)
     if result is None:
         return
-    rows = [("motion", "from", "to", "range", "unit")]
+    rows: list[tuple[str, ...]] = [("motion", "from", "to", "range", "unit")]
     poses = result.tables["motion"]
     for name in view.mechanism.drives:
         if name in poses.names:

@@ -26,7 +26,7 @@ from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.model import Friction
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import PIN, Balance, Joints, Reaction, balance, reactions
-from mechdesign.mechanism.wheels import Mesh
+from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Members whose relative rate is below this part of the fastest in the mechanism do not move against each other.
@@ -126,9 +126,9 @@ class Rubs:
 
     def __init__(
         self, joints: Joints, contacts: Sequence[Rubbing], linear: Linearization, forces: Forces,
-        meshes: Sequence[Mesh], size: float,
+        engaged: Sequence[Engagement], size: float,
     ) -> None:  # fmt: skip
-        self.joints, self.contacts, self.linear, self.forces, self.meshes = joints, contacts, linear, forces, meshes
+        self.joints, self.contacts, self.linear, self.forces, self.engaged = joints, contacts, linear, forces, engaged
         self.size, geometry = size or 1.0, linear.geometry
         self.shape = linear.configuration.shape
         places = linear.configuration.places
@@ -166,7 +166,7 @@ class Rubs:
     @cached_property
     def _free(self) -> tuple[Complexes, Complexes]:
         """What the contacts bear without friction, and its slopes."""
-        held = balance(self.linear, self.forces, self.meshes)
+        held = balance(self.linear, self.forces, self.engaged)
         return self._borne(held), self._slopes(held)
 
     @quiet
@@ -179,16 +179,16 @@ class Rubs:
         for _ in range(ROUNDS):
             system = _System(borne - np.einsum("jwkn,kn->jwn", slopes, friction), slopes, strength, self.weights)
             friction, jams, apart = system.solve(relative)
-            held = balance(self.linear, self.forces.plus(self._acting(friction)), self.meshes)
+            held = balance(self.linear, self.forces.plus(self._acting(friction)), self.engaged)
             borne, told = self._borne(held), system.borne(friction)
             wrong = np.abs(borne - told).max(axis=(0, 1)) > 1e-9 * np.abs(borne).max(axis=(0, 1))
-            if not self.meshes or not wrong.any():
+            if not self.engaged or not wrong.any():
                 break
             slopes = self._slopes(held)
         else:
             friction[:, wrong] = np.nan
             jams[wrong] = np.abs(system.strength).argmax(axis=0)[wrong]
-            held = balance(self.linear, self.forces.plus(self._acting(friction)), self.meshes)
+            held = balance(self.linear, self.forces.plus(self._acting(friction)), self.engaged)
         friction, relative = (values.reshape(len(self.contacts), *self.shape) for values in (friction, relative))
         return Rubbed(held, friction, relative, jams.reshape(self.shape), apart.reshape(self.shape))
 
@@ -210,7 +210,7 @@ class Rubs:
         slopes = np.empty((count, self.weights.shape[1], count, size), dtype=complex)
         for k, unit in enumerate(np.eye(count)):
             alone = self._acting(np.broadcast_to(unit[:, None], (count, size)))
-            slopes[:, :, k] = self._borne(balance(self.linear, alone, self.meshes, pressed=held.couplings))
+            slopes[:, :, k] = self._borne(balance(self.linear, alone, self.engaged, pressed=held.couplings))
         return slopes
 
     def _borne(self, held: Balance) -> Complexes:

@@ -94,7 +94,8 @@ class Graph:
         return [self.nodes[node] for node in dict.fromkeys(ends) if ":" not in self.nodes[node]]
 
 
-def _turns_of(line: Line) -> tuple[Turn, ...]:
+def turns_of(line: Line) -> tuple[Turn, ...]:
+    """From the x axis of a line's link to the line."""
     if line.toward is not None and line.through is not None:
         return (Turn(1, towards=(line.link, line.through, line.toward)),)
     return (Turn(1, line.direction),) if line.direction != 0.0 else ()
@@ -176,7 +177,7 @@ def build_graph(description: Description) -> Graph:
         seats += [(1, joint.slider, joint.point)] if isinstance(joint, Prismatic) else []
         lines.append((joint.name, line, joint.point, tuple(seats)))
         if isinstance(joint, Prismatic):
-            ties.append((line.link, joint.slider, (*_turns_of(line), Turn(1, joint.angle))))
+            ties.append((line.link, joint.slider, (*turns_of(line), Turn(1, joint.angle))))
 
     for name, joint in description.joints.items():
         for body, point in _named_points(joint):
@@ -201,7 +202,7 @@ def build_graph(description: Description) -> Graph:
     for name, line, point, pins in lines:
         through = line.through if line.through is not None else origin_of(line.link)
         frame, offset = classes[line.link]
-        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line)), pins))
+        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *turns_of(line)), pins))
         slides.append(name)
     return Graph(
         tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))), tuple(ties)

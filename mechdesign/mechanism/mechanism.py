@@ -12,6 +12,7 @@ from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
+from mechdesign.mechanism.cams import cams
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
@@ -21,6 +22,7 @@ from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH
+from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps around a closed chain may differ by this (radians): they are written with ten digits.
@@ -60,6 +62,7 @@ class Mechanism(Core):
             drawn = self.sketch_configuration
             nodes, rotations, slides = [*drawn.nodes], [*drawn.rotations], [*drawn.slides]
             self.sketch = replace(self.sketch, nodes=nodes, rotations=rotations, slides=slides)
+        self.cams = cams(self.couplings, self.forward, self.plan)  #: cams of its couplings
 
     @property
     def mobility(self) -> int:
@@ -67,6 +70,11 @@ class Mechanism(Core):
         graph = self.graph
         unknowns = (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1)
         return unknowns - 2 * len(graph.edges) - len(self.couplings)
+
+    @property
+    def engaged(self) -> list[Engagement]:
+        """Links that touch as couplings have them move, where the forces between them are known."""
+        return [*self.pressing, *self.cams]
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -258,6 +266,7 @@ class Variant(Mechanism):
         self.couplings = original.couplings
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
+        self.cams = cams(self.couplings, self.forward, self.plan)
 
     @property
     def closes(self) -> bool:

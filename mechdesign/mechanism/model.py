@@ -178,12 +178,29 @@ class Measure:
 
 
 @dataclass(frozen=True)
+class Cam:
+    """A cam, and the roller or the flat face of its follower.
+
+    `face` is the line of a flat face; of a roller, with its `radius`, only the point counts. The profile is that for
+    values of the coordinate that is followed from the first to the last of `span` (radians, or the study's unit), in
+    `steps`. The follower runs on one of its sides, ``outer`` or ``inner``, or in a ``groove`` with both.
+    """
+
+    link: str
+    face: Line
+    radius: Term | None
+    side: str
+    span: tuple[float, float]
+    steps: int
+
+
+@dataclass(frozen=True)
 class Coupling:
     """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
     is a parameter as in a `Measure`, or a place of the coupling's own. Its `wheels` are gears, whose teeth have a
-    `pressure_angle` (radians), or pulleys of a belt with the `radius` of the one that follows.
+    `pressure_angle` (radians), or pulleys of a belt with the `radius` of the one that follows; or it is a `cam`.
     """
 
     name: str
@@ -192,6 +209,7 @@ class Coupling:
     wheels: str = "gears"
     pressure_angle: float = 0.0
     radius: float = 0.0
+    cam: Cam | None = None
 
 
 @dataclass(frozen=True)

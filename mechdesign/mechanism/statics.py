@@ -32,7 +32,7 @@ from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.mechanism.structure import Group
-from mechdesign.mechanism.wheels import Mesh
+from mechdesign.mechanism.wheels import Engagement, Pressed
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"
@@ -50,62 +50,35 @@ class Balance:
     efforts: list[Value]
     edges: list[Vector]
     couplings: list[Value]
-    teeth: Mapping[str, Vector] = field(default_factory=dict)  # force on the link that follows, by coupling
+    pressing: Mapping[str, Pressed] = field(default_factory=dict)  # forces on the links that follow, by coupling
 
 
 @quiet
 def balance(
-    linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = (), *, pressed: Sequence[Value] | None = None
+    linear: Linearization, forces: Forces, engaged: Sequence[Engagement] = (), *,
+    pressed: Sequence[Value] | None = None,
 ) -> Balance:  # fmt: skip
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth. These are
-    pressed apart whichever way they drive; as those of the `pressed` efforts where these are given, which makes all
-    that they bear linear in the forces.
+    not finite. The efforts of couplings are moments alone, but those of links that are `engaged` the forces where these
+    touch. Teeth are pressed apart whichever way they drive; as those of the `pressed` efforts where these are given,
+    which makes all that they bear linear in the forces.
     """
     held = _balance(linear, forces)
-    if not meshes:
+    if not engaged:
         return held
-    # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
-    teeth = Forces(linear.configuration)
-    borne = {}
-    for mesh in meshes:
-        effort = held.couplings[mesh.index]
-        apart = 1.0 if pressed is None else np.sign(effort * pressed[mesh.index])
-        borne[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
-    return replace(_balance(linear, forces.plus(teeth)), teeth=borne)
-
-
-def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Value) -> Vector:
-    """Add the forces of a mesh to `teeth`; see `pressing`. Returns the force on the link that follows."""
-    place, force = pressing(mesh, teeth.configuration, effort, pressed, apart)
-    for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
-        teeth.on_body(link, sign * force, arm=place - teeth.configuration.nodes[teeth.bases[link]])
-    return force
-
-
-def pressing(
-    mesh: Mesh, configuration: Configuration, effort: Value, pressed: Value, apart: Value
-) -> tuple[Vector, Vector]:  # fmt: skip
-    """The force of a mesh on the link that follows, by an effort on this link, and a place on its line.
-
-    Teeth press each other `apart` by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt
-    only pulls, and its pretension is not known.
-    """
-    radius = mesh.radii(configuration)[0]
-    if mesh.belt:
-        # Its tight part pulls.
-        place, _, along = mesh.strand(configuration, np.where(pressed > 0, -1.0, 1.0))
-        force: Vector = along * (apart * np.abs(effort / radius))
-    else:
-        place, along = mesh.contact(configuration)
-        force = along * (effort * mesh.weight(configuration) if mesh.slide >= 0 else effort / radius)
-        inside = np.logical_and(mesh.slide < 0, mesh.ratio(configuration) > 1)
-        outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
-        away = 1j * along * np.where(outwards != inside, 1.0, -1.0)
-        force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * away
-    return place, force
+    # The forces of what touches do what the efforts of the couplings do, on any motion: those of the drives stay.
+    acting, pressing = Forces(linear.configuration), dict[str, Pressed]()
+    for engagement in engaged:
+        index = engagement.index
+        pressing[engagement.coupling] = push = engagement.press(
+            linear.configuration, held.couplings[index], None if pressed is None else pressed[index]
+        )
+        for link, sign in zip(engagement.links, (1.0, -1.0), strict=True):
+            arm = push.place - linear.configuration.nodes[acting.bases[link]]
+            acting.on_body(link, sign * push.force, arm=arm)
+    return replace(_balance(linear, forces.plus(acting)), pressing=pressing)
 
 
 @quiet
@@ -202,8 +175,8 @@ class Contact(NamedTuple):
     """A joint between two bodies, or between a body and a pin that several share.
 
     The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
-    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge. Teeth
-    press each other where the pitch circles of their `mesh` touch.
+    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge. Links
+    that are `engaged` press each other where they touch.
     """
 
     joint: str
@@ -214,12 +187,12 @@ class Contact(NamedTuple):
     bodies: tuple[str, ...] = ()
     turns: bool = True
     slides: bool = False
-    mesh: Mesh | None = None
+    engaged: Engagement | None = None
 
     def place(self, configuration: Configuration) -> Vector:
         """Where it is."""
         place: Vector = configuration.nodes[self.node]
-        return place if self.mesh is None else self.mesh.contact(configuration)[0]
+        return place if self.engaged is None else self.engaged.place(configuration)
 
 
 class _Member(NamedTuple):
@@ -238,7 +211,8 @@ class Joints:
     """
 
     def __init__(
-        self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(), meshes: Sequence[Mesh] = ()
+        self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(),
+        engaged: Sequence[Engagement] = (),
     ) -> None:  # fmt: skip
         self.description, self.graph, self.bases = description, graph, bases(graph)
         self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
@@ -254,8 +228,8 @@ class Joints:
             if isinstance(joint, Fixed):
                 one, other = joint.links
                 self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
-        wheels = [Contact(mesh.coupling, *mesh.links, mesh.axes[0], (), mesh=mesh) for mesh in meshes]
-        self.contacts = (*self._slides(), *self._pins(), *wheels)
+        touching = [Contact(pair.coupling, *pair.links, pair.node, (), engaged=pair) for pair in engaged]
+        self.contacts = (*self._slides(), *self._pins(), *touching)
         self.order, self.open = self._tie_order()
 
     @cached_property
@@ -395,7 +369,10 @@ def _borne(joint: str, member: _Member, by: str, node: int, *, turns: bool = Tru
 
 
 class Reaction(NamedTuple):
-    """What a contact bears: the force on `on` by `by`, the moment about its node, and the force across its slide."""
+    """What a contact bears: the force on `on` by `by`, the moment about its node, and the normal force.
+
+    That is the force across a slide, or of a cam on its follower.
+    """
 
     force: Vector
     moment: Value
@@ -423,9 +400,9 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         if not nothing(force := balance.forces.nodes[node]):
             turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))
     for contact in joints.contacts:
-        if contact.mesh is not None:
-            # What teeth do is among the forces on the bodies already.
-            forces.append(balance.teeth[contact.joint])
+        if contact.engaged is not None:
+            # What it does is among the forces on the bodies already.
+            forces.append(balance.pressing[contact.joint].force)
             continue
         force = 0.0
         for k, sign in contact.edges:
@@ -449,6 +426,8 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         normal: Value = np.nan
         if contact.slides:
             normal = cross(linear.direction(contact.edges[0][0]), force)
+        elif contact.engaged is not None:
+            normal = balance.pressing[contact.joint].normal
         moment = 0.0 if contact.turns else moments[contact.joint]
         if contact.joint in joints.ties and contact.on == joints.ties[contact.joint][0]:
             moment = -1.0 * moment

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector
+from mechdesign.mechanism.algebra import Value, Vector, dot
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import GROUND, Graph
@@ -31,6 +31,43 @@ Axes = tuple[tuple[str, str], str, tuple[int, int], int, float]
 SAME_RATE = 1e-9
 # Radius of the larger pulley of a belt, as a part of the distance of the axes.
 PULLEY = 0.2
+
+
+class Pressed(NamedTuple):
+    """The force on the link that follows, its place, and of a cam its part along the normal out of the cam."""
+
+    place: Vector
+    force: Vector
+    normal: Value = np.nan
+
+
+class Engagement(Protocol):
+    """Two links that touch as a coupling has them move: wheels, or a cam and its follower."""
+
+    @property
+    def coupling(self) -> str:
+        """Name of the coupling."""
+
+    @property
+    def index(self) -> int:
+        """Its number."""
+
+    @property
+    def links(self) -> tuple[str, str]:
+        """The link that follows, then what moves it."""
+
+    @property
+    def node(self) -> int:
+        """A node of the link that follows."""
+
+    def place(self, configuration: Configuration) -> Vector:
+        """Where they touch."""
+
+    def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
+        """The force of an effort on the coordinate that follows.
+
+        Its direction is that of the `pressed` effort where this is given, which makes it linear in the effort.
+        """
 
 
 @dataclass(frozen=True)
@@ -70,6 +107,11 @@ class Mesh:
     belt: bool
     pressure_angle: float
     radius: float
+
+    @property
+    def node(self) -> int:
+        """Axis of the wheel that follows, or a point of a rack."""
+        return self.axes[0]
 
     @property
     def presses(self) -> bool:
@@ -113,6 +155,30 @@ class Mesh:
         touch = centre + side * self.radii(configuration)[1] * way
         return touch, 1j * (touch - driven) / np.abs(touch - driven)
 
+    def place(self, configuration: Configuration) -> Vector:
+        """Where the pitch circles touch."""
+        return self.contact(configuration)[0]
+
+    def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
+        """The force of an effort on the link that follows; see `Engagement`.
+
+        Teeth press each other apart by their pressure angle whichever way they drive, a wheel inside of a ring towards
+        the ring's axis; a belt only pulls, and its pretension is not known.
+        """
+        apart: Value = 1.0 if pressed is None else np.sign(effort * pressed)
+        driving = effort if pressed is None else pressed
+        radius = self.radii(configuration)[0]
+        if self.belt:
+            # Its tight part pulls.
+            place, _, along = self.strand(configuration, np.where(driving > 0, -1.0, 1.0))
+            return Pressed(place, along * (apart * np.abs(effort / radius)))
+        place, along = self.contact(configuration)
+        force = along * (effort * self.weight(configuration) if self.slide >= 0 else effort / radius)
+        inside = np.logical_and(self.slide < 0, self.ratio(configuration) > 1)
+        outwards = dot(1j * along, place - configuration.nodes[self.axes[1]]) > 0
+        away = 1j * along * np.where(outwards != inside, 1.0, -1.0)
+        return Pressed(place, force + apart * np.abs(force) * np.tan(self.pressure_angle) * away)
+
     def strand(self, configuration: Configuration, side: Value) -> tuple[Vector, Vector, Vector]:
         """Where a belt's straight part leaves both wheels, and its direction from the one that follows to the other.
 
@@ -132,7 +198,7 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
     wheels = []
     for index, coupling in enumerate(couplings):
         given = description.couplings[coupling.name]
-        if given.wheels == "none":
+        if given.wheels == "none" or given.cam is not None:
             continue
         if not coupling.function.linear:
             continue

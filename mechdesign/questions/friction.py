@@ -68,7 +68,7 @@ class Friction:
         if velocity is None:
             velocity = linear.velocity([1.0 if c.quantity == "angle" else mechanism.size for c in drives])
         rates = [first(linear.configuration, drive, velocity) for drive in drives]
-        rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.pressing, mechanism.size)
+        rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.engaged, mechanism.size)
         ahead = rubs.solve(velocity)
         ways = [ahead, rubs.solve(velocity, back=True)] if back else [ahead]
         columns: dict[str, Value] = {}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
@@ -108,22 +109,30 @@ def _help_page(tree: ast.Module) -> str:
 def _read(page: str, tree: ast.Module) -> Iterator[Message]:
     """Messages of a module; where it has a page also further texts in its functions, as parts."""
     constants = _given(tree.body)
-    for node in ast.walk(tree):
+    for node in _statements(tree):
         if isinstance(node, ast.Assign) and _name(node.targets[0]) == "one_of":
             yield from _sentences(node.value, page, 2)
         elif isinstance(node, ast.FunctionDef):
-            names = {**constants, **_given(ast.walk(node))}
-            for call in ast.walk(node):
-                if isinstance(call, ast.Call):
-                    code, kind, arguments = _made(call)
-                    for argument in arguments:
-                        inside = {_name(part) for part in ast.walk(argument)}
-                        for value in (argument, *(value for name in inside for value in names.get(name, ()))):
-                            yield from _sentences(value, page, code, kind)
+            nodes = [*ast.walk(node)]
+            made = [found for call in nodes if isinstance(call, ast.Call) and (found := _made(call))[2]]
+            names = {**constants, **_given(nodes)} if made else {}
+            for code, kind, arguments in made:
+                for argument in arguments:
+                    inside = dict.fromkeys(_name(part) for part in ast.walk(argument))
+                    for value in (argument, *(value for name in inside for value in names.get(name, ()))):
+                        yield from _sentences(value, page, code, kind)
             for statement in node.body if page else ():
                 for message in _sentences(statement, page, PART):
                     if len(re.findall(r"[A-Za-z']{2,}", message.text)) >= _WORDS_OF_PART:
                         yield message
+
+
+def _statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """Every statement of a module, in the order of `ast.walk`, which would go through the expressions too."""
+    nodes: deque[ast.AST] = deque([tree])
+    while nodes:
+        yield (node := nodes.popleft())
+        nodes.extend(child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
 
 
 def _made(call: ast.Call) -> tuple[int | None, str, Sequence[ast.expr]]:

@@ -93,18 +93,28 @@ def remeasured(study: Study, names: Collection[str]) -> bool:
 
 
 def _drawing(study: Study) -> set[str]:
-    """Places on which the measured dimensions depend: of links that are measured in the sketch."""
+    """Places on which measured dimensions depend: of links measured in the sketch, and of a phase ratio and guides."""
     links, joints = study.mechanism.description.links, study.mechanism.description.joints
+    couplings = {coupling.name: coupling.gap for coupling in study.mechanism.couplings}
     owners: set[str] = set()
+    numbers: set[str] = set()
     for place in study.parameters.measured:
-        joint = joints.get(place.rpartition(".")[0])
-        owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
+        owner, _, _ = place.rpartition(".")
+        joint = joints.get(owner)
+        if owner in couplings:
+            numbers.add(f"{owner}.ratio")
+            for part in couplings[owner].parts:
+                name = study.mechanism.graph.slides[part.slide] if part.slide >= 0 else part.body
+                numbers.add(f"{name}.direction")
+                owners.update(joints[name].links if name in joints else {name} & links.keys())
+        else:
+            owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
     points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
     lengths = {f"{name}.length" for name in owners if len(links[name].points) > 2}
     # The numbers of the ground place its points in the sketch.
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
-    return lengths | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
+    return lengths | numbers | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
@@ -121,6 +131,10 @@ def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
             holder = mechanism["limits"][int(owner.partition(".")[2])]
         elif owner in study.mechanism.description.springs:
             holder = mechanism["springs"][owner]
+        elif owner in study.mechanism.description.couplings:
+            holder = mechanism["couplings"][owner]
+        elif owner.startswith("friction."):
+            holder = mechanism["friction"][owner.partition(".")[2]]
         elif last in ("mass", "inertia") or owner.endswith(".center"):
             link, *inner = owner.split(".")
             holder, key = mechanism["links"][link], "xy".index(last) if owner.endswith(".center") else last

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.gallery import meet, point, result_of, study_named, unit
 
+import mechdesign
 from mechdesign.mechanism.wheels import meshes
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.stiffness.analysis import stiffness
@@ -121,11 +122,32 @@ def test_cam_with_dwells_follows_its_law() -> None:
     speed = h / b * (np.cos(2 * np.pi * back) - np.cos(2 * np.pi * rise))
     assert motion["F.y_velocity"] == pytest.approx(speed, abs=1e-10)
     bend = 2 * np.pi * h / b**2 * (np.sin(2 * np.pi * rise) - np.sin(2 * np.pi * back))
-    # The law's parts are put together where its third derivative jumps.
-    assert motion["F.y_acceleration"] == pytest.approx(bend, abs=2e-4)
+    assert motion["F.y_acceleration"] == pytest.approx(bend, abs=1e-10)
     still = (cam > 120) & (cam < 180)
     assert not motion["F.y_velocity"][still].any()
     assert np.abs(motion["F.y_velocity"]).max() == pytest.approx(2 * h / b, rel=1e-3)
+
+
+def test_cam_with_dwells_has_the_pressure_angle_of_its_law() -> None:
+    table = result_of("cam_dwell").tables["cam"]
+    cam, lift, h, b = table["cam"], table["valve.slide"], 20, np.radians(120)
+    rise, back = (np.clip((cam - begin) / 120, 0, 1) for begin in (0, 180))
+    slope = h / b * (np.cos(2 * np.pi * back) - np.cos(2 * np.pi * rise))
+    assert np.tan(np.radians(table["pressure_angle"])) == pytest.approx(slope / lift, abs=1e-12)
+    profile = table["x"] + 1j * table["y"]
+    assert np.abs(profile)[[0, 150, 330]] == pytest.approx([32, 52, 32], rel=1e-12)
+
+
+def test_arm_with_a_flat_face_is_pushed_square_to_it() -> None:
+    cam, result = result_of("cam_arm").tables["cam"], dynamics(study_named("cam_arm"))
+    joints = result.tables["joint_forces"]
+    force, contact = joints["normal"][joints["joint"] == "lift"], cam["face"][::5]
+    assert force * contact == pytest.approx(50 * 140 * np.cos(np.radians(cam["arm.angle"][::5])), rel=1e-12)
+    assert not np.abs(cam["pressure_angle"]).max() > 1e-12
+    # The profile is the envelope of the face, whose distance from the cam's axis is h = 80 sin(a) + 30 cos(a).
+    turn, a = np.radians(cam["cam"]), np.radians(cam["arm.angle"])
+    h = 80 * np.sin(a) + 30 * np.cos(a)
+    assert ((cam["x"] + 1j * cam["y"]) * np.exp(1j * (turn - a))).imag == pytest.approx(h, rel=1e-12)
 
 
 def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
@@ -145,3 +167,12 @@ def test_scara_with_an_elbow_belt_reaches_a_ring_and_keeps_its_tool() -> None:
     region = workspace(study_named("belt_scara"))
     area = float(region.main["area"][0])
     assert area == pytest.approx(4 * np.pi * 200 * 150, rel=1e-9)
+
+
+def test_backlash_of_a_belt_moves_the_scara_across_its_forearm() -> None:
+    """The variances of x and y by it add up to (l2 b)^2/12 at every pose."""
+    study = study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
+    linear = mechdesign.reliability(study).tables["contributions"]
+    own = linear["source"] == "elbow"
+    sigma = linear["derivative"][own] * 0.06 / np.sqrt(12)
+    assert np.hypot(sigma[::2], sigma[1::2]) == pytest.approx(np.full(3, 150 * np.radians(0.06) / np.sqrt(12)))

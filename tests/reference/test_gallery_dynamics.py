@@ -26,6 +26,8 @@ def test_mean_torque_of_the_press_is_the_work_of_its_cut() -> None:
     height = np.arccos((60**2 + (360 - 7) ** 2 - 300**2) / (2 * 60 * (360 - 7)))
     lever = 60 * np.sin(height) * (1 + 60 * np.cos(height) / np.sqrt(300**2 - (60 * np.sin(height)) ** 2))
     assert effort["peak"] == pytest.approx(250 * lever, rel=0.02)
+    # The peak is at the corner of the load, where it begins to bear in full.
+    assert effort["peak_at"] == pytest.approx(270 - np.degrees(height), rel=1e-11)
 
 
 def test_spring_of_no_length_balances_the_arm_everywhere() -> None:

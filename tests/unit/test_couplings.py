@@ -11,9 +11,10 @@ from scipy.interpolate import CubicSpline
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.describe import describe
-from mechdesign.mechanism.outputs import first, second
+from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.analysis import optimize
 
 FIVE_BAR = """
 mechanism:
@@ -85,6 +86,132 @@ def test_velocities_and_accelerations_are_differences(coupling: str) -> None:
         assert first(here.configuration, coordinate, velocity) == pytest.approx(slope, rel=1e-5, abs=1e-4)
         found = second(here.configuration, coordinate, velocity, velocity, acceleration)
         assert found == pytest.approx(bend + 0.4 * slope, rel=1e-4, abs=1e-3)
+
+
+BENT = """
+mechanism:
+  parameters: {k: 2, lift: 5}
+  links:
+    ground: {O: [0, 0], C: [100, 0]}
+    one: [O, A, 30]
+    two: [C, D, 35]
+    left: [A, B, 80]
+    right: [D, B, 85]
+    valve: {V: [0, 0]}
+  joints: {guide: {prismatic: [ground, valve], through: O, direction: 90}}
+  drives: [one]
+  couplings:
+    gears: {set: two, to: "-2*one.angle + 60 + 10*sin(k*one.angle)**2"}
+    cam: {set: guide, to: "12 + lift*(1 - cos(k*one.angle)) + hypot(B.x, B.y)/20 + max(B.x/50, 0)**2"}
+  measures: {ratio: "B.x*B.y/(10 + guide.slide) + sqrt(B.x**2 + k)"}
+  sketch: {A: [30, 0], D: [117, 30], B: [50, 90], V: [0, 12]}
+"""
+
+
+def test_rates_by_dimensions_are_differences() -> None:
+    """Derivatives of velocities and accelerations by parameters of couplings and by dimensions, whatever their form."""
+    mechanism = study_of(BENT).mechanism
+    places, h = ["measures:k", "measures:lift", "one.length", "ground.C.x"], 1e-5
+    coordinates = [mechanism.coordinate(name) for name in ("B.x", "guide.slide", "two.angle", "ratio")]
+
+    def rates(changed):
+        pose = mechanism.solve({"one": [10.0, 33.0]}, changed).configuration
+        linear = mechanism.linearize(pose)
+        velocity = linear.velocity([3.0])
+        acceleration = linear.acceleration(velocity, [1.5])
+        own = [(first(pose, c, velocity), second(pose, c, velocity, velocity, acceleration)) for c in coordinates]
+        return np.array([np.broadcast_to(value, (2,)) for pair in own for value in pair])
+
+    pose = mechanism.solve({"one": [10.0, 33.0]}).configuration
+    linear = mechanism.linearize(pose)
+    velocity, position = linear.velocity([3.0]), linear.sensitivity(places)
+    acceleration = linear.acceleration(velocity, [1.5])
+    velocity_z, acceleration_z = linear.rate_sensitivity(places, position, velocity, acceleration)
+    slopes = []
+    for c in coordinates:
+        slopes.append(second(pose, c, velocity, position, velocity_z))
+        slopes.append(acceleration_sensitivity(pose, c, velocity, acceleration, position, velocity_z, acceleration_z))
+    slopes = np.array([np.broadcast_to(slope, (len(places), 2)) for slope in slopes])
+    for k, place in enumerate(places):
+        ends = [rates({place: mechanism.nominal[place] + step}) for step in (h, -h)]
+        assert slopes[:, k] == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6, abs=1e-5)
+
+
+RACKS = """
+mechanism:
+  parameters: {r: 20}
+  links: {ground: {O: [0, 0]}, head: {H: [0, 0]}, pinion: [H, N, r], rack: {R: [0, 0], S: [40, 0]}}
+  joints:
+    cross: {prismatic: [ground, head], through: O, direction: 0, point: H}
+    top: {prismatic: [ground, rack], through: O, direction: 0, point: R}
+  drives: [cross]
+  couplings:
+    below: {set: pinion, of: cross, ratio: -180/(pi*r)}
+    above: {set: top, to: cross - r*pinion.angle*pi/180}
+  sketch: {H: [0, 0], N: [0, 20], R: [0, 20], S: [40, 20]}
+dynamics:
+  sweep: {cross: {from: 0, to: 40, step: 20}}
+  loads: [{at: S, force: [-10, 0]}]
+"""
+
+
+@pytest.mark.slow
+def test_a_pinion_on_a_crosshead_rolls_between_two_racks() -> None:
+    """The fixed rack below and the moving one above bear a half of the crosshead's force each."""
+    study = study_of(RACKS)
+    below, above = study.mechanism.meshes
+    assert (below.links, above.links) == (("ground", "pinion"), ("rack", "pinion"))
+    drawn = study.mechanism.sketch_configuration
+    assert [mesh.contact(drawn)[0] for mesh in (below, above)] == pytest.approx([-20j, 20j])
+    assert [mesh.radii(drawn)[1] for mesh in (below, above)] == pytest.approx([20, 20])
+    result = dynamics(study)
+    assert result.tables["dynamics"]["cross_effort"] == pytest.approx(20)
+    forces = result.tables["joint_forces"]
+    borne = {name: (x, y) for name, x, y in zip(forces["joint"], forces["fx"], forces["fy"], strict=True)}
+    apart = 10 * np.tan(np.radians(20))
+    assert borne["below"] == pytest.approx((10, -apart))
+    assert borne["above"] == pytest.approx((10, apart))
+    assert borne["H"] == pytest.approx((20, 0))
+
+
+def test_a_rack_rolls_on_a_fixed_pinion_about_which_its_guide_turns() -> None:
+    (mesh,) = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: [O, A, 60], bar: {B: [0, 0]}}
+  joints: {guide: {prismatic: [arm, bar], through: O, point: B}}
+  drives: [arm]
+  couplings: {roll: {set: guide, of: arm, ratio: 20*pi/180}}
+  sketch: {A: [60, 0], B: [10, 0]}
+""").mechanism.meshes
+    assert (mesh.links, mesh.carrier) == (("bar", "ground"), "arm")
+
+
+def test_gears_on_a_crosshead_have_pitch_circles() -> None:
+    """The angle of a crosshead never changes, so that the wheels' angles in the world are those against it."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, head: {H: [0, 0], K: [30, 0]}, one: [H, M, 5], two: [K, N, 5]}
+  joints: {cross: {prismatic: [ground, head], through: O, point: H}}
+  drives: [cross, one]
+  couplings: {gears: {set: two, of: one, ratio: -2}}
+  sketch: {H: [0, 0], K: [30, 0], M: [5, 0], N: [35, 0]}
+""")
+    (mesh,) = study.mechanism.meshes
+    assert mesh.carrier == "head"
+    assert mesh.radii(study.mechanism.sketch_configuration) == pytest.approx((10, 20))
+
+
+@pytest.mark.slow
+def test_a_phase_that_is_left_out_follows_a_ratio_that_varies() -> None:
+    """What optimize computes of a design is what its study gives when it is read."""
+    text = FIVE_BAR % "{set: g2, of: g1, ratio: -1.5}" + "kinematics: {sweep: {g1: {from: 0, to: 90, step: 45}}}\n"
+    study = study_of(
+        text + "optimize: {variables: {mesh.ratio: {from: -1.5, to: -1, step: 0.5}}, minimize: kinematics.B.y.range}\n"
+    )
+    found = optimize(study).tables["designs"]["kinematics.B.y.range"]
+    for ratio, range_of_design in zip(("-1.5", "-1"), found, strict=True):
+        extremes = kinematics(study_of(text.replace("-1.5", ratio))).tables["extremes"]
+        assert range_of_design == pytest.approx(extremes["range"][list(extremes["output"]).index("B.y")])
 
 
 def test_turns_count() -> None:

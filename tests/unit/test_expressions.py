@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Dual, Expression, ExpressionError
 
 DEGREE = math.pi / 180
 
@@ -76,6 +76,27 @@ def test_derivatives_agree_with_differences(text, x, y):
         step = 1e-6
         ahead, behind = (expression.evaluate({**env, name: env[name] + sign * step}) for sign in (1, -1))
         assert slope == pytest.approx((ahead - behind) / (2 * step), rel=1e-6, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "x", "derivatives"),
+    [
+        ("x**2", 0.0, (0, 2, 0)),
+        ("x**3 - 2*x", 0.7, (3 * 0.49 - 2, 6 * 0.7, 6)),
+        ("sin(x)/x", 1.0, (-0.3011686789, -0.2391336269, 0.1770985749)),
+        ("sqrt(x)", 4.0, (1 / 4, -1 / 32, 3 / 256)),
+        ("log(x)*abs(x)", 2.0, (np.log(2) + 1, 1 / 2, -1 / 4)),
+        ("atan2(x, 1)", 1.0, (1 / 2, -1 / 2, 1 / 2)),
+        ("hypot(x, 3)", 4.0, (4 / 5, 9 / 125, -3 * 9 * 4 / 5**5)),
+        ("max(x, 0)**3 + min(x, 0)", 0.5, (0.75, 3, 6)),
+        ("exp(-x)", 0.0, (-1, 1, -1)),
+    ],
+)
+def test_derivatives_along_a_line_are_exact(text, x, derivatives):
+    expression = Expression.parse(text)
+    dual = Dual(Dual(x, 1.0), Dual(1.0, 0.0))
+    first, along = Dual.parts(expression.derivatives({"x": dual})["x"])
+    assert (*Dual.parts(first), Dual.parts(along)[1]) == pytest.approx(derivatives, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def test_every_method_agrees_on_a_slider_crank_with_slide_and_pin_clearances():
         ("{radial: 0.1}", "give that too"),
         ("{radial: 0.1, length: 20, link: slider}", "has no 'link'"),
         ("{radial: 0.1, length: 20 deg}", "where a length is expected"),
-        ("{radial: 0.1, length: 20, pin: contact}, other: {radial: 1}", "there is no point or slide 'other'"),
+        ("{radial: 0.1, length: 20, pin: contact}, other: {radial: 1}", "there is no point, slide or coupling 'other'"),
     ],
 )
 def test_a_slide_says_what_its_clearance_lacks(clearance, message):

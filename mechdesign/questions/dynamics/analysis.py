@@ -14,6 +14,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
@@ -30,7 +31,7 @@ from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, pose_in_words, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
@@ -41,6 +42,10 @@ from mechdesign.work.threads import one_thread
 # Tables with a row a pose, or several.
 A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
 TABLES = (*A_ROW_A_POSE, "extremes")
+# Before the name of a cam: the poses in which its follower lifts off.
+_LIFTED = "lifted off "
+# Part of the forces by which a contact force is rounding.
+PRESSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +110,18 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
         marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
         unknown &= ~friction.jammed(motion.arrays)
     singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
-    return {"singular": singular, "undefined": undefined, **marks}
+    return {"singular": singular, "undefined": undefined, **marks, **_lifted(motion)}
+
+
+def _lifted(motion: Motion) -> dict[str, Flags]:
+    """By cam, the poses in which its follower would have to be pulled; a groove pulls it."""
+    question, lifted = question_of(motion), dict[str, Flags]()
+    for name, contact in zip(question.forces, question.joints.contacts, strict=True):
+        cam = contact.engaged
+        if isinstance(cam, Cam) and cam.given.side != "groove":
+            pulled = motion.arrays[f"{name}.normal"] < -PRESSED * question.size
+            lifted[f"{_LIFTED}{cam.coupling}"] = motion.valid & pulled
+    return lifted
 
 
 def tables(
@@ -167,6 +183,14 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if mark.number:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    for name, mark in passage.marks[k].items():
+        if name.startswith(_LIFTED) and mark.number:
+            first = pose_in_words(study, poses, mark.first + k * count)
+            message = (
+                f"cam {name.removeprefix(_LIFTED)}: the follower lifts off at {mark.number} of {count} poses, where it "
+                f"would have to be pulled; a spring holds it on the cam; the first: {first}"
+            )
+            warnings.append(Caution("cam", message, "joint_forces", mark.first, first))
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")

@@ -24,7 +24,8 @@ JOINT_FORCES = TableKind.of("joint_forces", "what the joints bear, a row a pose 
     ("fx, fy", "force on the one by the other, axes of the world", "force"),
     ("moment", "moment likewise, about the joint's point; nan where equilibrium leaves it open", "moment"),
     ("magnitude", "size of the force", "force"), ("angle", "its direction from the world's x axis", "angle"),
-    ("normal", "of a slide the force across its line, to the left positive", "force"), VALID)  # fmt: skip
+    ("normal", "of a slide the force across its line, to the left positive; of a cam the contact force, negative where "
+     "the follower lifts off", "force"), VALID)  # fmt: skip
 EXTREMES = TableKind.of("extremes", f"extremes and means of efforts, forces and energies <{OVER}>",
     ("output", "column of dynamics.csv, 'shaking' for the size of that force, or a joint's force by the joint and, "
      "where it has several, what it acts on, in its own unit"),

@@ -132,7 +132,7 @@ class ForceQuestion:
         forces, energy = self.acting(poses, linear.configuration, rows, moving)
         columns: dict[str, Value] = {}
         if self.friction is None:
-            held: Balance | Slipping = balance(linear, forces, mechanism.pressing)
+            held: Balance | Slipping = balance(linear, forces, mechanism.engaged)
         else:
             back = self.subset is None or "back_efficiency" in self.subset
             held = self.friction.solve(linear, forces, moving.velocity, back=back)
@@ -245,6 +245,6 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     question = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
-        question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
+        question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False, cams=(),
         borne=ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo),
     )  # fmt: skip

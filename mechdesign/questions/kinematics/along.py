@@ -22,7 +22,7 @@ from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import APART
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.columns import OVER
-from mechdesign.questions.kinematics.motion import Motion, rates_of_advantage
+from mechdesign.questions.kinematics.motion import Motion, pole
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import unitless
 from mechdesign.questions.poses import SolvedPoses, unit_of
@@ -94,11 +94,7 @@ class Along:
             structure = mechanism.forward.structure
             self._groups = [k for k, group in enumerate(structure.groups) if group.solved]
         self._errors = any(name.endswith("_error") for name in columns)
-        self._advantages = {
-            f"{output}_advantage": (output, input_name)
-            for output, input_name in question.section.mechanical_advantage.items()
-            if f"{output}_advantage" in columns
-        }
+        self._poles = [name for name in question.poled if name in columns]
         self._chains: dict[str, tuple[int, ...]] = {}
         divisors = self._divisors()
         # The part of the question that the columns need.
@@ -109,7 +105,7 @@ class Along:
         integrals = {request.column for request in whole if request.integral}
         functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
         functions |= {_PACE: 0.0} if self._errors or integrals else {}
-        functions |= {f"rate of {name}": 0.0 for name in self._advantages}
+        functions |= {f"rate of {name}": 0.0 for name in self._poles}
         functions |= {f"group {k}": 1.0 for k in self._groups}
         arms = (0, 3) if toggles else (3,)
         lines = [f"{name} {k} {end}" for k in range(len(loops)) for end in arms for name in ("sine", "cosine")]
@@ -141,7 +137,7 @@ class Along:
         question = self.question
         rates = INVERSE if question.inverse else FORWARD
         divisors = {static.name: [(FORWARD, 1)] for static in question.statics}
-        divisors |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
+        divisors |= {name: [(f"rate of {name}", 1)] for name in self._poles}
         for name in self._others:
             output, _, order = name.rpartition("_")
             if output in question.study.mechanism.drives and not question.inverse:
@@ -185,8 +181,8 @@ class Along:
             outputs = [mechanism.coordinate(name) for name in whole.groups[0].names]
             matrix = unitless(mechanism, linear, outputs)[1]
             arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
-        for name, (output, input_name) in self._advantages.items():
-            arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, input_name)[0] * forward
+        for name in self._poles:
+            arrays[f"rate of {name}"] = pole(self._lean, linear, name) * forward
         for k, loop in enumerate(self._loops):
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)

@@ -15,6 +15,7 @@ from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL
 from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.cams import Profile, cam_table, cautions, profiles
 from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
@@ -29,7 +30,7 @@ from mechdesign.questions.together import End, Group
 from mechdesign.results import Result, Scope
 
 # Tables in the order in which they are shown.
-ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres")
+ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres", "cam")
 
 
 class _OnLine(Protocol):
@@ -42,11 +43,12 @@ Own = TypeVar("Own", bound=_OnLine)
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Motions between their poses, if they can be followed there; by design their limits and change points."""
+    """Motions between their poses, if they can be followed there; by design limits and change points; and cams."""
 
     along: Along | None
     limits: Sequence[Sequence[Limit]]
     changes: Sequence[Sequence[Change]]
+    cams: Sequence[Profile]
 
 
 def answers_of(passage: Passage) -> list[Group]:
@@ -75,7 +77,10 @@ def answers_of(passage: Passage) -> list[Group]:
             tables["toggles"] = toggles_table(toggles, along)
     if motion.errors:
         tables["targets"] = targets_table(motion, along)
-    events = _Events(along, _by_line(limits, designs), _by_line(changes, designs))
+    sides = profiles(question.study, question.poses)
+    if sides:
+        tables["cam"] = cam_table(question.study, sides)
+    events = _Events(along, _by_line(limits, designs), _by_line(changes, designs), sides)
     ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
@@ -132,7 +137,7 @@ def _warnings(
                 "but extremes may lie between the places that were looked at; sweep less of it",
                 "extremes",
             ))  # fmt: skip
-    return warnings + without_centre(question, marks), failed
+    return [*warnings, *without_centre(question, marks), *cautions(question.study, events.cams, k)], failed
 
 
 def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:

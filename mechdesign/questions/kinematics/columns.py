@@ -23,6 +23,10 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
      "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
      "as the input's length over the output's", "rate of the input/rate of the output"),
+    ("<coupling>_pressure_angle", "pressure angle of cam <coupling>", "angle",
+     "from the follower's velocity to the normal of the profile"),
+    ("<coupling>_curvature_radius", "radius of curvature of cam <coupling>", "length",
+     "negative where the cam is hollow"),
     ("<a>.<b>.clearance", "distance of the outlines of <a> and <b>, links or pins; where they overlap minus the depth",
      "length"),
     ("clearance", "smallest of all clearances between links, and between pins and links", "length"), VALID)  # fmt: skip
@@ -67,12 +71,22 @@ TARGETS = TableKind.of("targets", f"errors of the outputs against their targets 
     ("rms", "root of the mean square of the error (of a point: of its distance), in `unit`", "", "sqrt(mean(e^2))"),
     ("mean", "mean error, in `unit`"), ("max_abs", "largest absolute error, in `unit`"),
     ("at", "<swept> at the largest error", "as what is swept"), ("unit", "unit of its errors"))  # fmt: skip
+CAM = TableKind.of("cam", "profiles of cams in their frames",
+    ("coupling", "coupling of the cam"), ("side", "side of the profile: outer, or inner of a ring or a groove"),
+    ("<coordinate>", "coordinate that a cam's follower follows, or that of the follower", "as the coordinate"),
+    ("x, y", "place of the profile in the frame of the cam", "length"),
+    ("pressure_angle", "from the follower's velocity to the normal of the profile", "angle",
+     "atan((v x n)/(v . n))"),
+    ("curvature_radius", "radius of curvature of the profile, negative where it is hollow", "length"),
+    ("face", "place of the contact along a flat face, from its point", "length"))  # fmt: skip
 MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
     KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
+    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
+    KeyNumber(MOTION, "<coupling>_curvature_radius", "smallest {meaning}", "least"),
     KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
     KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
 )  # fmt: skip

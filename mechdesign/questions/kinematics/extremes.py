@@ -33,7 +33,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     # Of each column, the size that rounding is compared with, and the unit.
     curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
     curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
-    curves |= {static.name: (0.0, static.unit) for static in question.statics}
+    curves |= {static.name: (static.size, static.unit) for static in question.statics}
     curves |= {name: (sizes["length"], label("length")) for name in question.clearances}
     for name, (quantity, order) in question.orders.items():
         curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]

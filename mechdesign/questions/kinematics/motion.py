@@ -93,7 +93,7 @@ class Motion:
             # Of one drive alone every speed gives the same centres.
             one = len(study.mechanism.drives) == 1
             self._centres(linear, rows, linear.velocity([1.0]) if one else moving.velocity)
-        if self.question.square or section.loads or section.mechanical_advantage:
+        if self.question.square or section.loads or section.mechanical_advantage or self.question.cams:
             self._statics(linear, rows, regular, moving)
         if self.question.borne is not None:
             borne = self.question.borne.columns(self.question.poses, linear, rows, moving)
@@ -207,7 +207,7 @@ class Motion:
 
 
 def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving: Moving) -> dict[str, Value]:
-    """Efforts of the drives that balance the loads, and mechanical advantages, by their columns; nan where it stalls.
+    """Efforts of the drives that balance the loads, mechanical advantages, and what cams have, by their columns.
 
     `rows` are the poses of `linear`.
     """
@@ -224,11 +224,24 @@ def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving:
         columns |= {f"{drive.name}_effort": effort for drive, effort in zip(question.drives, efforts, strict=True)}
     for name, input_name in section.mechanical_advantage.items():
         columns[f"{name}_advantage"] = _advantage(question, linear, name, input_name)
+    for cam in question.cams:
+        touch = cam.touch(linear.configuration)
+        columns[f"{cam.coupling}_pressure_angle"] = touch.pressure_angle / question.study.units.angle_factor
+        columns[f"{cam.coupling}_curvature_radius"] = touch.radius
     return columns
 
 
+def pole(question: MotionQuestion, linear: Linearization, column: str) -> Value:
+    """What is zero where a column of `question.poled` goes to infinity: a rate, or the curvature of a pitch curve."""
+    name, advantages = column.removesuffix("_advantage"), question.section.mechanical_advantage
+    if name in advantages:
+        return _rates_of_advantage(question, linear, name, advantages[name])[0]
+    cam = next(cam for cam in question.cams if column == f"{cam.coupling}_curvature_radius")
+    return cam.touch(linear.configuration).pitch
+
+
 @quiet
-def rates_of_advantage(
+def _rates_of_advantage(
     question: MotionQuestion, linear: Linearization, output: str, input_name: str
 ) -> tuple[Value, Value]:
     """Rates of an output and of the input of its mechanical advantage, by a drive that moves the input."""
@@ -242,7 +255,7 @@ def rates_of_advantage(
 def _advantage(question: MotionQuestion, linear: Linearization, output: str, input_name: str) -> Value:
     """Force of an output over that at its input: by virtual work the input's rate over the output's."""
     mechanism = question.study.mechanism
-    given_out, put_in = rates_of_advantage(question, linear, output, input_name)
+    given_out, put_in = _rates_of_advantage(question, linear, output, input_name)
     sizes = [mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in (output, input_name)]
     still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
     return np.where(still & (put_in != 0), np.inf, put_in / given_out)

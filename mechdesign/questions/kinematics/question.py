@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -12,6 +12,7 @@ import numpy as np
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import counted
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import Linearization, mixes
 from mechdesign.mechanism.forces import Moving
@@ -30,6 +31,9 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.loads import joints_of
+
+# Columns of a cam behind the name of its coupling, and their kinds of quantity.
+CAM_COLUMNS: Mapping[str, Quantity] = {"pressure_angle": "angle", "curvature_radius": "length"}
 
 
 def characteristic_length(study: Study) -> float | None:
@@ -90,6 +94,8 @@ class MotionQuestion:
         Columns of errors that have values between the poses, too.
     borne : Borne or None
         What else is computed of the forces.
+    cams : sequence of Cam
+        Cams whose pressure angle and radius of curvature are computed.
     """
 
     study: Study
@@ -103,6 +109,7 @@ class MotionQuestion:
     targeted: tuple[str, ...]
     errors: Mapping[str, Quantity]
     borne: Borne | None = None
+    cams: Sequence[Cam] = ()
 
     @property
     def drives(self) -> list[Coordinate]:
@@ -135,7 +142,7 @@ class MotionQuestion:
 
     @property
     def statics(self) -> list[Static]:
-        """Efforts of the drives, where there are loads, and mechanical advantages."""
+        """Efforts of the drives, where there are loads, mechanical advantages, and what cams have."""
         label, statics = self.study.units.label, []
         for drive in self.drives if self.section.loads else ():
             unit = label("moment" if drive.quantity == "angle" else "force")
@@ -147,7 +154,18 @@ class MotionQuestion:
             unit = "" if above == below else above or f"1/{below}"
             words = {"output": name, "input": input_name}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
+        for cam in self.cams:
+            for word, kind in CAM_COLUMNS.items():
+                words = {"coupling": cam.coupling}
+                name = f"{cam.coupling}_{word}"
+                statics.append(Static(name, label(kind), f"<coupling>_{word}", words, self.sizes[kind]))
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
+
+    @property
+    def poled(self) -> list[str]:
+        """Columns that go to infinity where nothing is singular."""
+        advantages = [f"{name}_advantage" for name in self.section.mechanical_advantage]
+        return advantages + [f"{cam.coupling}_curvature_radius" for cam in self.cams]
 
     @cached_property
     def friction(self) -> Friction | None:
@@ -231,6 +249,7 @@ class MotionQuestion:
             self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
             watched=[coordinate for coordinate in self.watched if borne is not None or coordinate.name in values],
             inverse=self.inverse and (rates or borne is not None), borne=borne,
+            cams=[cam for cam in self.cams if any(f"{cam.coupling}_{word}" in names for word in CAM_COLUMNS)],
         )  # fmt: skip
 
     @property
@@ -289,4 +308,5 @@ def motion_question(study: Study, poses: Poses) -> MotionQuestion:
         section.inverse(study.mechanism.drives),
         targeted,
         between,
+        cams=mechanism.cams,
     )

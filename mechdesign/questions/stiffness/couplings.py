@@ -20,7 +20,6 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
-from mechdesign.mechanism.statics import pressing
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Wrench, borne
 from mechdesign.questions.stiffness.elements import slide_direction
@@ -105,9 +104,9 @@ def _wrenches(
     if mesh is not None:
         follower, wheel = transmission.seats[mesh.coupling]
         for way in (1.0, -1.0):
-            place, force = pressing(mesh, configuration, effort * (1 + way * side) / 2, way, way)
-            yield follower, at(place, force)
-            yield wheel, at(place, -1.0 * force)
+            push = mesh.press(configuration, effort * (1 + way * side) / 2, way)
+            yield follower, at(push.place, push.force)
+            yield wheel, at(push.place, -1.0 * push.force)
         return
     for part, share in shares(configuration, transmission.coupling.gap, effort):
         seats = transmission.seats[part.name]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,10 +13,11 @@ import numpy as np
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Vector
+from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot, Spring
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.poses import Shown, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
 from mechdesign.study import Study
@@ -26,6 +27,8 @@ _TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
 _SAME_POSE = 1e-3
 _FEW_POSES = 60  # fewer would show a curve as chords
 _TRACE_POSES = 240  # of a curve between few poses, about
+_OUTLINE = 241  # places of the drawn profile of a cam
+_FACE = 0.15  # by which a flat face is drawn longer at both ends, as a part of what the cam touches
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,27 @@ class Wheels:
 
 
 @dataclass(frozen=True)
+class CamPair:
+    """Profiles of a cam, and the roller or the ends of the flat face of its follower.
+
+    `links` are follower and cam, which is a `solid` disc, or has a groove or an open profile.
+    """
+
+    links: tuple[str, str]
+    profiles: tuple[tuple[complex, ...], ...]
+    solid: bool
+    center: complex
+    radius: float
+    face: tuple[complex, complex] | None
+
+    @property
+    def ends(self) -> list[complex]:
+        """Places that they reach."""
+        around = [self.center + self.radius * way for way in (1, 1j, -1, -1j)]
+        return [*(place for profile in self.profiles for place in profile), *(self.face or around)]
+
+
+@dataclass(frozen=True)
 class Scene:
     """One pose of a mechanism: places of the points, unit vectors of the links' x axes, lines of the slides.
 
@@ -87,15 +111,22 @@ class Scene:
     guides: tuple[Guide, ...]
     span: float
     wheels: tuple[Wheels, ...] = ()
+    cams: tuple[CamPair, ...] = ()
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
         return link_points(self.description.links[name])
 
     def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
-        """Points, wheels, and ends of the guides for a range of each slide (see `Guide.ends`)."""
+        """Points, wheels, cams, and ends of the guides for a range of each slide (see `Guide.ends`)."""
         guides = [end for guide in self.guides for end in guide.ends(travel, self.span)]
-        return [*self.points.values(), *guides, *(end for wheels in self.wheels for end in wheels.ends)]
+        return [*self.points.values(), *guides, *self.round]
+
+    @property
+    def round(self) -> list[complex]:
+        """Places that wheels, cams and rollers reach."""
+        wheels = (end for wheels in self.wheels for end in wheels.ends)
+        return [*wheels, *(end for pair in self.cams for end in pair.ends)]
 
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
@@ -177,7 +208,24 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         sides = [mesh.strand(configuration, side) for side in (1.0, -1.0) if mesh.belt]
         strands = [(pick(begin), pick(end)) for begin, end, _ in sides]
         wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, tuple(strands)))
-    return Scene(description, points, rotations, tuple(guides), span, tuple(wheels))
+    cams = tuple(_cam_pair(cam, configuration, pick) for cam in mechanism.cams)
+    return Scene(description, points, rotations, tuple(guides), span, tuple(wheels), cams)
+
+
+def _cam_pair(cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]) -> CamPair:
+    """A cam and its follower in the pose that `pick` takes."""
+    turn, base = pick(configuration.body_rotation(cam.links[1])), pick(configuration.nodes[cam.base])
+    start = base - turn * pick(cam.local(configuration, configuration.nodes[cam.base]))
+    few = [outline[np.isfinite(outline)] for outline in cam.outlines]
+    few = [outline[evenly(len(outline), _OUTLINE)] for outline in few]
+    profiles = tuple(tuple((start + turn * outline).tolist()) for outline in few)
+    solid = cam.sides == ("outer",) and cam.closed
+    center, radius, face = pick(configuration.nodes[cam.node]), pick(cam.roller(configuration)).real, None
+    if cam.flat:
+        along, (first, last) = pick(cam.along_face(configuration)), cam.face
+        more = _FACE * (last - first)
+        face = center + (first - more) * along, center + (last + more) * along
+    return CamPair(cam.links, profiles, solid, center, radius, face)
 
 
 def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
@@ -293,9 +341,9 @@ class Sweep(Shown):
             scene = pose(mechanism, configuration, int(index))
             if scene is not None:
                 reached += [np.array(guide.ends(self.travel, scene.span)) for guide in scene.guides]
-        if mechanism.meshes:
+        if mechanism.meshes or mechanism.cams:
             scenes = [pose(mechanism, configuration, int(index)) for index in self._some]
-            reached += [np.array(wheels.ends) for scene in scenes if scene is not None for wheels in scene.wheels]
+            reached += [np.array(scene.round) for scene in scenes if scene is not None]
         return np.concatenate(reached)
 
     @property

@@ -16,7 +16,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Spring
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.scene import Guide, Scene, Wheels, hull, spring_points
+from mechdesign.report.figures.scene import CamPair, Guide, Scene, Wheels, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -31,6 +31,7 @@ _COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its tur
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
+_PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
 _RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _NESTING = 9.0  # between the arrows of drives at one pivot
@@ -184,6 +185,8 @@ def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) ->
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
     for wheels in scene.wheels:
         shapes += _wheels(wheels, colors, scene.span)
+    for pair in scene.cams:
+        shapes += _cam(pair, colors)
     for spring in scene.description.springs.values():
         shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
     return shapes
@@ -201,6 +204,26 @@ def _wheels(wheels: Wheels, colors: Mapping[str, str], span: float) -> list[Shap
             ends = wheels.touch - _RACK * span * wheels.along, wheels.touch + _RACK * span * wheels.along
             shapes.append(Line(ends, colors[link], 1.2, 0.05, link, dashes=_PITCH))
     return shapes + [Line(strand, style.INK, 1.4, 0.06) for strand in wheels.strands]
+
+
+def _cam(pair: CamPair, colors: Mapping[str, str]) -> list[Shape]:
+    """A cam as a plate, or the lines of a groove, and the roller or the flat face on it."""
+    follower, cam = pair.links
+    shapes: list[Shape] = []
+    for profile in pair.profiles:
+        width = _PROFILE if pair.solid else _PROFILE / 2
+        shapes.append(Line(profile, colors[cam], width, PLATES - 0.1, cam, filled=pair.solid))
+        if pair.solid:
+            shapes.append(Line(profile, lighter(colors[cam], 0.8), 0.1, PLATES - 0.05, cam, filled=True))
+    if pair.face is not None:
+        shapes.append(Line(pair.face, colors[follower], BAR / 2, 0.05, follower))
+    elif pair.radius:
+        rim = (pair.center + pair.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 49))).tolist()
+        shapes += [
+            Line(rim, "white", 0.1, 0.02, follower, filled=True),
+            Line(rim, colors[follower], 1.6, 0.05, follower),
+        ]
+    return shapes
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:

@@ -24,16 +24,22 @@ from mechdesign.statistics import Request
 # Largest number of headlines of a question.
 MOST = 8
 _MOST_GOALS = 4  # of the best case of a sweep
-# Rates and forces: their extremes are not shown, of some the largest absolute value is.
+# Rates, forces and what cams have: their extremes are not shown, of some the largest absolute value is.
 _RATES_AND_FORCES = [
-    MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
-]
+    MOTION[name]
+    for name in (
+        "<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration",
+        "<coupling>_pressure_angle", "<coupling>_curvature_radius",
+    )
+]  # fmt: skip
 # Kinds of columns that say which pose a row is of.
 _POSE = (TIMED, DRIVE, GIVEN, HELD)
 # A number below this part of the others in its unit is zero up to rounding.
 _NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
+# Rows of key numbers that are told by absolute values, and by the smallest.
+_ABSOLUTE, _LOWEST = ("size", "least"), ("smallest", "least")
 _MINUS = "\N{MINUS SIGN}"
 _TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
@@ -147,7 +153,7 @@ def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:
 def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     table = result.tables[rule.table.name]
     values = np.asarray(column.values, dtype=float)
-    if rule.row == "size":
+    if rule.row in _ABSOLUTE:
         values = np.abs(values)
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
     valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
@@ -157,7 +163,7 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     if rule.row in ("first", "each"):
         rows = finite[: 1 if rule.row == "first" else None].tolist()
     else:
-        sign = 1.0 if rule.row == "smallest" else -1.0
+        sign = 1.0 if rule.row in _LOWEST else -1.0
         best: dict[tuple[Any, ...], int] = {}
         for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
@@ -194,7 +200,7 @@ def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pos
     course = table.scope.course(Request(column.name))
     if course is None:
         return None
-    value, place = course.worst(-1 if rule.row == "smallest" else 1, absolute=rule.row == "size")
+    value, place = course.worst(-1 if rule.row in _LOWEST else 1, absolute=rule.row in _ABSOLUTE)
     at = float(place[0])
     return float(value[0]), _Pose(course.shown(at), course.pose(at), at)
 

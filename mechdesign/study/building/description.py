@@ -16,6 +16,7 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import GROUND, build_graph
 from mechdesign.mechanism.model import (
     MEASURED,
+    Cam,
     Coupling,
     Description,
     Drive,
@@ -101,9 +102,10 @@ def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> No
         _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
 
 
-def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
-    path: KeyPath = ("joints", name, "through")
-    through = section.through or ()
+def _line(
+    builder: Builder, name: str, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath
+) -> Line:
+    """A line of a link through one point or two; its direction is a place of `name`."""
     for k, point in enumerate(through):
         _check_on_link(builder, link, point, (*path, k))
     if len(through) == 2:
@@ -116,8 +118,12 @@ def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line
         if first == second:
             _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
         return Line(link, through[0], 0.0, through[1])
-    direction = builder.place(f"{name}.direction", 0.0 if section.direction is None else section.direction, "angle")
-    return Line(link, through[0] if through else None, direction)
+    angle = builder.place(f"{name}.direction", 0.0 if direction is None else direction, "angle")
+    return Line(link, through[0] if through else None, angle)
+
+
+def _line_of_joint(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
+    return _line(builder, name, section.through or (), section.direction, link, ("joints", name, "through"))
 
 
 def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic:
@@ -129,7 +135,7 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[s
         _check_on_link(builder, slider, section.point, (*path, "point"))
     elif len(points) != 1:
         _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
-    line = _line(builder, name, section, guide)
+    line = _line_of_joint(builder, name, section, guide)
     angle = builder.place(f"{name}.angle", 0.0 if section.angle is None else section.angle, "angle")
     return Prismatic(name, line, slider, section.point or points[0], angle)
 
@@ -143,7 +149,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
     if builder.section.owners[section.point] == [guide]:
         message = f"point {section.point!r} is on link {guide!r} itself, which has the slot"
         _refuse(builder, (*path, "point"), message)
-    return Slot(name, _line(builder, name, section, guide), section.point)
+    return Slot(name, _line_of_joint(builder, name, section, guide), section.point)
 
 
 def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
@@ -445,8 +451,50 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
         builder.place(play(name), 0.0, kind)
-        couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
+        cam = None
+        if given.cam is not None:
+            with contextlib.suppress(_WrongJoint):
+                cam = _cam(builder, name, given, sets, function)
+        couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0, cam)
     return couplings
+
+
+def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, function: Expression) -> Cam:
+    """The cam of a coupling; `sets` is the coordinate that follows."""
+    section, given, path = builder.section, coupling.cam, ("couplings", name, "cam")
+    assert given is not None
+    _check_named(builder, "link", [given.link], (*path, "link"))
+    followed = sorted(function.names - builder.parameter_values.keys() - {f"{name}.ratio", f"{name}.phase"})
+    if len(followed) != 1:
+        _refuse(builder, path, f"a cam follows one coordinate, not {', '.join(followed) or 'none'}")
+    through = given.flat or (given.roller or "",)
+    key = (*path, given.kind)
+    _check_named(builder, "point", through[:1], key)
+    owners = [link for link in section.owners[through[0]] if link != given.link]
+    if not owners:
+        _refuse(builder, key, f"point {through[0]!r} is on the cam {given.link!r} itself; give one of its follower")
+    link = next((link for link in _moved(section, sets) if link in owners), owners[0])
+    if given.flat is None:
+        face = Line(link, through[0])
+        radius = builder.place(f"{name}.radius", given.radius or 0.0)
+    else:
+        face, radius = _line(builder, name, through, given.direction, link, key), None
+    span, kind = given.range, section.coordinates[followed[0]]
+    builder.reporter.kind((*ROOT, *path, "range"), kind)
+    if span is None:
+        table = next((table for _, table in function.program if isinstance(table, Tabulated)), None)
+        if table is None and kind != "angle":
+            _refuse(builder, path, f"the profile needs the 'range' of {followed[0]!r}, [first, last]")
+        span = (0.0, 2 * np.pi / builder.units.angle_factor) if table is None else (table.rows[0][0], table.rows[-1][0])
+    factor = builder.units.angle_factor if kind == "angle" else 1.0
+    return Cam(given.link, face, radius, given.side, (span[0] * factor, span[1] * factor), given.steps)
+
+
+def _moved(section: models.MechanismSection, name: str) -> tuple[str, ...]:
+    """Links of which a coordinate is the angle, or that it slides."""
+    target = section.driven(name)[1] if name in section.drives else name.rpartition(".")[0]
+    joint = section.joints.get(target)
+    return (target,) if joint is None else (joint.prismatic or ())[::-1]
 
 
 def _function(

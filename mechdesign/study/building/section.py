@@ -302,6 +302,51 @@ def _table(raw: Any, context: Context) -> str | tuple[tuple[float, ...], ...]:
     return read_rows(raw, context, 2, "every row holds two numbers", "an empty table")
 
 
+_SIDES = {
+    "outer": "its follower runs around the outside of the cam",
+    "inner": "its follower runs inside of the cam, a ring",
+    "groove": "its roller runs in a groove, which has both sides and holds it",
+}
+
+
+class Cam(fields.Model):
+    """A cam, and how its follower touches it: ``roller`` or ``flat``."""
+
+    one_of = ("the follower of a cam has one of roller: point, flat: point", "roller", "flat")
+    link: fields.LinkName
+    """Link that is the cam; the ground may be one. Example: cam"""
+    roller: fields.PointName | None = None
+    """Point of the follower that is the centre of its roller. Example: F"""
+    radius: fields.NonNegativeLengthPlace | None = None
+    """Radius of the roller; 0 is a knife edge. Example: 8 mm"""
+    flat: Line | None = None
+    """Point of the follower on its flat face; two points [P, R] give the face's direction as well. Example: F"""
+    direction: fields.AnglePlace | None = None
+    """Angle of the flat face from the follower's x axis. Left out: 0, unless ``flat`` has two points. Example: 90"""
+    side: Annotated[str, fields.choice(_SIDES, "side of a cam")] = "outer"
+    """Side of the profile on which the follower runs; the origin of the cam's frame is inside."""
+    range: Annotated[tuple[fields.Number, fields.Number], fields.pair_of("[first, last]")] | None = None
+    """First and last value of the coordinate that is followed, of the profile. Left out: the range of the ``table``, of
+    an angle a turn from 0. Example: [0, 120]
+    """
+    steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Cam:
+        if self.roller is not None and self.radius is None:
+            raise failure("a roller has a 'radius', 0 of a knife edge")
+        if foreign := self.given("direction") if self.roller is not None else self.given("radius"):
+            raise failure(f"a {self.kind} follower has no {foreign[0]!r}")
+        if self.flat is not None and self.side == "groove":
+            raise failure("a flat face runs in no groove; give a 'roller'")
+        if self.flat is not None and len(self.flat) == 2 and self.direction is not None:
+            raise failure("'flat' with two points gives the direction; leave 'direction' out")
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise failure("a range rises from its first value to its last")
+        return self
+
+
 class Coupling(fields.Model):
     """A coordinate that follows others, by gears, a rack, a belt, a cam or a controller: ``set`` and one of ``to``,
     ``ratio`` and ``table``.
@@ -335,6 +380,10 @@ class Coupling(fields.Model):
     """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
     pressure_angle: Annotated[float, fields.number("angle", fixed=True)] | None = None
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
+    cam: Cam | None = None
+    """The cam that moves what follows, whose profile, pressure angle and contact force are then known. Example:
+    {link: cam, roller: F, radius: 8}
+    """
 
     @model_validator(mode="after")
     def _consistent(self) -> Coupling:
@@ -346,6 +395,8 @@ class Coupling(fields.Model):
             raise failure("the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out")
         if self.phase is not None and self.ratio is None:
             raise failure("'phase' belongs to a 'ratio'")
+        if self.cam is not None and (foreign := self.given("radius", "pressure_angle")):
+            raise failure(f"{foreign[0]!r} belongs to wheels; a cam has its own, in 'cam'")
         return self
 
 

@@ -31,7 +31,7 @@ def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str
     if kind == "links" and rest:
         rest = ["length"] if rest == [2] else [part for part in rest if part != "points"]
         rest[-1] = "x" if rest[-1] == 0 else "y" if rest[-1] == 1 else rest[-1]
-    place = ".".join(map(str, ([kind] if kind == "limits" else []) + [owner, *rest]))
+    place = ".".join(map(str, ([kind] if kind in ("limits", "friction") else []) + [owner, *rest]))
     return place if place in places else ""
 
 

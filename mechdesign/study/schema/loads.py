@@ -97,7 +97,7 @@ def joints_of(mechanism: Mechanism, loads: Iterable[Load], springs: Iterable[Spr
     points += [point for spring in springs if not spring.turning for point in spring.between]
     graph = mechanism.graph
     loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
-    return Joints(mechanism.description, graph, loaded, mechanism.pressing)
+    return Joints(mechanism.description, graph, loaded, mechanism.engaged)
 
 
 def check_friction(checker: Checker) -> None:

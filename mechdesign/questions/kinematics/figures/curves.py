@@ -41,7 +41,7 @@ _MARKS = 8  # along a curve, about
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"  # of poses that are not valid
 # Kinds of panels in their order; a name has the same colour in all of its own.
-_ORDERS = ("velocity", "acceleration", "error", "effort")
+_ORDERS = ("velocity", "acceleration", "error", "effort", "pressure_angle", "curvature_radius")
 _RANKS = ("position", *_ORDERS, "clearance", "det_J", "inverse_condition")
 _OF_ONE_COLOR = ("position", "velocity", "acceleration", "error")
 _STILL = 1e-9  # part of its size by which a column changes that does not change

@@ -1,0 +1,312 @@
+"""Cams: profile, pressure angle and contact force of the motion that a coupling prescribes.
+
+Against the cam the centre c of a roller of radius r, or a point c of a flat face along the unit vector u, moves with
+the rates c' and c'' of the loop equations, and the face turns with the rates t' and t''. With the unit normal n out of
+the cam, the profile is the envelope of the roller or of the face, and rho its radius of curvature, positive where the
+cam is convex:
+
+    roller:  c' . n = 0,   p = c - r n,   rho = -|c'|^2/(n . c'') - r
+    face:    p = c + q u,  q = -(u x c')/t',  rho = -(n . i u) (2 u . c' - (u x c'')/t' - q t''/t')/t'
+
+The pressure angle is that from the velocity v of the follower where it is touched, the cam held, to n. By virtual work
+an effort Q on the coordinate that follows, which moves the follower with v for each unit, is a force Q/(v . n) along n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism import model
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet, rotation
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate, Coupled
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import Turn, turns_of
+from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.wheels import Pressed
+from mechdesign.numerics.arrays import Complexes, Floats
+
+# A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
+UNMOVED = 1e-9
+# The ends of a profile that closes meet within this part of its size.
+CLOSED = 1e-6
+
+
+class Touch(NamedTuple):
+    """Where a follower touches a cam, in the world.
+
+    Attributes
+    ----------
+    place, normal : complex
+        The place on the profile, and the unit normal out of the cam.
+    pressure_angle : float
+        From the follower's velocity to the normal, between -pi/2 and pi/2.
+    radius : float
+        Radius of curvature of the profile, positive where it is convex.
+    pitch : float
+        Curvature of the pitch curve, 1/(radius + roller); of a flat face 1.
+    face : float
+        Place along a flat face from its point; nan of a roller.
+    lever : float
+        How fast the follower moves along the normal for each unit of its coordinate.
+    swept : float
+        Rate of twice the area that the pitch curve sweeps about the origin of the cam's frame, seen along the normal.
+    """
+
+    place: Vector
+    normal: Vector
+    pressure_angle: Value
+    radius: Value
+    pitch: Value
+    face: Value
+    lever: Value
+    swept: Value
+
+
+@dataclass(frozen=True, eq=False)
+class Cam:
+    """The cam of a coupling.
+
+    Parameters
+    ----------
+    coupling, index : str, int
+        Name and number of the coupling.
+    followed, follower : Coordinate
+        The coordinates that it couples.
+    links : tuple of str
+        The follower's body, then the cam.
+    node, base : int
+        Nodes of the centre of the roller, or of a point of the flat face, and of a point of the cam.
+    turns : sequence of Turn
+        From the x axis of the follower to its flat face.
+    forward, plan : Plan
+        Plans of the drives, and with the coordinate that is followed in place of one of them.
+    """
+
+    coupling: str
+    index: int
+    given: model.Cam
+    followed: Coordinate
+    follower: Coordinate
+    links: tuple[str, str]
+    node: int
+    base: int
+    turns: Sequence[Turn]
+    forward: Plan
+    plan: Plan
+
+    @property
+    def flat(self) -> bool:
+        """Whether its follower has a flat face."""
+        return self.given.radius is None
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """Sides of the profile that it has."""
+        return ("outer", "inner") if self.given.side == "groove" else (self.given.side,)
+
+    @property
+    def _geometry(self) -> Geometry:
+        return self.forward.core.geometry
+
+    def roller(self, configuration: Configuration) -> Value:
+        """Radius of the roller; 0 of a flat face."""
+        radius = self.given.radius
+        return 0.0 if radius is None else self._geometry.term(radius, configuration.places)
+
+    def local(self, configuration: Configuration, place: Vector) -> Vector:
+        """A place of the world in the cam's frame."""
+        name = configuration.graph.nodes[self.base]
+        origin = self._geometry.local(self.links[1], name, configuration.places)
+        way = place - configuration.nodes[self.base]
+        local: Vector = origin + way * np.conj(configuration.body_rotation(self.links[1]))
+        return local
+
+    def along(self, values: Floats, places: dict[str, Floats] | None = None) -> Configuration:
+        """Poses in which the coordinate that is followed has these values, other drives as in the sketch."""
+        drawn = self.plan.core.sketch_configuration
+        given = [values if c.name == self.followed.name else drawn.value(c) for c in self.plan.structure.given]
+        return self.plan.solve(given, places, limits=False)
+
+    @property
+    def values(self) -> Floats:
+        """Values of the coordinate that is followed over the whole profile."""
+        return np.linspace(*self.given.span, self.given.steps + 1)
+
+    @cached_property
+    def _whole(self) -> Configuration:
+        """Poses over the whole profile, at the nominal dimensions."""
+        return self.along(self.values)
+
+    @cached_property
+    def outlines(self) -> list[Complexes]:
+        """The profile in the cam's frame, of each of its sides."""
+        touches = (self.touch(self._whole, side) for side in self.sides)
+        return [np.asarray(self.local(self._whole, touch.place)) for touch in touches]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the profile ends where it begins."""
+        outline = self.outlines[0]
+        return bool(abs(outline[-1] - outline[0]) <= CLOSED * (np.ptp(outline.real) + np.ptp(outline.imag)))
+
+    @cached_property
+    def face(self) -> tuple[float, float]:
+        """First and last place along a flat face that the cam touches, from the face's point; 0 of a roller."""
+        places = np.asarray(self.touch(self._whole).face)
+        return (0.0, 0.0) if np.isnan(places).all() else (float(np.nanmin(places)), float(np.nanmax(places)))
+
+    def along_face(self, configuration: Configuration) -> Vector:
+        """Unit vector of a flat face in the world."""
+        turned = rotation(self._geometry.angle(self.turns, configuration.places))
+        along: Vector = configuration.body_rotation(self.links[0]) * turned
+        return along
+
+    @cached_property
+    @quiet
+    def _out(self) -> float:
+        """Sign by which the normal leads out of the cam: the origin of its frame lies inside of the outer profile."""
+        return 1.0 if np.nansum(self._touch(self._whole, 1.0).swept) >= 0 else -1.0
+
+    def touch(self, configuration: Configuration, side: str = "") -> Touch:
+        """Where the follower touches the cam; of a groove on its outer profile, if not on the other `side`."""
+        return self._touch(configuration, -self._out if (side or self.sides[0]) == "inner" else self._out)
+
+    @quiet
+    def _touch(self, configuration: Configuration, out: float) -> Touch:
+        linear = Linearization(self.forward.structure, self._geometry, configuration)
+        slopes = [first(configuration, self.followed, rates) for rates in linear.by_drives]
+        square = sum(slope * slope for slope in slopes)
+        rates = [slope / square for slope in slopes]
+        velocity = linear.velocity(rates)
+        acceleration = linear.acceleration(velocity, [0.0] * len(rates))
+        frames = [linear.graph.bodies[body][0] for body in self.links]
+        center, radius = configuration.nodes[self.node], self.roller(configuration)
+        moved = self._against(velocity, center, configuration)
+        turn, bend = velocity.angles[frames[1]], acceleration.angles[frames[1]]
+        relative = velocity.nodes[self.node] - velocity.nodes[self.base]
+        arm = center - configuration.nodes[self.base]
+        fall = acceleration.nodes[self.node] - acceleration.nodes[self.base]
+        curved = fall - 1j * bend * arm - 2j * turn * relative - turn * turn * arm
+        face: Value = np.nan
+        if self.flat:
+            along = self.along_face(configuration)
+            spin = velocity.angles[frames[0]] - turn
+            face = -cross(along, moved) / spin
+            place = touched = center + face * along
+            normal = -1j * out * along
+            speed_up = face * (acceleration.angles[frames[0]] - bend)
+            size = out * (2 * dot(along, moved) - (cross(along, curved) + speed_up) / spin) / spin
+            pitch, pace = 1.0 + 0.0 * size, np.abs(spin)
+        else:
+            speed = np.abs(moved)
+            normal = -1j * out * moved / speed
+            pitch, pace = -dot(normal, curved) / norm2(moved), speed
+            place, touched, size = center - radius * normal, center, 1 / pitch - radius
+        # The follower's own motion while the cam is held: by play between them, the drives moved back.
+        parted = linear.sensitivity([model.play(self.coupling)])
+        back = first(configuration, self.followed, parted) * self._against(velocity, touched, configuration)
+        own = np.asarray(self._against(parted, touched, configuration) - back)[0]
+        pressure = np.arctan(cross(own, normal) / dot(own, normal))
+        turned = normal * np.conj(configuration.body_rotation(self.links[1]))
+        swept = pace * dot(self.local(configuration, center), turned)
+        return Touch(place, normal, pressure, size, pitch, face, dot(own, normal), swept)
+
+    def _against(self, rates: Rates, place: Vector, configuration: Configuration) -> Vector:
+        """Rate of a place of the follower against the cam."""
+        frames = [configuration.graph.bodies[body][0] for body in self.links]
+        follower, cam = (
+            rates.nodes[node] + 1j * rates.angles[frame] * (place - configuration.nodes[node])
+            for node, frame in zip((self.node, self.base), frames, strict=True)
+        )
+        way: Vector = follower - cam
+        return way
+
+    def place(self, configuration: Configuration) -> Vector:
+        """Where the follower touches the cam."""
+        return self.touch(configuration).place
+
+    @quiet
+    def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
+        """The contact force on the follower of an effort on its coordinate."""
+        touch = self.touch(configuration)
+        normal: Value = effort / touch.lever
+        return Pressed(touch.place, normal * touch.normal, normal)
+
+
+def cams(
+    couplings: Sequence[Coupled], forward: Plan, plan: Callable[[Sequence[str]], Plan]
+) -> list[Cam]:  # fmt: skip
+    """The cams of couplings.
+
+    Raises
+    ------
+    MechanismError
+        If the coordinate that a cam follows cannot take the place of a drive, or the follower has no one motion against
+        the cam.
+    """
+    core, listed = forward.core, []
+    graph = core.graph
+    for index, coupling in enumerate(couplings):
+        given = core.description.couplings[coupling.name].cam
+        if given is None:
+            continue
+        followed = next(part for part in coupling.function.parts if part.kind != "parameter")
+        point = given.face.through or ""
+        follower = graph.holder(given.face.link, point)
+        base = next(graph.nodes.index(name) for body, name in graph.points if body == given.link)
+        whole = _plan_with(followed, [c.name for c in forward.structure.given], plan, coupling.name)
+        cam = Cam(
+            coupling.name, index, given, followed, coupling.follower, (follower, given.link), graph.nodes.index(point),
+            base, turns_of(given.face), forward, whole,
+        )  # fmt: skip
+        _check_alone(cam)
+        listed.append(cam)
+    return listed
+
+
+def _plan_with(followed: Coordinate, drives: Sequence[str], plan: Callable[[Sequence[str]], Plan], name: str) -> Plan:
+    """The plan of the drives, the coordinate that is followed in place of one of them."""
+    if followed.name in drives:
+        return plan(drives)
+    for others in list(combinations(drives, len(drives) - 1))[::-1]:
+        try:
+            return plan((followed.name, *others))
+        except MechanismError:
+            continue
+    message = f"no drive moves '{followed.name}', which the cam of coupling '{name}' follows"
+    raise MechanismError(message, f"mechanism.couplings.{name}.cam")
+
+
+def _check_alone(cam: Cam) -> None:
+    """The follower moves against the cam by the one coordinate alone."""
+    core = cam.forward.core
+    drawn = core.sketch_configuration
+    linear = Linearization(cam.forward.structure, core.geometry, drawn)
+    slopes = [float(first(drawn, cam.followed, rates)) for rates in linear.by_drives]
+    largest = max(range(len(slopes)), key=lambda k: abs(slopes[k]))
+    for k, slope in enumerate(slopes):
+        if k == largest or slopes[largest] == 0:
+            continue
+        rates = [0.0] * len(slopes)
+        rates[k], rates[largest] = 1.0, -slope / slopes[largest]
+        velocity = linear.velocity(rates)
+        place = drawn.nodes[cam.node]
+        turned = [velocity.angles[core.graph.bodies[body][0]] for body in cam.links]
+        moved = np.abs(cam._against(velocity, place, drawn)) / (core.size or 1.0)
+        if max(float(moved), abs(float(turned[0] - turned[1]))) > UNMOVED:
+            drive = cam.forward.structure.given[k].name
+            raise MechanismError(
+                f"drive '{drive}' moves the follower against the cam too, not '{cam.followed.name}' alone: the cam has "
+                "no one profile",
+                f"mechanism.couplings.{cam.coupling}.cam",
+            )

@@ -1,0 +1,123 @@
+"""Cams of a study over their whole profiles: a table, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mechdesign.cautions import Caution
+from mechdesign.mechanism.algebra import TURN
+from mechdesign.mechanism.cams import Cam
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.kinematics.columns import CAM
+from mechdesign.questions.poses import in_study_units
+from mechdesign.results import Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.
+SLIDING, TURNING = 30.0, 45.0
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """One side of a cam of several designs; arrays are of shape (designs, places), lengths and angles of the study."""
+
+    cam: Cam
+    side: str
+    coordinates: Mapping[str, Floats]  # that which is followed, and the one that follows, by name
+    x: Floats
+    y: Floats
+    pressure_angle: Floats
+    radius: Floats
+    face: Floats
+    roller: Floats
+
+    @property
+    def undercut(self) -> Flags:
+        """Where the roller, or a flat face, cuts away what it has touched before."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray((self.radius <= 0) & (self.cam.flat | (self.radius > -self.roller)))
+
+    def caution(self, study: Study, design: int, kind: str, where: Flags, text: str) -> Iterator[Caution]:
+        """A warning where some places of a design's profile are concerned."""
+        if where.any():
+            row, followed = int(where.argmax()), self.cam.followed
+            value, unit = self.coordinates[followed.name][design][row], study.units.label(followed.quantity)
+            first = f"{followed.name} = {value:.6g} {unit}".rstrip()
+            side = f" ({self.side} side)" if len(self.cam.sides) > 1 else ""
+            places = f"at {np.count_nonzero(where)} of {len(where)} places"
+            message = f"cam {self.cam.coupling}{side}: {places} {text}; the first: {first}"
+            yield Caution(kind, message, "cam", row, first)
+
+
+def profiles(study: Study, poses: Poses) -> list[Profile]:
+    """The profiles of all cams in each design."""
+    sides = []
+    per_design = poses.count // poses.designs
+    places = {name: values[::per_design, None] for name, values in poses.places.items()}
+    for cam in study.mechanism.cams:
+        configuration = cam.along(cam.values, places)
+        shape = poses.designs, len(cam.values)
+
+        def whole(values: ArrayLike, shape: tuple[int, int] = shape) -> Floats:
+            return np.array(np.broadcast_to(np.real(values), shape))
+
+        coordinates = {
+            c.name: whole(in_study_units(study, c, configuration.value(c))) for c in (cam.followed, cam.follower)
+        }
+        for side in cam.sides:
+            touch = cam.touch(configuration, side)
+            place = cam.local(configuration, touch.place)
+            columns = (
+                place, -1j * place, touch.pressure_angle / study.units.angle_factor, touch.radius, touch.face,
+                cam.roller(configuration),
+            )  # fmt: skip
+            sides.append(Profile(cam, side, coordinates, *map(whole, columns)))
+    return sides
+
+
+def cam_table(study: Study, sides: Sequence[Profile]) -> Table:
+    """``cam.csv``: every profile of every design; coordinates of another cam are nan."""
+    coordinates = {c.name: c for side in sides for c in (side.cam.followed, side.cam.follower)}
+
+    def column(values: Callable[[Profile], ArrayLike]) -> NDArray[Any]:
+        return np.concatenate([np.broadcast_to(values(side), side.x.shape) for side in sides], axis=1).ravel()
+
+    words = {"coupling": column(lambda side: side.cam.coupling), "side": column(lambda side: side.side)}
+    numbers = {
+        "x": column(lambda side: side.x), "y": column(lambda side: side.y),
+        "pressure_angle": column(lambda side: side.pressure_angle),
+        "curvature_radius": column(lambda side: side.radius), "face": column(lambda side: side.face),
+    }  # fmt: skip
+    labels, followed = study.units.labels, []
+    for name, coordinate in coordinates.items():
+        values = column(lambda side, own=name: side.coordinates.get(own, np.nan))  # type: ignore[misc]
+        followed.append(CAM["<coordinate>"].column(values, study.units.label(coordinate.quantity), coordinate=name))
+    return CAM.table([*CAM.columns(labels, **words), *followed, *CAM.columns(labels, **numbers)])
+
+
+def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Caution]:
+    """Warnings of the cams of a design."""
+    angle, turn = study.units.label("angle"), study.units.angle_factor
+    for side in sides:
+        cam, pressure = side.cam, np.abs(side.pressure_angle[design])
+        limit = np.radians(SLIDING if cam.follower.quantity == "length" else TURNING) / turn
+        lost, steep = np.isnan(side.x[design]), pressure > limit
+        yield from side.caution(study, design, "unassembled", lost, "the profile cannot be assembled")
+        cure = "a larger base circle helps" if cam.flat else "a larger base circle helps, or a smaller roller"
+        text = f"the profile is undercut, and the follower leaves its law; {cure}"
+        yield from side.caution(study, design, "cam", side.undercut[design], text)
+        if steep.any():
+            text = (
+                f"the pressure angle is above {limit:.3g} {angle}, at most {np.nanmax(pressure):.4g}: the follower may "
+                "jam; a larger base circle or another offset helps"
+            )
+            yield from side.caution(study, design, "cam", steep, text)
+        if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN):
+            end = np.arange(side.x.shape[1]) == cam.given.steps
+            yield from side.caution(study, design, "cam", end, "the profile does not close after a turn")
