@@ -6,9 +6,10 @@ import cmath
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, indent, tostring
 
+from mechdesign.errors import printable
 from mechdesign.exporting.bodies import OPEN, Bodies, Body, Joint, Sum
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.model_text import add, comment, numbers, outlines, paint, planar, words
+from mechdesign.exporting.model_text import add, comment, name_of, numbers, outlines, paint, planar, words
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import GROUND
 
@@ -31,7 +32,7 @@ class Model:
 
     def __init__(self, bodies: Bodies) -> None:
         self.bodies, self.view = bodies, bodies.view
-        self.root = Element("mujoco", model=self.view.study.name)
+        self.root = Element("mujoco", model=printable(self.view.study.name))
         self.colors = paint(bodies.mechanism)
         self.bounded: dict[str, tuple[float, float]] = {}
 
@@ -77,7 +78,7 @@ class Model:
             body, parent = self.bodies.bodies[joint.child], self.bodies.bodies[joint.parent]
             angle = cmath.phase(body.turn * parent.turn.conjugate())
             element = add(
-                elements[joint.parent], "body", name=body.name, pos=planar(parent.local(body.origin)),
+                elements[joint.parent], "body", name=name_of(body.name), pos=planar(parent.local(body.origin)),
                 euler=numbers(0, 0, angle),
             )  # fmt: skip
             elements[body.name] = element
@@ -114,15 +115,15 @@ class Model:
     def _closures(self) -> None:
         for joint in self.bodies.closures:
             first, second = (joint.child, joint.parent) if joint.parent == GROUND else (joint.parent, joint.child)
-            other = {} if second == GROUND else {"body2": second}
+            other = {} if second == GROUND else {"body2": name_of(second)}
             anchor = planar(self.bodies.bodies[first].local(joint.place))
             kind = "connect" if joint.kind == "hinge" else "weld"
-            add(self.equality, kind, name=joint.name, body1=first, **other, anchor=anchor)
+            add(self.equality, kind, name=joint.name, body1=name_of(first), **other, anchor=anchor)
 
     def _couplings(self) -> None:
         bodies = self.bodies
         for coupling in bodies.mechanism.couplings:
-            terms = bodies.sum_of(coupling.gap)
+            name, terms = f"coupling.{coupling.name}", bodies.sum_of(coupling.gap)
             if terms is None:
                 bodies.leave_out(
                     f"coupling {coupling.name}", "MuJoCo has no function of its kind, and what it sets moves freely"
@@ -130,10 +131,10 @@ class Model:
             elif len(terms) == 2:
                 (follower, own), (leader, other) = terms.items()
                 ratio = numbers(0, -other / own, 0, 0, 0)
-                add(self.equality, "joint", name=coupling.name, joint1=follower, joint2=leader, polycoef=ratio)
+                add(self.equality, "joint", name=name, joint1=follower, joint2=leader, polycoef=ratio)
             else:
-                self._fixed(coupling.name, terms)
-                add(self.equality, "tendon", name=coupling.name, tendon1=coupling.name)
+                self._fixed(name, terms)
+                add(self.equality, "tendon", name=name, tendon1=name)
 
     def _fixed(self, name: str, terms: Sum, **more: str) -> None:
         """A tendon whose length is a sum of coordinates."""
@@ -149,17 +150,15 @@ class Model:
 
     def _limits(self, world: Element) -> None:
         bodies = self.bodies
-        for bound in bodies.mechanism.bounds:
-            coordinate = bound.coordinate
+        for number, bound in enumerate(bodies.mechanism.bounds, start=1):
+            name, coordinate = f"limit.{number}", bound.coordinate
             if coordinate.kind == "distance":
                 nodes = (bodies.graph.nodes[node] for node in (coordinate.node, coordinate.other))
                 scale = bodies.scales.length
                 low, high = (
                     None if end is None else scale * float(end) for end in bound.ends(bodies.mechanism.nominal)
                 )
-                self._spatial(
-                    f"limit.{bound.label}", [*nodes], range=numbers(low or 0.0, OPEN if high is None else high)
-                )
+                self._spatial(name, [*nodes], range=numbers(low or 0.0, OPEN if high is None else high))
                 continue
             terms = bodies.sum_of(coordinate)
             if terms is None:
@@ -172,12 +171,12 @@ class Model:
                 joint = next(joint for joint in world.iter("joint") if joint.get("name") in terms)
                 joint.set("range", numbers(*ends))
             else:
-                self._fixed(f"limit.{bound.label}", terms, range=numbers(*ends))
+                self._fixed(name, terms, range=numbers(*ends))
 
     def _springs(self) -> None:
         """Springs and dampers as tendons; a pull that does not vanish without stiffness is an actuator's."""
-        for name, spring in self.bodies.description.springs.items():
-            pull = self.bodies.pull_of(spring)
+        for own, spring in self.bodies.description.springs.items():
+            name, pull = f"spring.{own}", self.bodies.pull_of(spring)
             rest = {"stiffness": numbers(pull.stiffness), "springlength": numbers(pull.rest, pull.rest)}
             more = {**(rest if pull.stiffness else {}), "damping": numbers(pull.damping)}
             if pull.terms is None:

@@ -7,12 +7,15 @@ from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement
 
 from mechdesign import __version__
+from mechdesign.errors import printable
 from mechdesign.exporting.bodies import Bodies, Body
 from mechdesign.exporting.drawing import hull
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.report.figures.shapes import link_colors
 
+# Name of what does not move.
+WORLD = "world"
 # Decimals of places (m).
 DECIMALS = 12
 
@@ -27,6 +30,11 @@ def numbers(*values: float) -> str:
     return " ".join(f"{value + 0.0:.10g}" for value in values)
 
 
+def name_of(body: str) -> str:
+    """Name of a body in the file; simulators have a world of their own."""
+    return f"{body}.link" if body == WORLD else body
+
+
 def planar(place: complex) -> str:
     """A place or vector of the plane in space."""
     return numbers(round(place.real, DECIMALS), round(place.imag, DECIMALS), 0.0)
@@ -34,7 +42,7 @@ def planar(place: complex) -> str:
 
 def comment(words: Iterable[str]) -> Any:
     """Lines as a comment, in which no two hyphens follow each other."""
-    return Comment("".join(f"\n  {line.replace('--', '- -')}" for line in words) + "\n")
+    return Comment("".join(f"\n  {printable(line).replace('--', '- -')}" for line in words) + "\n")
 
 
 def outlines(bodies: Bodies, body: Body) -> tuple[list[tuple[complex, complex]], float]:

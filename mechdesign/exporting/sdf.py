@@ -9,15 +9,14 @@ import cmath
 import math
 from xml.etree.ElementTree import Element, indent, tostring
 
+from mechdesign.errors import printable
 from mechdesign.exporting.bodies import OPEN, Bodies, Joint, Sum
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.model_text import add, comment, numbers, outlines, paint, planar, words
+from mechdesign.exporting.model_text import WORLD, add, comment, name_of, numbers, outlines, paint, planar, words
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import GROUND
 
 VERSION = "1.11"
-# Name of the frame that does not move.
-WORLD = "world"
 _CONTROLLER = ("gz-sim-joint-position-controller-system", "gz::sim::systems::JointPositionController")
 _FORCE = ("gz-sim-apply-joint-force-system", "gz::sim::systems::ApplyJointForce")
 _TYPES = {"hinge": "revolute", "slide": "prismatic", "fixed": "fixed"}
@@ -42,7 +41,7 @@ class Model:
     def __init__(self, bodies: Bodies) -> None:
         self.bodies = bodies
         self.root = Element("sdf", version=VERSION)
-        self.model = add(self.root, "model", name=bodies.view.study.name)
+        self.model = add(self.root, "model", name=printable(bodies.view.study.name))
         self.axes: dict[str, Element] = {}
 
     def text(self) -> str:
@@ -54,7 +53,9 @@ class Model:
             put(model, "pose", numbers(0, 0, 0, math.pi / 2, lean, 0))
         put(model, "self_collide", "false")
         self._links()
-        self._joint(Joint("fixed.ground", "fixed", WORLD, GROUND, 0j))
+        ground = add(model, "joint", name="fixed.ground", type="fixed")
+        put(ground, "parent", WORLD)
+        put(ground, "child", GROUND)
         for joint in (*bodies.joints.values(), *bodies.closures):
             self._joint(joint)
         self._couplings()
@@ -76,7 +77,7 @@ class Model:
     def _links(self) -> None:
         colors = paint(self.bodies.mechanism)
         for body in self.bodies.bodies.values():
-            link = add(self.model, "link", name=body.name)
+            link = add(self.model, "link", name=name_of(body.name))
             put(link, "pose", f"{planar(body.origin)} 0 0 {numbers(cmath.phase(body.turn))}")
             inertial = add(link, "inertial")
             put(inertial, "pose", f"{planar(body.center)} 0 0 0")
@@ -101,13 +102,13 @@ class Model:
 
     def _joint(self, joint: Joint) -> None:
         parent, child = joint.parent, joint.child
-        if child == GROUND and parent != WORLD:
+        if child == GROUND:
             parent, child = child, parent
         body = self.bodies.bodies[child]
         element = add(self.model, "joint", name=joint.name, type=_TYPES[joint.kind])
         put(element, "pose", f"{planar(body.local(joint.place))} 0 0 0")
-        put(element, "parent", parent)
-        put(element, "child", child)
+        put(element, "parent", name_of(parent))
+        put(element, "child", name_of(child))
         if joint.kind != "fixed":
             axis = add(element, "axis")
             put(axis, "xyz", planar(joint.along * body.turn.conjugate()) if joint.kind == "slide" else "0 0 1")

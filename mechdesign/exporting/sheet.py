@@ -17,7 +17,7 @@ from matplotlib.textpath import text_to_path
 
 from mechdesign import __version__
 from mechdesign.cautions import Caution
-from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.errors import MechdesignError, StudyError, printable
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.plates import pins_of
@@ -231,7 +231,7 @@ class Sheet:
         unit = study.units.label("length") or "none (as mm)"
         rows = (
             (("Legal owner", "", 60.0), ("Created by", "", 40.0), ("Approved by", "", 40.0), ("Date", "", 40.0)),
-            (("Title", study.name, 110.0), ("Document type", "Mechanism with its dimensions", 70.0)),
+            (("Title", printable(study.name), 110.0), ("Document type", "Mechanism with its dimensions", 70.0)),
             (("Scale", self.words, 25.0), ("Unit of length", unit, 30.0), ("Paper", self.paper, 15.0),
              ("Sheet", "1 / 1", 15.0), ("Identification (SHA-256 of the study)", study.text_sha256[:16], 55.0),
              ("Made with", f"mechdesign {__version__}", 40.0)),
