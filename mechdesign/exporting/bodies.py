@@ -146,6 +146,10 @@ class Bodies:
         self.bodies = {name: self._body(name) for name in (*self.graph.bodies, *self._blocks)}
         if view.study.units.length == "dimensionless":
             self._say("assumed", "lengths are dimensionless: a unit of length is taken as 1 m")
+        if self.description.friction:
+            self.leave_out("friction", "that of a simulator's joints does not grow with their forces")
+        if view.study.dynamics is not None and view.study.dynamics.loads:
+            self.leave_out("dynamics.loads", "loads follow time and motion; apply them from your program")
 
     def _say(self, kind: str, message: str) -> None:
         self.left_out.append(Caution(kind, message))

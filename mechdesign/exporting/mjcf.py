@@ -64,10 +64,6 @@ class Model:
         root.extend(part for part in (self.tendons, self.equality, self.actuators, self.sensors) if len(part))
         about = "A pin's coordinate is the angle of its body against the one that carries it."
         root.insert(0, comment([*words(bodies), about]))
-        if bodies.description.friction:
-            bodies.leave_out("friction", "MuJoCo's friction in joints does not grow with their forces")
-        if self.view.study.dynamics is not None and self.view.study.dynamics.loads:
-            bodies.leave_out("dynamics.loads", "loads follow time and motion; apply them from your program")
         indent(root)
         return tostring(root, encoding="unicode") + "\n"
 

@@ -62,11 +62,6 @@ class Model:
         self._limits()
         self._springs()
         drives = self._drives()
-        description, dynamics = bodies.description, bodies.view.study.dynamics
-        if description.friction:
-            bodies.leave_out("friction", "Gazebo's friction in joints does not grow with their forces")
-        if dynamics is not None and dynamics.loads:
-            bodies.leave_out("dynamics.loads", "loads follow time and motion; apply them from your program")
         lines = [*words(bodies), f"Coordinates of joints are 0 in this pose, where {', '.join(drives)}."]
         if gravity:
             lines.append(f"The world's gravity has to be 0 0 {numbers(-abs(gravity))}; the model stands upright in it.")
