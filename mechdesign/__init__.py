@@ -40,12 +40,14 @@ if TYPE_CHECKING:
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
     from mechdesign.errors import StudyError as StudyError
+    from mechdesign.importing.conversion import convert as convert
     from mechdesign.report.requirements import requirements as requirements
 
     __version__: str
 
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
+    "convert": "mechdesign.importing.conversion",
     "requirements": "mechdesign.report.requirements",
     **dict.fromkeys(
         (

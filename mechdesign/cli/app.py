@@ -164,10 +164,12 @@ def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
     return watch(file, commands or (), Options(command="watch", **said))
 
 
-def _export(study: Path | None, to: str, at: str | None, **said: Any) -> int:
+def _export(
+    study: Path | None, to: str, at: str | None, rate: str | None, paper: str | None, **said: Any
+) -> int:  # fmt: skip
     from mechdesign.cli.export import export
 
-    return export(study, to, at, Options(command="export", **said))
+    return export(study, to, (at, rate, paper), Options(command="export", **said))
 
 
 def _compare(**said: Any) -> int:
@@ -240,10 +242,22 @@ _add(
 _add(
     _export,
     "export",
-    (given.STUDY, given.TO, given.AT, given.OUT_EXPORT, given.OVERRIDES, given.QUIET, given.STRICT, given.ALLOW_FILES),
-    "Write a file for other tools: parts to cut, a drawing, layers.",
+    (
+        given.STUDY,
+        given.TO,
+        given.AT,
+        given.RATE,
+        given.PAPER,
+        given.OUT_EXPORT,
+        given.OVERRIDES,
+        given.QUIET,
+        given.STRICT,
+        given.ALLOW_FILES,
+    ),
+    "Write a file for other tools: parts to cut, a drawing, a simulator's model.",
     "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "
-    "nothing meets.",
+    "nothing meets, a drawing sheet, a model for MuJoCo or Gazebo, curves, the motion for a controller, the study as "
+    "JSON.",
 )
 _add(
     _watch,
@@ -283,6 +297,23 @@ def new(
         from mechdesign.study import template as template_text
 
         emit(template_text(template) if template else template_text())
+
+
+@app.command("import", short_help="Make a study of another tool's file or share address.")
+def import_(
+    source: Annotated[str, given.SOURCE],
+    out: Annotated[Path | None, given.OUT_STUDY] = None,
+    drive: Annotated[list[str] | None, given.DRIVE] = None,
+    unit: Annotated[str | None, given.UNIT] = None,
+    scale: Annotated[float | None, given.SCALE] = None,
+) -> None:
+    """Make a commented study that runs of a mechanism that PMKS+, Linkage or pylinkage has saved, of tables of joints
+    and links, or of a DXF sketch. Nothing is fetched: a share address holds the whole mechanism.
+    """
+    with _guard():
+        from mechdesign.cli.importing import import_study
+
+        import_study(source, out, drive or (), unit, scale)
 
 
 def _words(incomplete: str) -> list[str]:

@@ -109,6 +109,18 @@ TO = _parameter(
     Parameter.empty,
     typer.Option("--to", metavar="NAME", help="Name of the file, e.g. parts.dxf; a wrong name lists them."),
 )
+RATE = _text(
+    str,
+    "--rate",
+    "RATE",
+    "Rate at which motion.csv tells the drives, e.g. '500 Hz', or a step of time, e.g. '2 ms'. Default: 1 kHz.",
+)
+PAPER = _text(
+    str,
+    "--paper",
+    "SIZE",
+    "Size of the drawing sheet sheet.pdf: A4 or A3. Default: A4, or A3 where the drawing would be crowded.",
+)
 AT = _text(
     str,
     "--at",
@@ -246,6 +258,22 @@ TEMPLATE = typer.Argument(
     show_default=False,
     autocompletion=_templates,
 )
+SOURCE = typer.Argument(
+    metavar="SOURCE",
+    help="A share address of PMKS+ (in quotes), a file, or a folder with joints.csv and links.csv.",
+    show_default=False,
+)
+OUT_STUDY = typer.Option(
+    "--out", metavar="FILE", help="Where to write the study. Left out: stdout.", show_default=False
+)
+DRIVE = typer.Option(
+    "--drive",
+    metavar="NAME",
+    help="What is driven, in place of the file's inputs: a pin of the ground, a link or a slide; may be repeated.",
+    show_default=False,
+)
+UNIT = typer.Option("--unit", metavar="UNIT", help="Unit of length in place of the file's.", show_default=False)
+SCALE = typer.Option("--scale", metavar="FACTOR", help="Factor of all lengths.", show_default=False)
 OLD = _folder("old", "Folder of the results that are the baseline.")
 NEW = _folder("new", "Folder of the results that are compared with it.")
 RTOL = _parameter(

@@ -39,6 +39,7 @@ ORDER = (
     tuple(f"mechdesign.questions.{name}.figures" for name in COMMANDS),
     ("mechdesign.report",),
     ("mechdesign.experiments",),
+    ("mechdesign.importing",),
     ("mechdesign.exporting",),
     ("mechdesign.api",),
     ("mechdesign.reference",),

@@ -1,0 +1,36 @@
+"""The command `import`: a study of another tool's file, on stdout or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mechdesign.cli.terminal import emit, emit_words
+from mechdesign.errors import OutputError, StudyError
+from mechdesign.files import replace
+from mechdesign.importing.conversion import convert
+
+
+def import_study(
+    source: str, out: Path | None, drives: Sequence[str], unit: str | None, scale: float | None
+) -> None:  # fmt: skip
+    """Convert a source; a study that is there already is kept.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be converted, or the file is there already.
+    OutputError
+        If it cannot be written.
+    """
+    if out is not None and out.exists():
+        raise StudyError(f"{out} is there already; give --out another name")
+    text = convert(source, drives=drives, unit=unit, scale=scale)
+    if out is None:
+        emit(text)
+        return
+    try:
+        replace(out, [text.encode()])
+    except OSError as error:
+        raise OutputError(f"{out}: could not be written: {error.strerror or error}") from error
+    emit_words(f"{out}: written; mechdesign kinematics {out} runs it\n")

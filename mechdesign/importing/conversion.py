@@ -1,0 +1,202 @@
+"""`convert`: from a file or an address of another tool to the text of a study that runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mechdesign import study as studies
+from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
+from mechdesign.importing.draft import Draft, Span
+from mechdesign.importing.formats import FORMATS
+from mechdesign.importing.sketch import Drive, Sketch
+from mechdesign.importing.source import Source
+from mechdesign.importing.writer import STEPS, Writer
+from mechdesign.numerics.arrays import Flags, Floats
+
+_APART = "the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits there"
+
+
+def convert(
+    source: str | os.PathLike[str] | None = None,
+    *,
+    text: str | None = None,
+    drives: Sequence[str] = (),
+    unit: str | None = None,
+    scale: float | None = None,
+) -> str:
+    """Convert what another tool has saved to a commented study in YAML, which `load` takes as its `text`.
+
+    Parameters
+    ----------
+    source : str or path
+        A share address of PMKS+, a file of PMKS+, Linkage or pylinkage, a DXF sketch, JSON of joints and links, or a
+        folder with ``joints.csv`` and ``links.csv``. Nothing is fetched: an address holds the whole mechanism.
+    text : str
+        The text of such a file, or an address, in place of `source`.
+    drives : sequence of str
+        What is driven, in place of the file's inputs: pins of the ground, links or slides, by their names in the file.
+    unit : str
+        Unit of length in place of the file's; numbers stay as they are.
+    scale : float
+        Factor of all lengths, before `unit`.
+
+    Returns
+    -------
+    str
+        The study. Its comments say what became what and what was left out.
+
+    Raises
+    ------
+    StudyError
+        If the format is none of these, the file is broken, or what it shows is no mechanism that can be driven.
+
+    Examples
+    --------
+    >>> import mechdesign
+    >>> arm = '{"joints": [{"name": "O", "x": 0, "y": 0, "ground": "yes", "drive": "60 rpm"}, \
+{"name": "P", "x": 3, "y": 4}], "links": [{"name": "arm", "joints": ["O", "P"]}]}'
+    >>> study = mechdesign.load(text=mechdesign.convert(text=arm))
+    >>> study.mechanism.drives
+    ('arm',)
+    """
+    if (source is None) == (text is None):
+        raise StudyError("give a source, or a text in its place")
+    origin = Source.of(os.fspath(source)) if source is not None else Source.of_text(text or "")
+    for kind in FORMATS:
+        if kind.recognises(origin):
+            sketch = kind.read(origin)
+            break
+    else:
+        names = "; ".join(kind.name for kind in FORMATS)
+        raise StudyError(f"{cut(origin.name)} is of no format that is read: {names}")
+    if not sketch.links:
+        raise StudyError(f"{cut(origin.name)} has no links")
+    if not sketch.fixed:
+        raise StudyError(f"no joint of {cut(origin.name)} is on the ground: nothing holds the mechanism")
+    if scale is not None:
+        _scale(sketch, scale)
+    if unit is not None:
+        sketch.units["length"] = unit
+    _choose(sketch, drives)
+    return _settled(Draft(sketch), cut(origin.name))
+
+
+def _scale(sketch: Sketch, factor: float) -> None:
+    if not 0 < factor < 1e6:
+        raise StudyError(f"a scale of {factor:g}; it is a positive number")
+    for name, point in sketch.points.items():
+        sketch.points[name] = replace(point, x=factor * point.x, y=factor * point.y)
+    for link in sketch.links.values():
+        link.center = None if link.center is None else (factor * link.center[0], factor * link.center[1])
+    sketch.forces = [replace(f, place=(factor * f.place[0], factor * f.place[1])) for f in sketch.forces]
+    for index, drive in enumerate(sketch.drives):
+        if drive.kind != "angle":
+            span = None if drive.span is None else (factor * drive.span[0], factor * drive.span[1])
+            speed = None if drive.speed is None else factor * drive.speed
+            sketch.drives[index] = replace(drive, span=span, speed=speed)
+    sketch.choices.append(f"all lengths are multiplied by {factor:g}")
+
+
+def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
+    """Take what `drives` names in place of the file's inputs; ask where neither says anything."""
+    if chosen:
+        sketch.drives = [_named(sketch, name) for name in chosen]
+        return
+    if not sketch.drives:
+        pins = [name for name in sketch.fixed if sketch.moving_at(name)]
+        listed = ", ".join(map(repr, pins[:12]))
+        raise StudyError(
+            f"the file says of no joint that it is driven: choose with --drive; pins of the ground: {listed}"
+        )
+    kept: dict[tuple[str, str], Drive] = {}
+    for drive in sketch.drives:
+        kept.setdefault((drive.kind, drive.of), drive)
+    sketch.drives = list(kept.values())
+    if len(kept) > 1:
+        by_hand = [repr(drive.of) for drive in sketch.drives if drive.held]
+        sketch.choices += [f"input {name} is moved by hand there, and held here" for name in by_hand]
+
+
+def _named(sketch: Sketch, name: str) -> Drive:
+    """The drive that a name stands for, with the speed that the file has for it."""
+    of = name
+    if name in sketch.points and name in sketch.fixed:
+        links = sketch.moving_at(name)
+        if len(links) != 1:
+            raise StudyError(f"{len(links)} links turn about {name!r}: name the one that is driven")
+        of = links[0]
+    elif name in sketch.points:
+        of = next((slide for slide, s in sketch.slides.items() if s.point == name), name)
+    for drive in sketch.drives:
+        if drive.of == of:
+            return drive
+    if of in sketch.slides:
+        return Drive("slide", of)
+    if of in sketch.links:
+        return Drive("length" if sketch.links[of].telescopic else "angle", of)
+    raise StudyError(f"--drive {cut(name)}: no pin of the ground, link or slide of the file has this name")
+
+
+def _settled(draft: Draft, source: str) -> str:
+    """The study, whose drive goes no farther than the mechanism lets it."""
+    writer = Writer(draft)
+    spans = {name: draft.span(name) for name in draft.drives}
+    if len(spans) == 1:
+        ((name, span),) = spans.items()
+        drive, start = draft.drives[name], draft.start(name)
+        turns = drive.kind == "angle" and drive.span is None
+        wide = (start - 180, start + 180) if turns else span
+        solve = _loaded(writer.text(source, {name: wide})).mechanism.solve
+
+        def assembled(values: Floats) -> Flags:
+            return np.asarray(solve({name: values}).valid)
+
+        values = np.unique([*np.linspace(*wide, 2 * STEPS + 1), start])
+        valid = assembled(values)
+        spans[name] = _passed(values, valid, start, assembled)
+        if turns and valid.all():
+            spans[name] = span
+        remark = []
+        if not valid.all():
+            low, high = spans[name]
+            remark = [f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"]
+        return writer.text(source, spans, remark)
+    text = writer.text(source, spans)
+    if not _loaded(text).mechanism.solve({name: [draft.start(name)] for name in spans}).valid.all():
+        raise AssemblyError(_APART)
+    return text
+
+
+def _loaded(text: str) -> studies.Study:
+    try:
+        return studies.load(None, (), None, text=text)
+    except StudyError as error:
+        reasons = "; ".join(f"{problem.key}: {problem.message}" for problem in error.problems[:3])
+        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {reasons}") from None
+    except MechdesignError as error:
+        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
+
+
+def _passed(values: Floats, valid: Flags, start: float, assembled: Callable[[Floats], Flags]) -> Span:
+    """The ends of the values around the start, without a gap, at which the mechanism is assembled."""
+    middle = int(np.argmin(np.abs(values - start)))
+    if not valid[middle]:
+        raise AssemblyError(_APART)
+    ends = []
+    for step in (-1, 1):
+        end = middle
+        while 0 <= end + step < len(values) and valid[end + step]:
+            end += step
+        inside = float(values[end])
+        if 0 <= end + step < len(values):
+            outside = float(values[end + step])
+            for _ in range(2):
+                tried = np.linspace(inside, outside, STEPS + 1)
+                last = int(np.argmin(assembled(tried))) - 1
+                inside, outside = float(tried[last]), float(tried[last + 1])
+        ends.append(inside)
+    return ends[0], ends[1]

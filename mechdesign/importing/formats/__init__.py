@@ -1,0 +1,24 @@
+"""The formats that are read, a module each; `FORMATS` is the one list of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mechdesign.importing.formats import dxf, linkage, pmks, pylinkage, tables
+from mechdesign.importing.sketch import Sketch
+from mechdesign.importing.source import Source
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: its name, whether a text is of it, by what the text says, and what reads it."""
+
+    name: str
+    recognises: Callable[[Source], bool]
+    read: Callable[[Source], Sketch]
+
+
+FORMATS = tuple(
+    Format(module.NAME, module.recognises, module.read) for module in (pmks, linkage, pylinkage, tables, dxf)
+)

@@ -1,0 +1,45 @@
+"""Names of a study for those of a file."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from mechdesign.errors import cut
+from mechdesign.expressions import RESERVED
+from mechdesign.mechanism.graph import GROUND
+
+_UNFIT = re.compile(r"\W+")
+_LONGEST = 40
+_TAKEN = {GROUND, "time", "true", "false", "null", *RESERVED}
+
+
+def clean(raw: str, noun: str = "part") -> str:
+    """A text as a name; one that does not begin with a letter has its noun before it."""
+    name = _UNFIT.sub("_", unicodedata.normalize("NFC", raw))[:_LONGEST].strip("_")
+    return name if name and name[0].isalpha() else f"{noun}_{name}".rstrip("_")
+
+
+class Names:
+    """Distinct names, each of letters, digits and underscores with a letter first."""
+
+    def __init__(self) -> None:
+        self._given: dict[tuple[str, str], str] = {}
+        self._taken = set(_TAKEN)
+
+    def make(self, noun: str, raw: str) -> str:
+        """The study's name of a `noun` (point, link, ...) that the file calls `raw`; a new one is distinct."""
+        if (noun, raw) not in self._given:
+            base = clean(raw, noun)
+            name, count = base, 1
+            while name.lower() in _TAKEN or name in self._taken:
+                count += 1
+                name = f"{base}_{count}"
+            self._taken.add(name)
+            self._given[noun, raw] = name
+        return self._given[noun, raw]
+
+    def changed(self) -> list[str]:
+        """What is called otherwise in the study than in the file."""
+        pairs = [(noun, raw, name) for (noun, raw), name in self._given.items() if raw != name]
+        return [f"{name} is the file's {noun} {cut(raw)!r}" for noun, raw, name in pairs]

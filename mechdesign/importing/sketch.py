@@ -1,0 +1,196 @@
+"""The mechanism that a file of another tool shows, whatever the tool: points, links, slides, drives, gears, forces.
+
+Points, links and slides are known by the names that the file has for them; `names` makes them names of a study.
+Lengths are in the unit of the sketch, angles in radians, positive counter-clockwise, speeds per second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from mechdesign.errors import StudyError, cut
+
+# Most points, and most links, of a file; most points on links; and the largest number.
+MOST = 1000
+MOST_ENDS = 5000
+# The ground among links, whose names are not empty.
+GROUND = ""
+LARGEST = 1e12
+
+
+@dataclass(frozen=True)
+class Point:
+    """A place in the sketch; the path of a traced point is what the file asks for."""
+
+    x: float
+    y: float
+    traced: bool = False
+
+
+@dataclass
+class Link:
+    """A rigid body by its points; a telescopic one is as long as its drive says."""
+
+    points: list[str]
+    telescopic: bool = False
+    mass: float | None = None
+    center: tuple[float, float] | None = None  # in the sketch
+    inertia: float | None = None
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A point that moves along a straight line of a link, the guide.
+
+    The line goes `through` one point of the guide in a `direction`, or through two. Of the point's links the `riders`
+    do not turn against the guide; without any the point turns as it slides.
+    """
+
+    point: str
+    guide: str
+    through: tuple[str, ...]
+    direction: float = 0.0
+    riders: tuple[str, ...] = ()
+    limited: bool = False  # whether it stays between its two points
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A driven link's angle from another link, the length of a telescopic link, or a slide."""
+
+    kind: Literal["angle", "length", "slide"]
+    of: str
+    base: str = GROUND
+    speed: float | None = None
+    span: tuple[float, float] | None = None  # values between which it goes to and fro; None: a turn
+    held: bool = False
+
+
+@dataclass(frozen=True)
+class Gears:
+    """Two links whose wheels mesh, or have a belt or chain; they turn as the ratio says against the link of their axes.
+
+    `ratio` is what the follower turns by for each turn of the leader, `radius` that of the follower's pulley.
+    """
+
+    follower: str
+    leader: str
+    ratio: float
+    axes: tuple[str, str]
+    belt: bool = False
+    radius: float | None = None
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force at a place of a link; a `local` one turns with the link."""
+
+    name: str
+    link: str
+    place: tuple[float, float]
+    vector: tuple[float, float]
+    local: bool
+
+
+@dataclass
+class Sketch:
+    """What a file shows. `choices` say how it was read, `omitted` what of it a study does not have."""
+
+    tool: str
+    name: str = ""
+    units: dict[str, str] = field(default_factory=lambda: {"length": "mm"})
+    inertia_unit: str = ""
+    points: dict[str, Point] = field(default_factory=dict)
+    links: dict[str, Link] = field(default_factory=dict)
+    fixed: list[str] = field(default_factory=list)
+    welds: list[tuple[str, ...]] = field(default_factory=list)
+    slides: dict[str, Slide] = field(default_factory=dict)
+    drives: list[Drive] = field(default_factory=list)
+    gears: list[Gears] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
+    dynamic: bool = False  # whether masses and forces are asked about
+    gravity: bool = False
+    choices: list[str] = field(default_factory=list)
+    omitted: list[str] = field(default_factory=list)
+
+    def add_point(self, name: str, x: Any, y: Any, *, traced: bool = False, fixed: bool = False) -> None:
+        """Add a point.
+
+        Raises
+        ------
+        StudyError
+            If there is one of this name, or its coordinates are no numbers.
+        """
+        _check_new("joint", name, self.points)
+        self.points[name] = Point(number(x, f"x of joint {name!r}"), number(y, f"y of joint {name!r}"), traced)
+        if fixed:
+            self.fixed.append(name)
+
+    def add_link(self, name: str, points: Iterable[str], *, telescopic: bool = False) -> Link:
+        """Add a link through points that the sketch has.
+
+        Raises
+        ------
+        StudyError
+            If there is one of this name, or a point is missing.
+        """
+        _check_new("link", name, self.links)
+        listed = list(dict.fromkeys(points))
+        for point in listed:
+            if point not in self.points:
+                raise StudyError(f"link {cut(name)!r} has the joint {cut(point)!r}, which the file does not have")
+        self.links[name] = Link(listed, telescopic)
+        if sum(len(link.points) for link in self.links.values()) > MOST_ENDS:
+            raise StudyError(f"the links of the file have more than {MOST_ENDS} joints together; take a part of it")
+        return self.links[name]
+
+    def fix(self, points: Iterable[str]) -> None:
+        """Put points on the ground; those that the sketch does not have are passed over."""
+        self.fixed += [point for point in points if point in self.points and point not in self.fixed]
+
+    def links_at(self, point: str) -> list[str]:
+        """The links that have a point."""
+        return [name for name, link in self.links.items() if point in link.points]
+
+    def moving_at(self, point: str) -> list[str]:
+        """The links that have a point, but those whose points are all on the ground."""
+        return [name for name in self.links_at(point) if not {*self.links[name].points} <= {*self.fixed}]
+
+    def distance(self, one: str, other: str) -> float:
+        """Distance of two points."""
+        a, b = self.points[one], self.points[other]
+        return math.hypot(b.x - a.x, b.y - a.y)
+
+    def size(self) -> float:
+        """The larger side of the sketch."""
+        xs, ys = [p.x for p in self.points.values()], [p.y for p in self.points.values()]
+        return max(max(xs) - min(xs), max(ys) - min(ys)) if xs else 0.0
+
+
+def _check_new(noun: str, name: str, known: dict[str, Any]) -> None:
+    if not name:
+        raise StudyError(f"a {noun} without a name")
+    if name in known:
+        raise StudyError(f"two {noun}s have the name {cut(name)!r}")
+    if len(known) >= MOST:
+        raise StudyError(f"the file has more than {MOST} {noun}s; take a part of it")
+
+
+def number(raw: Any, meaning: str) -> float:
+    """A finite number of a file.
+
+    Raises
+    ------
+    StudyError
+        If it is none, or beyond `LARGEST`.
+    """
+    try:
+        value = math.nan if isinstance(raw, bool) else float(raw)
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not abs(value) <= LARGEST:
+        raise StudyError(f"{cut(meaning)} is {cut(repr(raw))}, not a number of a sensible size")
+    return value

@@ -1,0 +1,81 @@
+"""What is imported: a file, a folder of tables, an address or a text, read whole and within bounds."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from mechdesign.errors import StudyError, cut
+from mechdesign.importing.sketch import Sketch
+from mechdesign.study.text.inputs import Folder
+
+# Most characters of a source.
+MOST_CHARACTERS = 5_000_000
+# Names of the tables of a folder; either stands for both.
+JOINTS, LINKS = "joints.csv", "links.csv"
+
+
+@dataclass(frozen=True)
+class Source:
+    """The text that is imported, what it is called, and the texts of tables of a folder."""
+
+    name: str
+    text: str
+    tables: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, source: str) -> Source:
+        """An address, a folder with tables, or a file.
+
+        Raises
+        ------
+        StudyError
+            Where there is nothing to read, or too much.
+        """
+        if "://" in source or ("?" in source and not os.path.exists(source)):
+            return cls.of_text(source, "a share address")
+        path = Path(source)
+        if path.name.lower() in (JOINTS, LINKS):
+            path = path.parent
+        if path.is_dir():
+            tables = {name: _read(path / name) for name in (JOINTS, LINKS)}
+            return cls(path.resolve().name, tables[JOINTS], tables)
+        return cls(path.name, _read(path))
+
+    @classmethod
+    def of_text(cls, text: str, name: str = "a text") -> Source:
+        """A text."""
+        return cls(name, _bounded(text, name))
+
+    @property
+    def stem(self) -> str:
+        """The name without its ending."""
+        return self.name.partition(".")[0]
+
+    def started(self, tool: str) -> Sketch:
+        """The empty sketch of a tool's file."""
+        return Sketch(tool, "" if self.name.startswith("a ") else self.stem)
+
+    @cached_property
+    def data(self) -> Any:
+        """The text as JSON, None if it is none."""
+        if not self.text.lstrip().startswith(("{", "[")):
+            return None
+        try:
+            return json.loads(self.text)
+        except (ValueError, RecursionError):
+            return None
+
+
+def _read(path: Path) -> str:
+    return _bounded(Folder(path.parent, anywhere=True).text(path.name), str(path))
+
+
+def _bounded(text: str, name: str) -> str:
+    if len(text) > MOST_CHARACTERS:
+        raise StudyError(f"{cut(name)} is larger than {MOST_CHARACTERS // 1_000_000} million characters")
+    return text
