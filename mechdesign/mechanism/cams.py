@@ -277,9 +277,9 @@ class Cam:
         return self.touch(configuration).place
 
     @quiet
-    def force(self, configuration: Configuration) -> Value:
-        """Contact force for each unit of effort on the coordinate that follows."""
-        return 1 / self.touch(configuration).lever
+    def lever(self, configuration: Configuration) -> Value:
+        """How fast the follower moves along the normal for each unit of its coordinate."""
+        return self.touch(configuration).lever
 
     @quiet
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:

@@ -67,8 +67,8 @@ class Engagement(Protocol):
     def place(self, configuration: Configuration) -> Vector:
         """Where they touch."""
 
-    def force(self, configuration: Configuration) -> Value:
-        """Force along the pitch circles, the belt or the normal for each unit of effort on the link that follows."""
+    def lever(self, configuration: Configuration) -> Value:
+        """How fast they move along the pitch circles, the belt or the normal for each unit of what follows."""
 
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
         """The force of an effort on the coordinate that follows.
@@ -166,9 +166,9 @@ class Mesh:
         """Where the pitch circles touch."""
         return self.contact(configuration)[0]
 
-    def force(self, configuration: Configuration) -> Value:
-        """Force along the pitch circles or the belt for each unit of effort; see `Engagement`."""
-        return self.weight(configuration) if self.slide >= 0 else 1 / self.radii(configuration)[0]
+    def lever(self, configuration: Configuration) -> Value:
+        """Radius of the wheel that follows; see `Engagement`."""
+        return 1 / self.weight(configuration) if self.slide >= 0 else self.radii(configuration)[0]
 
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
         """The force of an effort on the link that follows; see `Engagement`.
@@ -178,7 +178,7 @@ class Mesh:
         """
         apart: Value = 1.0 if pressed is None else np.sign(effort * pressed)
         driving = effort if pressed is None else pressed
-        tangential = effort * self.force(configuration)
+        tangential = effort / self.lever(configuration)
         if self.belt:
             # Its tight part pulls.
             place, _, along = self.strand(configuration, np.where(driving > 0, -1.0, 1.0))

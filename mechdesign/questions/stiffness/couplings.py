@@ -78,8 +78,8 @@ def compliance_of(
     soft: list[Value] = []
     if given.force is not None:
         pair = transmission.engagement
-        force: Value = 1.0 if pair is None else pair.force(configuration)
-        soft.append(force**2 / given.force)
+        lever: Value = 1.0 if pair is None else pair.lever(configuration)
+        soft.append((1 / lever) ** 2 / given.force)
     if given.moment is not None:
         soft.append(1 / given.moment)
     return sum(soft) * _unit(transmission, length) ** 2
