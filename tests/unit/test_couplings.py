@@ -46,12 +46,24 @@ def five_bar(coupling: str) -> Mechanism:
         ("{set: g2, of: g1, ratio: 2, phase: 20 mm}", "'20 mm' is a length, where an angle is expected"),
         ("{set: g2, of: g1, ratio: 2, pressure_angle: 95}", "between 0 and 90 degrees"),
         ("{set: g1, to: '40'}", "'mesh' and 'g1' fix link 'g1' twice over"),
+        ("{set: g2, to: sqrt(g1 - 20)}", "coupling 'mesh' has no value at the sketch (g1 = 0)"),
+        ("{set: g2, to: sqrt(-1 - g1**2)}", "coupling 'mesh' has no value at the sketch"),
+        ("{set: g2, of: g1, ratio: 2}, other: {set: g2, of: g1, ratio: 3}", "takes: couplings 'mesh' and 'other'"),
+        ("{set: g2, of: g1, ratio: 2}, other: {set: g1, of: g2, ratio: 0.5}", "couplings 'mesh' and 'other' hold each"),
+        ("{set: a, of: b, ratio: 2}, other: {set: b, of: a, ratio: 0.5}", "couplings 'mesh' and 'other' hold each"),
     ],
 )
 def test_mistakes_are_named(coupling: str, message: str) -> None:
     with pytest.raises(StudyError) as caught:
         five_bar(coupling)
     assert message in str(caught.value)
+
+
+def test_a_drive_that_follows_by_a_coupling_is_named() -> None:
+    with pytest.raises(
+        StudyError, match="one of 'g1' or 'g2': each of them follows from the others by coupling 'mesh'"
+    ):
+        study_of(FIVE_BAR.replace("[g1]", "[g1, g2]") % "{set: g2, of: g1, ratio: 2}")
 
 
 def test_a_phase_that_is_left_out_is_that_of_the_sketch() -> None:
