@@ -64,6 +64,8 @@ def clearances(profile: Complexes, centers: Complexes) -> Floats:
         ("{link: disk, roller: F, radius: 3}", "there is no link 'disk'"),
         ("{link: disc, roller: F, radius: 3, range: [90, 0]}", "rises from its first value"),
         ("{link: disc, roller: F, radius: 3, range: [0 mm, 9 mm]}", "'0 mm' is a length"),
+        ("{link: disc, roller: O, radius: 3}", "'valve.slide' does not move the roller at 'O'"),
+        ("{link: disc, flat: F, direction: 0}", "moves the flat face at 'F' along itself"),
     ],
 )
 def test_mistakes_are_named(cam: str, message: str) -> None:
@@ -207,6 +209,8 @@ def test_what_is_wrong_with_a_cam_is_said() -> None:
     assert "the profile is undercut" in cut
     (opened,) = warnings_of(study_of(SLIDING % "to: 40 + cam/40, cam: {link: disc, roller: F, radius: 5}"))
     assert "does not close after a turn" in opened
+    broken, _ = warnings_of(study_of(SLIDING % "to: 40 + 2*abs(sin(cam)), cam: {link: disc, roller: F, radius: 5}"))
+    assert "the law of the follower has a corner (0, 180)" in broken
 
 
 LOADED = ROLLER + "dynamics: {sweep: {cam: {from: 0, to: 350, step: 10}}, loads: [{at: T, force: [0, -50]}]}\n"
