@@ -64,6 +64,7 @@ def clearances(profile: Complexes, centers: Complexes) -> Floats:
         ("{link: disk, roller: F, radius: 3}", "there is no link 'disk'"),
         ("{link: disc, roller: F, radius: 3, range: [90, 0]}", "rises from its first value"),
         ("{link: disc, roller: F, radius: 3, range: [0 mm, 9 mm]}", "'0 mm' is a length"),
+        ("{link: disc, roller: F, radius: 3, steps: 2}", "must be at least 8, not 2"),
         ("{link: disc, roller: O, radius: 3}", "'valve.slide' does not move the roller at 'O'"),
         ("{link: disc, flat: F, direction: 0}", "moves the flat face at 'F' along itself"),
     ],

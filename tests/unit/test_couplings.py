@@ -44,6 +44,9 @@ def five_bar(coupling: str) -> Mechanism:
         ("{set: g2, of: g1, table: [[0, 1], [0, 2]]}", "at least 4 rows, the first column rising"),
         ("{set: g2, of: g1, ratio: 2, wheels: chain}", "expected one of gears, belt, none"),
         ("{set: g2, of: g1, ratio: 2, phase: 20 mm}", "'20 mm' is a length, where an angle is expected"),
+        ("{set: g2, of: g1, ratio: 2 mm}", "'2 mm' is a length, where a pure number is expected"),
+        ("{set: g2, of: g1, ratio: 0}", "with a ratio of 0 'g2' would stand still"),
+        ("{set: g2, to: 2*g1 + g2}", "'g2' cannot follow itself"),
         ("{set: g2, of: g1, ratio: 2, pressure_angle: 95}", "between 0 and 90 degrees"),
         ("{set: g1, to: '40'}", "'mesh' and 'g1' fix link 'g1' twice over"),
         ("{set: g2, to: sqrt(g1 - 20)}", "coupling 'mesh' has no value at the sketch (g1 = 0)"),
@@ -224,6 +227,11 @@ def test_a_phase_that_is_left_out_follows_a_ratio_that_varies() -> None:
     for ratio, range_of_design in zip(("-1.5", "-1"), found, strict=True):
         extremes = kinematics(study_of(text.replace("-1.5", ratio))).tables["extremes"]
         assert range_of_design == pytest.approx(extremes["range"][list(extremes["output"]).index("B.y")])
+
+
+def test_a_link_stands_for_its_angle_in_an_expression() -> None:
+    by_name, by_angle = (five_bar(f"{{set: g2, to: 60 + 0.4*{name}}}").solve({"g1": 20}) for name in ("b", "b.angle"))
+    assert by_name["B.x"] == by_angle["B.x"]
 
 
 def test_turns_count() -> None:
