@@ -214,6 +214,18 @@ def test_what_is_wrong_with_a_cam_is_said() -> None:
     assert "the law of the follower has a corner (0, 180)" in broken
 
 
+def test_a_follower_at_rest_is_no_dead_centre_but_a_piston_is() -> None:
+    assert not kinematics(study_of(ROLLER)).warnings
+    engine = (
+        ROLLER.replace("T: [60, 0]}", "T: [60, 0]}\n    rod: [N, B, 120]\n    piston: {B: [0, 0]}")
+        .replace("point: F}", "point: F}, guide: {prismatic: [ground, piston], through: O, point: B}")
+        .replace("sketch: {", "sketch: {B: [160, 0], ")
+        .replace("[F.y]", "[B.x]")
+    )
+    (dead,) = kinematics(study_of(engine)).warnings
+    assert str(dead) == "3 poses are at a dead centre: B.x stands still there, and det_J is 0"
+
+
 LOADED = ROLLER + "dynamics: {sweep: {cam: {from: 0, to: 350, step: 10}}, loads: [{at: T, force: [0, -50]}]}\n"
 
 

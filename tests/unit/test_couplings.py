@@ -287,6 +287,22 @@ mechanism:
     assert bend == pytest.approx(spline(np.radians(at % 360), 2), rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("coupling", "message"),
+    [
+        (
+            "of: g1, table: [[-90, 10], [0, 40], [60, 80], [120, 60]]",
+            "'g1' is outside of the table of coupling 'mesh', -90 to 120",
+        ),
+        ("to: 60 + sqrt(40 - g1)", "coupling 'mesh' has no value"),
+    ],
+)
+def test_poses_at_which_a_coupling_has_no_value_say_so(coupling: str, message: str) -> None:
+    sweep = "kinematics: {sweep: {g1: {from: 0, to: 150, step: 50}}, outputs: [B]}"
+    result = kinematics(study_of(FIVE_BAR % f"{{set: g2, {coupling}}}" + sweep))
+    assert message in str(result.warnings[0])
+
+
 def test_two_gears_press_their_bearings_apart() -> None:
     """A moment M on the second gear: the teeth bear M/r2 along the pitch circles, and that times tan 20 deg apart."""
     study = study_of("""

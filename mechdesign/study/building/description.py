@@ -488,7 +488,7 @@ def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, func
     span, kind = given.range, section.coordinates[followed[0]]
     builder.reporter.kind((*ROOT, *path, "range"), kind)
     if span is None:
-        table = next((table for _, table in function.program if isinstance(table, Tabulated)), None)
+        table = function.table
         if table is None and kind != "angle":
             _refuse(builder, path, f"the profile needs the 'range' of {followed[0]!r}, [first, last]")
         span = (0.0, 2 * np.pi / builder.units.angle_factor) if table is None else (table.rows[0][0], table.rows[-1][0])
