@@ -309,8 +309,8 @@ class Cam:
         parted = linear.sensitivity([model.play(self.coupling)])
         back = first(linear.configuration, self.followed, parted)
         own = self._against(parted, place, linear.configuration)
-        moved = own - back * self._against(velocity, place, linear.configuration)
-        return np.atleast_1d(moved)[0]
+        moved: Vector = np.atleast_1d(own - back * self._against(velocity, place, linear.configuration))[0]
+        return moved
 
     def _against(self, rates: Rates, place: Vector, configuration: Configuration) -> Vector:
         """Rate of a place of the follower against the cam."""
@@ -413,13 +413,13 @@ def _check_follower(cam: Cam) -> None:
     point = core.graph.nodes[cam.node]
     if cam.flat:
         along = cam.along_face(drawn)
-        pushed = max(abs(dot(1j * along, cam._own(linear, velocity, place + s * along))) for s in (0.0, size))
+        pushed = max(float(np.abs(dot(1j * along, cam._own(linear, velocity, place + s * along)))) for s in (0.0, size))
         mistake = (
             f"moves the flat face at '{point}' along itself or not at all, so that the cam cannot push it: give "
             "another direction, or a point of the link that moves"
         )
     else:
-        pushed = abs(cam._own(linear, velocity, place))
+        pushed = float(np.abs(cam._own(linear, velocity, place)))
         mistake = f"does not move the roller at '{point}' against the cam: give a point of the link that it moves"
     if pushed <= UNMOVED * (size if cam.follower.quantity == "angle" else 1.0):
         raise MechanismError(f"'{cam.follower.name}' {mistake}", where)

@@ -517,8 +517,8 @@ def _function(
         for item in given.to.names & parameters.keys():
             builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
-        program = ((kind, coordinates[item] if kind == "name" else item) for kind, item in given.to.program)
-        return replace(given.to, program=tuple(program), angle_unit=unit)
+        named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
+        return replace(given.to.substituted(named), angle_unit=unit)
     assert given.of is not None
     listed = [*section.coordinates, *section.moving, *section.slides]
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
@@ -529,7 +529,7 @@ def _function(
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
     assert given.ratio is not None
     ratio, phase = f"{name}.ratio", f"{name}.phase"
-    if given.ratio == 0:
+    if float(given.ratio) == 0.0:
         message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
         builder.report((*path, "ratio"), message)
     # Per radian a length is the radius of a pinion; per degree it is none.
