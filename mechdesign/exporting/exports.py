@@ -11,6 +11,9 @@ from pkgutil import iter_modules
 from mechdesign import exporting
 from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError, suggestion
+from mechdesign.exporting.drawing import Drawing
+from mechdesign.exporting.dxf import to_dxf
+from mechdesign.exporting.svg import to_svg
 from mechdesign.exporting.view import View
 
 
@@ -52,6 +55,17 @@ def export(
 ) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
     """Declare that a function makes the file of this name from a view; see `Export` for what is said of it."""
     return lambda make: Export(name, meaning, order, mark, make)
+
+
+def drawings(name: str, meaning: str, order: int, make: Callable[[View], Drawing]) -> tuple[Export, Export]:
+    """The exports of a drawing: as DXF, and behind it as SVG."""
+    dxf, svg = (
+        export(f"{name}.{ending}", f"{meaning}, as {ending.upper()}", order + k)(
+            lambda view, text=text: Content(text(make(view)), view.assumed + view.unmoved)  # type: ignore[misc]
+        )
+        for k, (ending, text) in enumerate((("dxf", to_dxf), ("svg", to_svg)))
+    )
+    return dxf, svg
 
 
 @cache

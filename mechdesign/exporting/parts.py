@@ -8,30 +8,16 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, hull, roomiest
-from mechdesign.exporting.dxf import to_dxf
-from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.svg import to_svg
+from mechdesign.exporting.drawing import FLAT, Circle, Drawing, Mark, Shape, Text, around, box, roomiest
+from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.plates import joined
+from mechdesign.mechanism.plates import hull, joined
 from mechdesign.questions.reliability.schema.section import in_words
 
 SHEET = 600.0  # width of the sheet where the study gives none
 SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
 ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
-
-
-@export("parts.dxf", "every link as a part to cut at 1:1, as DXF", order=10)
-def parts_dxf(view: View) -> Content:
-    """All parts as DXF."""
-    return Content(to_dxf(parts_drawing(view)), view.assumed + view.unmoved)
-
-
-@export("parts.svg", "every link as a part to cut at 1:1, as SVG", order=11)
-def parts_svg(view: View) -> Content:
-    """All parts as SVG."""
-    return Content(to_svg(parts_drawing(view)), view.assumed + view.unmoved)
 
 
 @dataclass(frozen=True)
@@ -60,7 +46,7 @@ class Part:
     @property
     def turn(self) -> complex:
         """The turn by which the part is least tall: one of its sides lies level."""
-        corners = hull(self.places)
+        corners = hull(self.places, FLAT)
         sides = [b - a for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True) if a != b]
         turns = [abs(side) / side for side in sides] or [1.0 + 0j]
         return min(turns, key=lambda turn: round(float(np.ptp([(turn * corner).imag for corner in corners])), 9))
@@ -172,3 +158,6 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
                 lines.append(f"tolerance: {name} {float(low):+.6g} to {float(high):+.6g} {unit}".rstrip())
         lines += in_words(study.reliability, study.mechanism.graph, study.sizes)
     return lines
+
+
+parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing)

@@ -188,16 +188,16 @@ class _Search:
     def best(self, count: int) -> dict[str, int] | None:
         """The best stack of so many layers; None if there is none, or none was found."""
         self._least: tuple[int, int] | None = None
-        self._found: dict[str, int] | None = None
+        self._cheapest: dict[str, int] | None = None
         self._place(0, {}, 0, count)
-        return None if self._found is None else {link: self._found[link] for link in self.of_link}
+        return None if self._cheapest is None else {link: self._cheapest[link] for link in self.of_link}
 
     def _place(self, rank: int, layers: dict[str, int], broken: int, count: int) -> None:
         cost = broken, self._length(layers)
         if self.spent or (self._least is not None and cost >= self._least):
             return
         if rank == len(self.order):
-            self._least, self._found = cost, dict(layers)
+            self._least, self._cheapest = cost, dict(layers)
             return
         link = self.order[rank]
         before = self._cost(link, layers)

@@ -88,11 +88,10 @@ def convert(
 def _scale(sketch: Sketch, factor: float) -> None:
     if not 0 < factor < 1e6:
         raise StudyError(f"a scale of {factor:g}; it is a positive number")
-    for name, point in sketch.points.items():
-        sketch.points[name] = replace(point, x=factor * point.x, y=factor * point.y)
+    sketch.points = {name: factor * place for name, place in sketch.points.items()}
     for link in sketch.links.values():
-        link.center = None if link.center is None else (factor * link.center[0], factor * link.center[1])
-    sketch.forces = [replace(f, place=(factor * f.place[0], factor * f.place[1])) for f in sketch.forces]
+        link.center = None if link.center is None else factor * link.center
+    sketch.forces = [replace(force, place=factor * force.place) for force in sketch.forces]
     for index, drive in enumerate(sketch.drives):
         if drive.kind != "angle":
             span = None if drive.span is None else (factor * drive.span[0], factor * drive.span[1])
@@ -123,22 +122,17 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
 
 def _named(sketch: Sketch, name: str) -> Drive:
     """The drive that a name stands for, with the speed that the file has for it."""
-    of = name
-    if name in sketch.points and name in sketch.fixed:
-        links = sketch.moving_at(name)
-        if len(links) != 1:
-            raise StudyError(f"{len(links)} links turn about {name!r}: name the one that is driven")
-        of = links[0]
+    if name in sketch.fixed:
+        chosen = sketch.drive_at(name)
+    elif name in sketch.links:
+        chosen = Drive("length" if sketch.links[name].telescopic else "angle", name)
+    elif name in sketch.slides:
+        chosen = Drive("slide", name)
     elif name in sketch.points:
-        of = next((slide for slide, s in sketch.slides.items() if s.point == name), name)
-    for drive in sketch.drives:
-        if drive.of == of:
-            return drive
-    if of in sketch.slides:
-        return Drive("slide", of)
-    if of in sketch.links:
-        return Drive("length" if sketch.links[of].telescopic else "angle", of)
-    raise StudyError(f"--drive {cut(name)}: no pin of the ground, link or slide of the file has this name")
+        chosen = sketch.drive_at(name)
+    else:
+        raise StudyError(f"--drive {cut(name)}: no joint, link or slide of the file has this name")
+    return next((drive for drive in sketch.drives if drive.of == chosen.of), chosen)
 
 
 def _settled(draft: Draft, source: str) -> str:

@@ -10,14 +10,14 @@ them, or along the line between two corners, so that all of these are tried.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.model import Description, Fixed, Link, Plates
@@ -201,3 +201,24 @@ def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
         largest = np.where(length > 0, np.fmax(largest, apart), largest)
     lost = np.isnan(sum(np.abs(corner) for corner in (*one, *other)))
     return np.where(lost, np.nan, np.where(np.isneginf(largest), 0.0, largest))
+
+
+def hull(places: Iterable[complex], flat: float = 1e-3) -> list[complex]:
+    """Corners of the convex hull, counter-clockwise; two where all lie on one line.
+
+    A corner that stands out by less than `flat`, in squares of the size, counts as a place on a side.
+    """
+    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
+    if len(ordered) < 3:
+        return ordered
+    size = max(abs(place - ordered[0]) for place in ordered)
+
+    def half(sequence: Sequence[complex]) -> list[complex]:
+        chain: list[complex] = []
+        for place in sequence:
+            while len(chain) > 1 and cross(chain[-1] - chain[-2], place - chain[-2]) <= flat * size**2:
+                chain.pop()
+            chain.append(place)
+        return chain[:-1]
+
+    return half(ordered) + half(ordered[::-1])

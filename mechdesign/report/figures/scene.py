@@ -238,28 +238,6 @@ def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def hull(places: Sequence[complex]) -> list[complex]:
-    """Corners of the convex hull, counter-clockwise; two where the places lie on one line."""
-    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
-    if len(ordered) < 3:
-        return ordered
-    width = max(abs(place - ordered[0]) for place in ordered)
-
-    def half(sequence: Sequence[complex]) -> list[complex]:
-        chain: list[complex] = []
-        for place in sequence:
-            while len(chain) > 1 and _area(chain[-2], chain[-1], place) <= 1e-3 * width**2:
-                chain.pop()
-            chain.append(place)
-        return chain[:-1]
-
-    return half(ordered) + half(ordered[::-1])
-
-
-def _area(a: complex, b: complex, c: complex) -> float:
-    return ((b - a).conjugate() * (c - a)).imag
-
-
 @dataclass(frozen=True, eq=False)
 class Sweep(Shown):
     """The poses of a motion that a result carries, in their order, with paths of points and travel of slides."""
