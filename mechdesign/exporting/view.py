@@ -102,9 +102,7 @@ class View:
             name: (joint.line.link, joint.point)
             for name, joint in description.joints.items() if not isinstance(joint, Fixed)
         }  # fmt: skip
-        slides |= {
-            name: (name, link.ends[1]) for name, link in description.links.items() if link.telescopic and link.ends
-        }
+        slides |= {name: (name, link.tip) for name, link in description.links.items() if link.tip is not None}
         for name, (link, point) in slides.items():
             travel = self.track.configuration.slides[self.mechanism.graph.slides.index(name)]
             ends = [self.in_frame(link, point, int(index(travel))) for index in (np.argmin, np.argmax)]

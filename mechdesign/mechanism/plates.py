@@ -20,7 +20,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
-from mechdesign.mechanism.model import Description, Fixed, Link, Plates
+from mechdesign.mechanism.model import Description, Fixed, Plates
 
 # Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
 PIN, THICKNESS = 0.4, 0.25
@@ -28,16 +28,11 @@ PIN, THICKNESS = 0.4, 0.25
 CLEARANCE = "clearance"
 
 
-def points_of(link: Link) -> tuple[str, ...]:
-    """Names of a link's points, its ends first; of a telescopic one also the tip."""
-    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
-
-
 def joined(description: Description) -> dict[str, tuple[str, ...]]:
     """Every point at which a pin, a slide or a clamp joins links, and these links."""
     links: dict[str, list[str]] = {}
     for name, link in description.links.items():
-        for point in points_of(link):
+        for point in link.all_points:
             links.setdefault(point, []).append(name)
     for joint in description.joints.values():
         if not isinstance(joint, Fixed) and joint.line.link not in links[joint.point]:
@@ -165,10 +160,10 @@ class Clearances:
             return [self._node(item.name)]
         link = self.mechanism.description.links[item.name]
         if item.name not in self.corners:
-            return [self._node(point) for point in points_of(link)]
+            return [self._node(point) for point in link.all_points]
         base, turn = next(iter(link.points)), self.configuration.body_rotation(item.name)
         local = self.mechanism.geometry.local(item.name, base, self.configuration.places)
-        tip = [self._node(link.ends[1])] if link.telescopic and link.ends else []
+        tip = [self._node(link.tip)] if link.tip is not None else []
         return [*(self._node(base) + (corner - local) * turn for corner in self.corners[item.name]), *tip]
 
     def moved(self, item: Item) -> Value:

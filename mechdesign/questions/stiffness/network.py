@@ -144,8 +144,8 @@ def build_bodies(
         if ":" not in point:
             holders.setdefault(point, []).append(body)
     for name, leg in description.links.items():
-        if leg.telescopic and leg.ends is not None:
-            builder.slide(name, name, rod_of(name), leg.ends[1], base=leg.ends[0])
+        if leg.tip is not None:
+            builder.slide(name, name, rod_of(name), leg.tip, base=leg.corners[0])
     clamps = []
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
@@ -321,8 +321,8 @@ class _Builder:
             if name == GROUND:
                 continue
             vertices = [(point, self._node(name, point)) for point in link.points]
-            if link.telescopic and link.ends is not None:
-                vertices.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
+            if link.tip is not None:
+                vertices.append((link.tip, self._node(rod_of(name), link.tip)))
             points[name] = tuple(vertices)
         return points
 
@@ -346,8 +346,7 @@ class _Builder:
     def _vertex(self, body: str, point: str) -> str:
         """The vertex of a body at a joint; that of a telescopic leg's rod is at its end."""
         link = self.mechanism.description.links.get(link_of(body))
-        end = link.ends[1] if link is not None and link.telescopic and link.ends is not None else point
-        return self._node(body, end)
+        return self._node(body, point if link is None or link.tip is None else link.tip)
 
     def _drive_between(self, first: list[str], second: list[str]) -> str | None:
         """The drive of the angle between two clusters of bodies; None if there is none."""

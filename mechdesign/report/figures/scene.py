@@ -16,7 +16,7 @@ from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description, Fixed, Link, Slot, Spring
+from mechdesign.mechanism.model import Description, Fixed, Slot, Spring
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.poses import Shown, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
@@ -115,7 +115,7 @@ class Scene:
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
-        return link_points(self.description.links[name])
+        return self.description.links[name].all_points
 
     def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
         """Points, wheels, cams, and ends of the guides for a range of each slide (see `Guide.ends`)."""
@@ -164,11 +164,6 @@ class Scene:
         return {point for spring in springs if not spring.turning for point in spring_points(spring)}
 
 
-def link_points(link: Link) -> tuple[str, ...]:
-    """Names of a link's points, its ends first; those of a telescopic leg include its tip."""
-    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
-
-
 def spring_points(spring: Spring) -> tuple[str, str]:
     """Names of the two points between which a spring is, without those of links."""
     one, other = (end.rpartition(".")[2] for end in spring.between)
@@ -182,18 +177,17 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     def pick(values: Vector) -> complex:
         return complex(np.broadcast_to(values, configuration.shape).flat[index])
 
-    names = {point for link in description.links.values() for point in link_points(link)}
+    names = {point for link in description.links.values() for point in link.all_points}
     points = {name: pick(configuration.point(name)) for name in sorted(names)}
     rotations = {name: pick(configuration.rotation(name)) for name in description.links}
     if not all(map(cmath.isfinite, (*points.values(), *rotations.values()))):
         return None
 
     graph, guides = mechanism.graph, []
-    edges = {edge.slide: k for k, edge in enumerate(graph.edges)}
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
             continue
-        k = edges[graph.slides.index(name)]
+        k = graph.edge_of(graph.slides.index(name))
         origin = pick(configuration.nodes[graph.edges[k].tail])
         along = pick(configuration.direction(k))
         slider = None if isinstance(joint, Slot) else joint.slider
@@ -260,7 +254,7 @@ class Sweep(Shown):
     @cached_property
     def places(self) -> dict[str, Complexes]:
         """Path of every moving point, nan where a pose is not valid."""
-        still = link_points(self.mechanism.description.links[GROUND])
+        still = self.mechanism.description.links[GROUND].all_points
         valid = self.configuration.valid
         return {
             point: np.where(valid, self.configuration.point(point), complex(np.nan, np.nan))
@@ -313,7 +307,7 @@ class Sweep(Shown):
     def extent(self) -> Complexes:
         """Everything the motion reaches: points, their paths and the ends of guides."""
         mechanism, configuration = self.mechanism, self.configuration
-        ground = [configuration.point(point)[:1] for point in link_points(mechanism.description.links[GROUND])]
+        ground = [configuration.point(point)[:1] for point in mechanism.description.links[GROUND].all_points]
         reached = [np.empty(0, dtype=complex), *ground, *self.traces.values()]
         for index in self.valid[[0, -1]] if len(self.valid) else ():
             scene = pose(mechanism, configuration, int(index))
@@ -351,15 +345,15 @@ def ranks(study: Study) -> dict[str, int]:
     """
     mechanism, section = study.mechanism, study.kinematics
     links = mechanism.description.links
-    ground = set(link_points(links[GROUND]))
-    uses = Counter(point for link in links.values() for point in link_points(link))
+    ground = set(links[GROUND].all_points)
+    uses = Counter(point for link in links.values() for point in link.all_points)
     simple = {
         joint.point
         for joint in mechanism.description.joints.values()
         if not isinstance(joint, Fixed) and joint.line.link == GROUND
     }
     for name, link in links.items():
-        points = link_points(link)
+        points = link.all_points
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
     outputs = {name.split(".")[0] for name in (section and section.outputs) or ()}
