@@ -42,7 +42,7 @@ LAYERS = {
 class Path:
     """Lines and arcs from corner to corner, and back to the first where it is `closed`.
 
-    `bulges` are by corner that of what leads on from it: 0 of a line, else the tangent of a quarter of the arc's angle,
+    `bulges` says for each corner what begins there: 0 a line, else an arc, by the tangent of a quarter of its angle,
     positive counter-clockwise.
     """
 
@@ -59,7 +59,7 @@ class Path:
 
     @property
     def ends(self) -> Iterator[complex]:
-        """Places between which it lies: its corners, and of each arc the outermost in x and y."""
+        """Places that bound it: its corners, and the outermost places of each arc in x and y."""
         yield from self.corners
         for corner, following, bulge in self.pieces():
             if bulge:
@@ -177,7 +177,7 @@ def arc(begin: complex, end: complex, bulge: float) -> tuple[complex, float]:
 
 
 def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], empty: float) -> tuple[complex, float]:
-    """The place for a name among the middles of `places` that is farthest from any hole, and that distance.
+    """Where a name has most room: of the middles of `places` the one farthest from all holes, and its distance.
 
     `holes` are centres and radii; without any the distance is `empty`.
     """

@@ -1,4 +1,4 @@
-"""What can be exported: each is a function that is declared by the names of its files where it stands."""
+"""Files that can be exported: functions, each declared with the name of its file."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Export:
     order : int
         Its place in the list of what can be exported.
     mark : bytes
-        What every file of the kind contains, by which an older one may be replaced.
+        What every file of the kind contains: only such a file is written over.
     make : callable
-        The function: what it holds, of a study and a pose.
+        Makes the content from a study and a pose.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Export:
 def export(
     name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign"
 ) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
-    """Declare that a function makes the file of this name from a view; see `Export` for what is said of it."""
+    """Declare that a function makes the file of this name from a view; see `Export` for the arguments."""
     return lambda make: Export(name, meaning, order, mark, make)
 
 

@@ -23,7 +23,7 @@ from mechdesign.study.text.fields import Context, read_number
 
 # Width of links of a study without plates, as a part of the mechanism's size.
 WIDTH = 0.08
-# Least number of poses at which a motion is looked at.
+# Least number of poses of a motion.
 LOOKS = 721
 
 
@@ -38,7 +38,7 @@ class Track:
     follows : bool array, shape (n - 1,)
         Whether the motion goes on from each pose to the one behind it.
     places : ndarray, shape (n,)
-        Where each lies, in rows of the motion's poses.
+        Row of each among the study's poses, with a fraction between two of them.
     """
 
     configuration: Configuration
@@ -160,7 +160,7 @@ class View:
 
     @cached_property
     def track(self) -> Track:
-        """The motion of kinematics: its poses, and between them so many that `LOOKS` are there; else the sketch.
+        """The motion of kinematics in at least `LOOKS` poses; without a motion the pose of the sketch.
 
         Raises
         ------

@@ -10,14 +10,12 @@ import numpy as np
 
 from mechdesign import study as studies
 from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
-from mechdesign.importing.draft import Draft, Span
+from mechdesign.importing.draft import Draft
 from mechdesign.importing.formats import FORMATS
 from mechdesign.importing.sketch import Drive, Sketch
 from mechdesign.importing.source import Source
 from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
-
-_APART = "the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits there"
 
 
 def convert(
@@ -137,32 +135,22 @@ def _named(sketch: Sketch, name: str) -> Drive:
 
 def _settled(draft: Draft, source: str) -> str:
     """The study, whose drive goes no farther than the mechanism lets it."""
-    writer = Writer(draft)
-    spans = {name: draft.span(name) for name in draft.drives}
-    if len(spans) == 1:
-        ((name, span),) = spans.items()
-        drive, start = draft.drives[name], draft.start(name)
-        turns = drive.kind == "angle" and drive.span is None
-        wide = (start - 180, start + 180) if turns else span
-        solve = _loaded(writer.text(source, {name: wide})).mechanism.solve
-
-        def assembled(values: Floats) -> Flags:
-            return np.asarray(solve({name: values}).valid)
-
-        values = np.unique([*np.linspace(*wide, 2 * STEPS + 1), start])
-        valid = assembled(values)
-        spans[name] = _passed(values, valid, start, assembled)
-        if turns and valid.all():
-            spans[name] = span
-        remark = []
-        if not valid.all():
-            low, high = spans[name]
-            remark = [f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"]
-        return writer.text(source, spans, remark)
+    writer, spans = Writer(draft), {name: draft.span(name) for name in draft.drives}
     text = writer.text(source, spans)
-    if not _loaded(text).mechanism.solve({name: [draft.start(name)] for name in spans}).valid.all():
-        raise AssemblyError(_APART)
-    return text
+    solve = _loaded(text).mechanism.solve
+    if not solve({name: [draft.start(name)] for name in spans}).valid.all():
+        raise AssemblyError("the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits")
+    if len(spans) > 1:
+        return text
+    ((name, drive),) = draft.drives.items()
+    start = draft.start(name)
+    turns = drive.kind == "angle" and drive.span is None
+    wide = (start - 180, start + 180) if turns else spans[name]
+    low, high = (_farthest(lambda values: solve({name: values}).valid, start, end) for end in wide)
+    if (low, high) == wide:
+        return text
+    remark = f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"
+    return writer.text(source, {name: (low, high)}, [remark])
 
 
 def _loaded(text: str) -> studies.Study:
@@ -175,22 +163,13 @@ def _loaded(text: str) -> studies.Study:
         raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
 
 
-def _passed(values: Floats, valid: Flags, start: float, assembled: Callable[[Floats], Flags]) -> Span:
-    """The ends of the values around the start, without a gap, at which the mechanism is assembled."""
-    middle = int(np.argmin(np.abs(values - start)))
-    if not valid[middle]:
-        raise AssemblyError(_APART)
-    ends = []
-    for step in (-1, 1):
-        end = middle
-        while 0 <= end + step < len(values) and valid[end + step]:
-            end += step
-        inside = float(values[end])
-        if 0 <= end + step < len(values):
-            outside = float(values[end + step])
-            for _ in range(2):
-                tried = np.linspace(inside, outside, STEPS + 1)
-                last = int(np.argmin(assembled(tried))) - 1
-                inside, outside = float(tried[last]), float(tried[last + 1])
-        ends.append(inside)
-    return ends[0], ends[1]
+def _farthest(valid: Callable[[Floats], Flags], start: float, end: float) -> float:
+    """How far a drive goes from its start towards an end while the mechanism is assembled."""
+    inside, outside = start, end
+    for _ in range(3):
+        values = np.linspace(inside, outside, STEPS + 1)
+        gaps = np.flatnonzero(~valid(values))
+        if not len(gaps):
+            return outside
+        inside, outside = float(values[gaps[0] - 1]), float(values[gaps[0]])
+    return inside

@@ -44,6 +44,6 @@ class Names:
         return self._given[noun, raw]
 
     def changed(self) -> list[str]:
-        """What is called otherwise in the study than in the file."""
+        """Sentences about the names that differ from those of the file."""
         pairs = [(noun, raw, name) for (noun, raw), name in self._given.items() if raw != name]
         return [f"{name} is the file's {noun} {cut(raw)!r}" for noun, raw, name in pairs]

@@ -1,6 +1,6 @@
 """The mechanism that a file of another tool shows, whatever the tool: points, links, slides, drives, gears, forces.
 
-Points, links and slides are known by the names that the file has for them; `names` makes them names of a study.
+Points, links and slides have the names of the file; `names` makes names of a study from them.
 Lengths are in the unit of the sketch, angles in radians, positive counter-clockwise, speeds per second.
 """
 
@@ -24,7 +24,7 @@ LARGEST = 1e12
 
 @dataclass
 class Link:
-    """A rigid body by its points; a telescopic one is as long as its drive says."""
+    """A rigid body by its points, or a telescopic link of two points, whose length is driven."""
 
     points: list[str]
     telescopic: bool = False
@@ -99,7 +99,7 @@ class Force:
 
 @dataclass
 class Sketch:
-    """What a file shows. `choices` say how it was read, `omitted` what of it a study does not have.
+    """The mechanism of a file. `choices` say how the file was read, `omitted` what the study leaves out.
 
     The paths of `traced` points are what the file asks for.
     """
@@ -221,12 +221,12 @@ class Sketch:
         return max(max(xs) - min(xs), max(ys) - min(ys))
 
 
-def _check_new(noun: str, name: str, known: dict[str, Any]) -> None:
+def _check_new(noun: str, name: str, present: dict[str, Any]) -> None:
     if not name:
         raise StudyError(f"a {noun} without a name")
-    if name in known:
+    if name in present:
         raise StudyError(f"two {noun}s have the name {cut(name)!r}")
-    if len(known) >= MOST:
+    if len(present) >= MOST:
         raise StudyError(f"the file has more than {MOST} {noun}s; take a part of it")
 
 

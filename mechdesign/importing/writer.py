@@ -13,7 +13,7 @@ from mechdesign.importing.draft import Draft, Span
 from mechdesign.importing.sketch import GROUND, Drive, Gears, Slide
 
 _WIDTH = 116
-# Poses of a sweep; of a motion in time, at least, and for each turn of a drive.
+# Steps of a sweep, least instants of a motion in time, and instants for each turn of a drive.
 STEPS = 72
 _INSTANTS = 361
 _EACH_TURN = 73

@@ -126,7 +126,7 @@ class Mesh:
         return _ratio(by_class, bodies[self.links[1]][0], bodies[self.carrier][0])
 
     def weight(self, configuration: Configuration) -> Value:
-        """What the coupling's gap changes by for each unit of the rack's displacement."""
+        """Change of the coupling's gap for each unit of the rack's displacement."""
         return pulled(configuration, self.gap, 1.0).slides[self.slide]
 
     def radii(self, configuration: Configuration) -> tuple[Value, Value]:

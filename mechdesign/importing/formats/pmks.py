@@ -32,7 +32,7 @@ _UNITS = {
 # First characters of links that no other link contains.
 _WHOLE, _PARTS = "YAMG0123", "Namg4567"
 _NEWER = "pmks2:"
-# The speed of a driven slide that the address does not say, in units of length per second.
+# Speed of a driven slide where the address gives none, in units of length per second.
 _LINEAR = 5.0
 
 
@@ -200,8 +200,8 @@ def _read_tables(
     unit = settings[3].strip() if len(settings) > 3 else ""
     _use_units(sketch, units.get(unit, units["cm"]))
     if unit not in units:
-        said = f"the unit {cut(repr(unit))} is not known" if unit else "the file says no unit"
-        sketch.choices.append(f"{said}: lengths are taken as cm, the unit that PMKS+ begins with")
+        reason = f"the unit {cut(repr(unit))} is not known" if unit else "the file says no unit"
+        sketch.choices.append(f"{reason}: lengths are taken as cm, the unit that PMKS+ begins with")
     table = _Joints(sketch)
     for row in joints:
         _check_length(row, 8, "joint")

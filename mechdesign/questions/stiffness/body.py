@@ -84,7 +84,7 @@ class Body:
     def loads(self) -> Floats:
         """Loads on the asked point (fx, fy, mz) in each pose, shape (poses, loads, 3), 0 of loads elsewhere.
 
-        They are of a single pose where all poses have the same.
+        The first axis is 1 where the loads are the same in all poses.
         """
         wrenches = [wrench or (0.0, 0.0, 0.0) for wrench in self.section.wrenches]
         parts = np.broadcast_arrays(*(part for wrench in wrenches for part in wrench))

@@ -212,8 +212,8 @@ def twists_of(
             compliance[:, j] = soft
 
     def put_on(through: Floats) -> Floats:
-        every = np.broadcast_to(within, (n, *within.shape[1:]))
-        return np.asarray(np.einsum("nej,neic,nij->njc", every, through, twist))
+        parts = np.broadcast_to(within, (n, *within.shape[1:]))
+        return np.asarray(np.einsum("nej,neic,nij->njc", parts, through, twist))
 
     elsewhere = couplings = None
     if network.transmissions:
