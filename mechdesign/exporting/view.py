@@ -111,30 +111,25 @@ class View:
 
     def in_frame(self, link: str, point: str, row: int) -> complex:
         """Place of a point in the frame of a link, in a pose of the motion."""
-        configuration, base = self.track.configuration, self._base(link)
-        away = configuration.point(point)[row] - configuration.point(base)[row]
-        return self._local(link, base) + complex(away * np.conj(configuration.rotation(link)[row]))
+        configuration = self.track.configuration
+        origin, along = self.mechanism.frame(link, configuration)
+        places = (configuration.point(point) - origin) * np.conj(along)
+        return complex(np.broadcast_to(places, configuration.shape)[row])
 
     def in_world(self, link: str, places: Iterable[complex]) -> list[complex]:
         """Places of the frame of a link in the world, in the pose that is shown."""
-        base = self._base(link)
-        origin, turn = complex(self.pose.point(base)), complex(self.pose.rotation(link))
-        return [origin + turn * (place - self._local(link, base)) for place in places]
+        origin, along = self.mechanism.frame(link, self.pose)
+        return [complex(origin + along * place) for place in places]
 
     def points(self, link: str) -> dict[str, complex]:
         """Points of a link in its frame; the tip of a telescopic one is that of its rod."""
-        return {point: self._local(link, point) for point in self.mechanism.description.links[link].points}
+        local, points = self.mechanism.geometry.local, self.mechanism.description.links[link].points
+        return {point: complex(local(link, point, {})) for point in points}
 
     def outline(self, link: str) -> list[complex]:
         """Places of a link's frame that its plate goes around: its points, and the ends of its slots."""
         ends = [end for slot in self.slots if slot.link == link for end in slot.ends]
         return [*self.points(link).values(), *ends]
-
-    def _base(self, link: str) -> str:
-        return next(iter(self.mechanism.description.links[link].points))
-
-    def _local(self, link: str, point: str) -> complex:
-        return complex(self.mechanism.geometry.local(link, point, {}))
 
     @property
     def posed(self) -> str:

@@ -161,10 +161,9 @@ class Clearances:
         link = self.mechanism.description.links[item.name]
         if item.name not in self.corners:
             return [self._node(point) for point in link.all_points]
-        base, turn = next(iter(link.points)), self.configuration.body_rotation(item.name)
-        local = self.mechanism.geometry.local(item.name, base, self.configuration.places)
+        origin, along = self.mechanism.frame(item.name, self.configuration)
         tip = [self._node(link.tip)] if link.tip is not None else []
-        return [*(self._node(base) + (corner - local) * turn for corner in self.corners[item.name]), *tip]
+        return [*(origin + along * corner for corner in self.corners[item.name]), *tip]
 
     def moved(self, item: Item) -> Value:
         """The longest way of a place of an item from each pose to the next, shape (n - 1,)."""

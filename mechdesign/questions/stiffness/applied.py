@@ -27,10 +27,10 @@ Density = Callable[[Complexes], Vector]
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """A force (n,) at a place (n,), and a moment about it, of the load number `case`."""
+    """A force at a place, and a moment about it, in n poses or alike in all, of the load number `case`."""
 
     case: int
-    place: Complexes
+    place: Vector
     force: Vector
     moment: Value = 0.0
 

@@ -76,7 +76,7 @@ class Transmission:
     seats: Mapping[str, tuple[str, ...]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bodies:
     """Bodies of a mechanism and the edges and couplings that connect them.
 
@@ -97,7 +97,7 @@ class Bodies:
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str]
-    transmissions: tuple[Transmission, ...] = ()
+    transmissions: tuple[Transmission, ...]
 
     @cached_property
     def carrying(self) -> list[NetworkEdge]:
@@ -373,8 +373,8 @@ def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]])
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
-    """Vertices, edges and loops that carry the `target` body.
+class Network(Bodies):
+    """Bodies with the paths and loops of the edges that carry the `target` body.
 
     Parameters
     ----------
@@ -382,19 +382,10 @@ class Network:
         The path from the ground to each vertex.
     loops : tuple of EdgePath
         The edges around each loop.
-    points : mapping of str to tuple of (str, str)
-        Points of each moving link, with the vertices to which they belong.
-    pins : mapping of str to str
-        By point, the vertex on which a force at its pin acts.
     """
 
-    edges: tuple[NetworkEdge, ...]
-    target: str
     paths: Mapping[str, EdgePath]
     loops: tuple[EdgePath, ...]
-    points: Mapping[str, tuple[tuple[str, str], ...]]
-    pins: Mapping[str, str] = field(default_factory=dict)
-    transmissions: tuple[Transmission, ...] = ()
 
     @cached_property
     def one_sided(self) -> list[bool]:
@@ -487,4 +478,5 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
                 for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
-    return Network(edges, bodies.target, paths, tuple(loops), bodies.points, bodies.pins, bodies.transmissions)
+    given = bodies.target, bodies.link, bodies.points, bodies.pins, bodies.transmissions
+    return Network(edges, *given, paths, tuple(loops))

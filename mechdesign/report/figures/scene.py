@@ -202,14 +202,15 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         sides = [mesh.strand(configuration, side) for side in (1.0, -1.0) if mesh.belt]
         strands = [(pick(begin), pick(end)) for begin, end, _ in sides]
         wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, tuple(strands)))
-    cams = tuple(_cam_pair(cam, configuration, pick) for cam in mechanism.cams)
+    cams = tuple(_cam_pair(mechanism, cam, configuration, pick) for cam in mechanism.cams)
     return Scene(description, points, rotations, tuple(guides), span, tuple(wheels), cams)
 
 
-def _cam_pair(cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]) -> CamPair:
+def _cam_pair(
+    mechanism: Mechanism, cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]
+) -> CamPair:
     """A cam and its follower in the pose that `pick` takes."""
-    turn, base = pick(configuration.body_rotation(cam.links[1])), pick(configuration.nodes[cam.base])
-    start = base - turn * pick(cam.local(configuration, configuration.nodes[cam.base]))
+    start, turn = (pick(value) for value in mechanism.frame(cam.links[1], configuration))
     few = [outline[np.isfinite(outline)] for outline in cam.outlines]
     few = [outline[evenly(len(outline), _OUTLINE)] for outline in few]
     profiles = tuple(tuple((start + turn * outline).tolist()) for outline in few)
