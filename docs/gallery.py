@@ -31,7 +31,7 @@ GROUPS = {
     "Reliability": ("two_link_arm", "two_link_arm_uniform", "slider_crank_tolerances", "function_generator_made",
                     "bored_in_one_setting", "cheapest_tolerances", "one_in_a_billion", "five_bar_precision_map"),
     "Dynamics": ("flywheel_press", "twin_cylinder", "wiper_motor", "balanced_arm", "excavator_lift",
-                 "pendulum", "wedge_press"),
+                 "pendulum", "braked_pendulum", "wedge_press"),
     "Stiffness": ("planar_3rpr", "planar_2rpr_rp", "planar_rp_rr", "press_stiffness", "stiffness_map", "loaded_arm"),
 }  # fmt: skip
 # Of the home page: mechanisms that look unlike each other.

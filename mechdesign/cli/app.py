@@ -164,10 +164,12 @@ def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
     return watch(file, commands or (), Options(command="watch", **said))
 
 
-def _export(study: Path | None, to: str, at: str | None, **said: Any) -> int:
+def _export(
+    study: Path | None, to: str, at: str | None, rate: str | None, paper: str | None, **said: Any
+) -> int:  # fmt: skip
     from mechdesign.cli.export import export
 
-    return export(study, to, at, Options(command="export", **said))
+    return export(study, to, (at, rate, paper), Options(command="export", **said))
 
 
 def _compare(**said: Any) -> int:
@@ -240,10 +242,22 @@ _add(
 _add(
     _export,
     "export",
-    (given.STUDY, given.TO, given.AT, given.OUT_EXPORT, given.OVERRIDES, given.QUIET, given.STRICT, given.ALLOW_FILES),
-    "Write a file for other tools: parts to cut, a drawing, layers.",
+    (
+        given.STUDY,
+        given.TO,
+        given.AT,
+        given.RATE,
+        given.PAPER,
+        given.OUT_EXPORT,
+        given.OVERRIDES,
+        given.QUIET,
+        given.STRICT,
+        given.ALLOW_FILES,
+    ),
+    "Write a file for other tools: parts to cut, a drawing, a simulator's model.",
     "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "
-    "nothing meets.",
+    "nothing meets, a drawing sheet, a model for MuJoCo or Gazebo, curves, the motion for a controller, the study as "
+    "JSON.",
 )
 _add(
     _watch,

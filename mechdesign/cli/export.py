@@ -19,11 +19,11 @@ from mechdesign.work.threads import one_thread
 
 
 @one_thread()
-def export(path: Path | None, to: str, at: str | None, options: Options) -> int:
-    """Write one file of a study; returns the exit code."""
+def export(path: Path | None, to: str, said: tuple[str | None, str | None, str | None], options: Options) -> int:
+    """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `View`."""
     declared = export_named(to)
     study = load_study(path, options)
-    content = declared.make(View(study, at))
+    content = declared.make(View(study, *said))
     for warning in content.warnings:
         terminal.say(f"{study.label}: export: warning: {warning} [{warning.kind}]", quiet=options.quiet)
     annotate("warning", of_warnings(study, "export", content.warnings))

@@ -109,6 +109,18 @@ TO = _parameter(
     Parameter.empty,
     typer.Option("--to", metavar="NAME", help="Name of the file, e.g. parts.dxf; a wrong name lists them."),
 )
+RATE = _text(
+    str,
+    "--rate",
+    "RATE",
+    "Rate at which motion.csv tells the drives, e.g. '500 Hz', or a step of time, e.g. '2 ms'. Default: 1 kHz.",
+)
+PAPER = _text(
+    str,
+    "--paper",
+    "SIZE",
+    "Size of the drawing sheet sheet.pdf: A4 or A3. Default: A4, or A3 where the drawing would be crowded.",
+)
 AT = _text(
     str,
     "--at",

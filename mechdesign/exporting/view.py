@@ -57,10 +57,15 @@ class Slot:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A study, and the pose in which it is shown: coordinates and values as the study writes them, or None."""
+    """A study, and the pose in which it is shown: coordinates and values as the study writes them, or None.
+
+    `rate` is that of a controller, or a step of time, and `paper` the size of a drawing sheet; None: not said.
+    """
 
     study: Study
     at: str | None = None
+    rate: str | None = None
+    paper: str | None = None
 
     @property
     def mechanism(self) -> Mechanism:

@@ -37,7 +37,7 @@ class Positions:
     coordinates : tuple of Coordinate
         What the rows of `x` are.
     scales : Floats, shape (m,)
-        A radian for angles, the mechanism's size for slides.
+        A radian for angles, for slides the size of the mechanism; a unit where it has none.
     """
 
     def __init__(self, mechanism: Mechanism, at: Configuration, coordinates: Iterable[Coordinate] = ()) -> None:
@@ -49,7 +49,9 @@ class Positions:
                   for frame in self.rows]  # fmt: skip
         slides = [Coordinate(f"{name}.slide", "slide", "length", slide=k) for k, name in enumerate(graph.slides)]
         self.coordinates = (*angles, *slides)
-        self.scales = np.array([1.0] * len(angles) + [mechanism.size] * len(slides))
+        #: A length that counts as a radian.
+        self.size = mechanism.size or 1.0
+        self.scales = np.array([1.0] * len(angles) + [self.size] * len(slides))
         offsets = mechanism.geometry.nominal.offsets
         self._bases = np.array([float(np.angle(offsets[angle.body])) for angle in angles])
         self.start = self.of(at)[:, 0]
@@ -76,9 +78,13 @@ class Positions:
 
     def difference(self, angle: Coordinate, x: Floats) -> Floats:
         """Angle between the classes of two bodies, up to a constant; of rates of `x` its rate."""
+        return self.between(angle.body, angle.reference, x)
+
+    def between(self, body: str, reference: str, x: Floats) -> Floats:
+        """The same from a reference to a body."""
         total = np.zeros(x.shape[1:])
-        for sign, body in ((1, angle.body), (-1, angle.reference)):
-            frame = self.mechanism.graph.bodies[body][0]
+        for sign, end in ((1, body), (-1, reference)):
+            frame = self.mechanism.graph.bodies[end][0]
             total = total + sign * x[self.rows[frame]] if frame else total
         return total
 

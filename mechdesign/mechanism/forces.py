@@ -13,10 +13,11 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Mass, Spring
-from mechdesign.mechanism.outputs import Rates
+from mechdesign.mechanism.outputs import Rates, pulled
 
 
 def bases(graph: Graph) -> dict[str, int]:
@@ -79,6 +80,16 @@ class Forces:
         body = graph.holder(link, graph.nodes[node])
         nodes = self.configuration.nodes
         self.on_body(body, force, arm=nodes[node] - nodes[self.bases[body]])
+
+    def on_coordinate(self, coordinate: Coordinate, effort: Value) -> None:
+        """Add an effort on a coordinate: forces and moments that do its work on any motion."""
+        pulls = pulled(self.configuration, coordinate, effort)
+        for body, moment in pulls.bodies.items():
+            self.on_body(body, 0.0, moment)
+        for slide, force in pulls.slides.items():
+            self.on_slide(slide, force)
+        for node, pull in pulls.nodes.items():
+            self.on_pin(node, pull)
 
     def pull(self, ends: tuple[str, str], force: Vector) -> None:
         """Add forces that pull two points together: this one at the first, the opposite at the second."""

@@ -42,7 +42,8 @@ PIN = "pin:"
 class Balance:
     """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
 
-    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets.
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets; 0
+    where teeth do that. `pressed` are the same without teeth.
     """
 
     linear: Linearization
@@ -51,6 +52,7 @@ class Balance:
     edges: list[Vector]
     couplings: list[Value]
     pressing: Mapping[str, Pressed] = field(default_factory=dict)  # forces on the links that follow, by coupling
+    pressed: Sequence[Value] = ()  # efforts of the couplings, by which the teeth press
 
 
 @quiet
@@ -78,7 +80,7 @@ def balance(
         for link, sign in zip(engagement.links, (1.0, -1.0), strict=True):
             arm = push.place - linear.configuration.nodes[acting.bases[link]]
             acting.on_body(link, sign * push.force, arm=arm)
-    return replace(_balance(linear, forces.plus(acting)), pressing=pressing)
+    return replace(_balance(linear, forces.plus(acting)), pressing=pressing, pressed=held.couplings)
 
 
 @quiet

@@ -25,6 +25,8 @@ from mechdesign.study.poses import Poses
 _JAMS, _HOLDS = "jams in", "is held by"
 # Another: how far a pose is from jamming, from 0 to 1; forces lose so many digits.
 APART = "apart from jamming"
+# Efforts without friction, with the drive's name behind it.
+SMOOTH = "effort without friction of"
 # A slide bears a moment of note from this part of the largest joint force times the size of the mechanism.
 NOTABLE_MOMENT = 0.01
 # The mechanism is called self-locking where friction holds it in at least this part of the poses: at a dead centre, and
@@ -58,10 +60,14 @@ class Friction:
         self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])
 
     @quiet
-    def solve(self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True) -> Slipping:
+    def solve(
+        self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True,
+        given: Floats | None = None,
+    ) -> Slipping:  # fmt: skip
         """Equilibrium under forces while the mechanism moves; where it stands still, as if all drives moved up.
 
-        With `back` also what it does on its way back.
+        With `back` also what it does on its way back. Friction that is `given`, shape (contacts, poses), is that of a
+        motion in time, and no way back is asked.
         """
         mechanism, moves = self.mechanism, velocity is not None
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
@@ -69,9 +75,12 @@ class Friction:
             velocity = linear.velocity([1.0 if c.quantity == "angle" else mechanism.size for c in drives])
         rates = [first(linear.configuration, drive, velocity) for drive in drives]
         rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.engaged, mechanism.size)
-        ahead = rubs.solve(velocity)
-        ways = [ahead, rubs.solve(velocity, back=True)] if back else [ahead]
-        columns: dict[str, Value] = {}
+        ahead = rubs.solve(velocity) if given is None else rubs.given(given, velocity)
+        ways = [ahead, rubs.solve(velocity, back=True)] if back and given is None else [ahead]
+        columns: dict[str, Value] = dict.fromkeys(EFFICIENCIES, np.nan)
+        if given is None:
+            smooth = zip(mechanism.drives, rubs.smooth.efforts, strict=True)
+            columns |= {f"{SMOOTH} {name}": effort for name, effort in smooth}
         holds: Value = 0.0
         for name, rubbed, sign in zip(EFFICIENCIES, ways, (1.0, -1.0), strict=False):
             lost = np.sum(rubbed.power, axis=0)
@@ -115,7 +124,7 @@ class Friction:
         """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
         warnings, count = [], poses.count // poses.designs
 
-        def told(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
+        def caution(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
             number, row = marks[f"{what} {name}"]
             where = pose_in_words(study, poses, row) if number >= least else ""
             words = f"in {number} of {count} poses {text}; the first: {where}"
@@ -126,18 +135,18 @@ class Friction:
                 f"friction in {name} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
                 "forces are nan; a longer guide, a smaller offset or coefficient frees it"
             )
-            if jams := told(_JAMS, name, 1, text):
+            if jams := caution(_JAMS, name, 1, text):
                 warnings.append(Caution("jammed", *jams))
             text = (
                 f"friction holds what the loads would move, most of it in {name}: the mechanism is self-locking there, "
                 "and the drives must push in either direction"
             )
-            if holds := told(_HOLDS, name, max(OFTEN * count, 1), text):
+            if holds := caution(_HOLDS, name, max(OFTEN * count, 1), text):
                 warnings.append(Caution("self_locking", *holds))
             text = (
                 f"{name} bears a moment, which presses on both ends of its guide, and its friction counts the force "
                 "across alone; give its 'length'"
             )
-            if turns := told(_MOMENT, name, 1, text):
+            if turns := caution(_MOMENT, name, 1, text):
                 warnings.append(Caution("incomplete", *turns))
         return warnings

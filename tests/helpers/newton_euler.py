@@ -183,14 +183,16 @@ class Bodies:
         jets = [jet for jets in self.constraints.values() for jet in jets]
         return np.stack([jet.row for jet in jets], axis=1), np.stack([jet.bend for jet in jets], axis=1)
 
-    def move(self, rates: Mapping[str, float], accelerations: Mapping[str, float]) -> None:
-        """Give the drives rates and accelerations."""
+    def move(self, rates: Mapping[str, Floats | float], accelerations: Mapping[str, Floats | float]) -> None:
+        """Give the drives rates and accelerations, the same at all poses or one at each."""
         jacobian, _ = self._jacobian()
         right = np.zeros(jacobian.shape[:2])
         count = len(self.layout.drives)
-        right[:, -count:] = [rates.get(name, 0.0) for name in self.layout.drives]
+        for k, name in enumerate(self.layout.drives, -count):
+            right[:, k] = rates.get(name, 0.0)
         self.rates = np.linalg.solve(jacobian, right[..., None])[..., 0]
-        right[:, -count:] = [accelerations.get(name, 0.0) for name in self.layout.drives]
+        for k, name in enumerate(self.layout.drives, -count):
+            right[:, k] = accelerations.get(name, 0.0)
         self.accelerations = np.linalg.solve(jacobian, (right - self._jacobian()[1])[..., None])[..., 0]
 
     # What acts on them.

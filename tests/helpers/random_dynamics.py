@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from random import Random
@@ -19,6 +19,7 @@ from helpers.layouts import DUMPER, GROUND, Coordinate
 from helpers.newton_euler import Bodies, Jet
 from helpers.random_mechanisms import Made, mechanisms
 from helpers.studies import study_of
+from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.poses import solve_poses, study_poses
@@ -207,8 +208,15 @@ class Loaded:
     def bodies(self) -> Bodies:
         """The bodies in motion at the poses."""
         (solved,) = solve_poses(self.study, study_poses(self.study, "dynamics"))
-        configuration, layout = solved.configuration, self.layout
-        assume(configuration.valid.all())
+        assume(solved.configuration.valid.all())
+        return self.at(solved.configuration, self.rates, self.accelerations)
+
+    def at(
+        self, configuration: Configuration, rates: Mapping[str, Floats | float],
+        accelerations: Mapping[str, Floats | float],
+    ) -> Bodies:  # fmt: skip
+        """The bodies at some poses, with rates and accelerations of the drives."""
+        layout = self.layout
         origin: dict[str, Complexes] = {}
         turn: dict[str, Complexes] = {}
         for body in layout.rigid():
@@ -222,7 +230,7 @@ class Loaded:
                     configuration.point(point) - turn[body] * (layout.places[point] - link.origin) / link.turn
                 )
         bodies = Bodies(layout, origin, turn)
-        bodies.move(self.rates, self.accelerations)
+        bodies.move(rates, accelerations)
         return bodies
 
     @cached_property

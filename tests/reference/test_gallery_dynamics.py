@@ -88,6 +88,18 @@ def test_boom_cylinder_of_the_excavator_holds_the_moment_of_all_weights() -> Non
     assert table["boom_length_effort"] == pytest.approx(moment / lever, rel=1e-11)
 
 
+def test_a_braked_pendulum_sticks_inside_of_its_circle_of_friction() -> None:
+    result = result_of("braked_pendulum")
+    table, events = result.main, result.tables["events"]
+    assert events["event"].tolist() == ["standstill"]
+    still = table["time"] > events["time"][0]
+    assert still.any()
+    assert not table["swing_velocity"][still].any()
+    assert abs(250 * np.cos(np.radians(table["swing"][-1]))) < 24
+    energy = table["kinetic_energy"] + table["potential_energy"]
+    assert energy - energy[0] == pytest.approx(table["friction_work"], abs=1e-9 * table["kinetic_energy"].max())
+
+
 def test_pendulum_passes_its_lowest_place_every_half_of_its_period() -> None:
     """4 sqrt(J / (m g r)) K(sin^2(a / 2)), K the complete elliptic integral of the first kind, a = 170 deg."""
     result = result_of("pendulum")

@@ -16,10 +16,10 @@ FOUR_BAR = """
 mechanism:
   parameters: {w: 10}
   links:
-    ground: {O: [0, 0], D: [60, 0]}
-    crank: [O, A, 30]
-    coupler: [A, B, 70]
-    rocker: [D, B, 60]
+    ground: {points: {O: [0, 0], D: [60, 0]}}
+    crank: {from: O, to: A, length: 30}
+    coupler: {from: A, to: B, length: 70}
+    rocker: {from: D, to: B, length: 60}
   drives: {theta: {angle: crank}}
   sketch: {A: [0, 30], B: [55, 60]}
   plates: {width: w, pin: 4}
@@ -101,8 +101,9 @@ optimize:
 
 
 def test_pins_meet_what_lies_between_the_links_that_they_join():
-    layers = {"ground": {"layer": 1}, "crank": {"layer": 2}, "coupler": {"layer": 3}, "rocker": {"layer": 4}}
-    study = mechdesign.load(text=FOUR_BAR, overrides={"mechanism.plates.links": layers, "kinematics.collisions": True})
+    links = ("ground", "crank", "coupler", "rocker")
+    layers = {f"mechanism.links.{link}.layer": layer for layer, link in enumerate(links, start=1)}
+    study = mechdesign.load(text=FOUR_BAR, overrides={**layers, "kinematics.collisions": True})
     motion = mechdesign.kinematics(study).tables["motion"]
     # The rocker's pin in the frame passes the layers of crank and coupler; those at A and B join neighbours.
     assert [name for name in motion.names if name.endswith("clearance")] == [

@@ -22,14 +22,15 @@ FOUR_BAR = """
 mechanism:
   links:
     ground: {O: [0, 0], D: [100, 0]}
-    crank: [O, A, 30]
-    coupler: {from: A, to: B, length: 90, points: {P: [45, 25]}}
-    rocker: [D, B, 60]
+    crank: {from: O, to: A, length: 30}
+    coupler: {from: A, to: B, length: 90, points: {P: [45, 25]}, width: 12}
+    rocker: {from: D, to: B, length: 60}
   drives: {theta: {angle: crank}}
   sketch: {A: [0, 30], B: [75, 55]}
-  plates: {width: 16, pin: 6, pins: {A: 8}, links: {coupler: {width: 12}}, kerf: 0.2}
+  plates: {width: 16, pin: 6, pins: {A: 8}, kerf: 0.2}
 kinematics:
   sweep: {theta: {from: 0, to: 360, step: 15}}
+  rates: {theta: 60 rpm}
   outputs: [P]
 reliability:
   dimensions: {crank.length: 0.05, rocker.length: js9}
@@ -70,8 +71,9 @@ def test_everything_that_is_declared_is_made_with_its_mark(name):
 
 
 def test_every_file_is_told_of_on_its_page():
-    page = (Path(__file__).parents[2] / "docs" / "howto" / "export.md").read_text(encoding="utf-8")
-    assert [name for name in exports() if f"`{name}`" not in page] == []
+    howto = Path(__file__).parents[2] / "docs" / "howto"
+    pages = [(howto / f"{page}.md").read_text(encoding="utf-8") for page in ("export", "simulate_elsewhere")]
+    assert [name for name in exports() if not any(f"`{name}`" in page for page in pages)] == []
 
 
 def test_a_wrong_name_lists_those_there_are():
@@ -160,7 +162,7 @@ def met(study, layers, poses):
     solved = mechanism.solve({mechanism.drives[0]: poses})
     links = {name: link.all_points for name, link in mechanism.description.links.items()}
     width, found = mechanism.nominal["plates.width"], set()
-    radius = {name: mechanism.nominal.get(f"plates.{name}.width", width) / 2 for name in links}
+    radius = {name: mechanism.nominal.get(f"{name}.width", width) / 2 for name in links}
     pins = {}
     for name, points in links.items():
         for point in points:
@@ -212,15 +214,15 @@ def test_nothing_meets_in_the_layers_that_are_found(text):
 
 
 def test_layers_of_the_study_are_kept():
-    stack = stack_of(view(FOUR_BAR, overrides={"mechanism.plates.links": {"crank": {"layer": 3}}}))
+    stack = stack_of(view(FOUR_BAR, overrides={"mechanism.links.crank.layer": 3}))
     assert stack.layers["crank"] == 3
     assert not stack.meetings
 
 
 def test_what_meets_in_any_layers_is_named_with_the_pose():
     # Rod and rocker are in one layer, although a pin joins them.
-    both = {"coupler": {"layer": 2}, "rocker": {"layer": 2}}
-    stack = stack_of(view(FOUR_BAR, overrides={"mechanism.plates.links": both}))
+    both = {f"mechanism.links.{link}.layer": 2 for link in ("coupler", "rocker")}
+    stack = stack_of(view(FOUR_BAR, overrides=both))
     (warning,) = stack.cautions
     assert (warning.kind, stack.complete) == ("infeasible", True)
     assert str(warning) == "in whatever layers, something meets; here coupler and rocker (joined at B)"
@@ -228,7 +230,22 @@ def test_what_meets_in_any_layers_is_named_with_the_pose():
 
 def test_a_hole_as_wide_as_its_link_is_refused():
     with pytest.raises(StudyError, match="the pin 'A' has 8, and link 'coupler' is only 8 wide: its hole would cut"):
-        view(FOUR_BAR, overrides={"mechanism.plates.links.coupler.width": 8})
+        view(FOUR_BAR, overrides={"mechanism.links.coupler.width": 8})
+
+
+def test_the_least_width_of_a_link_is_that_of_links_without_one():
+    study = mechdesign.load(text=FOUR_BAR.replace("  plates: {width: 16, pin: 6, pins: {A: 8}, kerf: 0.2}\n", ""))
+    assert [View(study).sizes.radius(link) for link in ("crank", "coupler")] == [6, 6]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [({"plates": {"pin": 4}}, "plates need a 'width'"), ({"links.crank.layer": 2}, "a 'layer' belongs to plates")],
+)
+def test_plates_without_any_width_are_refused(overrides, words):
+    bare = FOUR_BAR.replace(", width: 12", "").replace("  plates: {width: 16, pin: 6, pins: {A: 8}, kerf: 0.2}\n", "")
+    with pytest.raises(StudyError, match=words):
+        view(bare, overrides={f"mechanism.{key}": value for key, value in overrides.items()})
 
 
 def test_a_study_without_plates_or_motion_says_what_is_taken():

@@ -196,10 +196,11 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
     if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
-        message = (
-            f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them; beams "
-            "or bearings with 'moment' in 'stiffness' settle it"
-        )
+        settled = "beams or bearings with 'moment' in 'stiffness' settle it"
+        if friction is not None:
+            settled = "with friction they do not follow from 'stiffness' either"
+        shares = "equilibrium leaves open how a chain of slides and clamps shares them"
+        message = f"moments of {chains} are nan: {shares}; {settled}"
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
 

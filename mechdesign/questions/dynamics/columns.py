@@ -42,11 +42,13 @@ FORWARD = TableKind.of("forward", "the motion that given efforts bring about, a 
     ("<drive>_effort", "torque or force that is given", "force or moment"),
     ("<output>", "output", "as the output"), ("kinetic_energy", "energy of the motion", "moment"),
     ("potential_energy", "energy of weights and springs", "moment"),
-    ("work", "work of efforts and loads since the start, less what dampers and stops took: the gain of both energies",
-     "moment"), VALID)  # fmt: skip
-EVENTS = TableKind.of("events", "limits reached and values passed in time, a row each",
-    ("event", "name of the crossing or limit"), ("time", "when", "time"),
-    ("direction", "up where the value rises through it, else down; at a limit down"))  # fmt: skip
+    ("work", "work of efforts and loads since the start, less what dampers, stops and friction took: the gain of both "
+     "energies", "moment"),
+    ("friction_work", "work of friction since the start, never positive", "moment"), VALID)  # fmt: skip
+EVENTS = TableKind.of("events", "limits reached, values passed and standstills in time, a row each",
+    ("event", "name of the crossing or limit; 'standstill' where friction holds the whole mechanism from then on"),
+    ("time", "when; nan if never", "time"),
+    ("direction", "up where the value rises through it, else down; at a limit and a standstill down"))  # fmt: skip
 FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of the drive over a cycle",
     ("drive", "drive"), ("mean_speed", "mean velocity of the drive", "as the drive, per time"),
     ("mean_effort", "mean torque over the cycle: a motor of this torque drives it", "moment"),
@@ -57,7 +59,7 @@ FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of th
     ("fluctuation", "coefficient of fluctuation without a flywheel", "", "surplus / (inertia omega^2)"),
     ("added_inertia", "moment of inertia to add on the drive for the fluctuation asked", "moment_of_inertia",
      "surplus / (fluctuation omega^2) - inertia, at least 0"))  # fmt: skip
-MODES = TableKind.of("modes", "natural frequencies of small motion about each pose", DRIVE,
+MODES = TableKind.of("modes", "natural frequencies of small motion about each pose, without friction", DRIVE,
     ("mode", "number of the mode, the slowest first"),
     ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable", "1/time",
      "sqrt(eigenvalue of M^-1 K) / (2 pi)"),

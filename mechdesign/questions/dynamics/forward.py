@@ -13,7 +13,7 @@ from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
-from mechdesign.questions.dynamics.motion_in_time import Course, EquationsOfMotion, Integration
+from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, EquationsOfMotion, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
@@ -78,7 +78,12 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
         (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
         slopes=slopes, bends=bends,
     )  # fmt: skip
-    motion = Motion(force_question(study, poses), reason=np.zeros(count, dtype=np.int8))
+    question = force_question(study, poses)
+    borne = question.borne
+    assert isinstance(borne, ForceQuestion)
+    if len(course.rates.friction):
+        question = replace(question, borne=replace(borne, rubbing=course.rates.friction))
+    motion = Motion(question, reason=np.zeros(count, dtype=np.int8))
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
     # Efforts are known, also where the drives are singular.
@@ -105,13 +110,28 @@ def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) ->
     for output in outputs:
         value = np.broadcast_to(in_study_units(study, output, course.configuration.value(output)), course.times.shape)
         columns.append(FORWARD["<output>"].column(value, label(output.quantity), output=output.name))
-    energies = {"kinetic_energy": course.rates.kinetic, "potential_energy": course.rates.potential, "work": course.work}
+    energies = {
+        "kinetic_energy": course.rates.kinetic,
+        "potential_energy": course.rates.potential,
+        "work": course.work[0],
+    }
+    if len(course.work) > 1:
+        energies["friction_work"] = course.work[1]
     columns += FORWARD.columns(study.units.labels, **energies)
     return FORWARD.table([*columns, VALID.column(motion.valid)])
 
 
 def _events_table(study: Study, course: Course) -> Table:
-    names = np.array([event.name for event in course.events], dtype=str)
-    times = np.array([event.time for event in course.events], dtype=float)
-    ways = np.array(["up" if event.rises else "down" for event in course.events], dtype=str)
-    return EVENTS.table(EVENTS.columns(study.units.labels, event=names, time=times, direction=ways))
+    """A row each event; those that are asked and do not happen have one without a time."""
+    section = DynamicsSection.of(study).forward
+    assert section is not None
+    watched = [*section.events, *([STANDSTILL] if study.mechanism.description.friction else [])]
+    happened = {event.name for event in course.events}
+    rows = [(event.name, event.time, "up" if event.rises else "down") for event in course.events]
+    rows += [(name, np.nan, "") for name in watched if name not in happened]
+    names, times, ways = zip(*rows, strict=True) if rows else ((), (), ())
+    columns = EVENTS.columns(
+        study.units.labels, event=np.array(names, dtype=str), time=np.array(times, dtype=float),
+        direction=np.array(ways, dtype=str),
+    )  # fmt: skip
+    return EVENTS.table(columns)

@@ -31,9 +31,11 @@ from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.friction import Rubbing, Rubs
 from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
+from mechdesign.mechanism.stick_slip import accelerate, solved_each
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import ForceQuestion
@@ -58,6 +60,11 @@ NEAREST = 8
 LOOKED_AT = np.array([0.25, 0.5, 0.75, 1.0])
 # A velocity below this part of the usual one is rest.
 REST = 1e-6
+# Where friction is, members that move against each other less than this part of the usual velocity rest; those that
+# rest do not move at all while they do. The first step from rest, as a part of the usual time; and the longest at rest,
+# as a part of the duration.
+STILL, FIRST_STEP, LONGEST_REST = 1e-8, 1e-3, 0.05
+STANDSTILL = "standstill"
 # A mass matrix whose inverse condition is below this has no inertia along some motion.
 NO_INERTIA = 1e-13
 
@@ -67,18 +74,37 @@ class Rates(NamedTuple):
 
     velocity: Floats  # of all positions
     acceleration: Floats
-    power: Floats  # of efforts and loads, less what dampers take
+    power: Floats  # of efforts and loads, less what dampers and friction take; and if there is friction its own
     kinetic: Floats
     potential: Floats
     efforts: Floats  # of the drives
+    friction: Floats  # in its contacts, as `Accelerations` has it
 
 
 class Event(NamedTuple):
-    """A crossing or a limit that is reached, at a time."""
+    """A crossing, a limit that is reached, or a standstill, at a time."""
 
     name: str
     time: float
     rises: bool
+
+
+class Watch(NamedTuple):
+    """What is looked for within steps: where a function of poses and states changes its sign.
+
+    Where it becomes negative some of them end a step: a limit of motion, of which this is the coordinate, and a contact
+    whose members come to rest against each other, of which this is the number.
+    """
+
+    name: str
+    function: Callable[[Configuration, Floats], Value]
+    limit: Coordinate | None = None
+    contact: int | None = None
+
+    @property
+    def stops(self) -> bool:
+        """Whether it ends a step."""
+        return self.limit is not None or self.contact is not None
 
 
 @dataclass
@@ -90,8 +116,8 @@ class Course:
     times : Floats
     x, velocity, acceleration : Floats
         All positions, as `positions` has them.
-    work : Floats
-        Work of efforts and loads since the start, less what dampers and stops have taken.
+    work : Floats, shape (1 or 2, instants)
+        Work of efforts and loads since the start, less what dampers, stops and friction have taken; that of friction.
     ended : str
         Why the motion ended before its time; empty if it did not.
     failed : bool
@@ -128,7 +154,12 @@ class EquationsOfMotion:
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         self.crossings = [(name, mechanism.coordinate(crossing.of)) for name, crossing in section.events.items()]
         followed = [*drives, *(coordinate for _, coordinate in self.crossings), *mechanism.counting, *outputs]
-        self.drives = drives
+        self.drives, friction = drives, question.friction
+        self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
+        #: Signs of the contacts' velocities, 0 of those at rest.
+        self.signs = np.zeros(len(self.contacts))
+        #: The joint that jammed when rates were computed last.
+        self.jams = ""
         self.positions = Positions(mechanism, at, followed)
         self.atlas = Atlas(self.positions)
         self.last = at
@@ -193,21 +224,19 @@ class EquationsOfMotion:
         linear, count, shape = self.chart.solve(x, self.last), len(self.chart.rows), times.shape
         configuration, section, rows = linear.configuration, self.question.section, slice(None)
         moves = linear.velocity([*velocity[self.chart.rows]])
-        units = np.eye(count + 1)[1:, :, None]
-        moving = Moving(moves, linear.acceleration(moves, [*units]))
+        cases = 1 + count + len(self.contacts)
+        moving = Moving(moves, linear.acceleration(moves, [*np.eye(cases)[1 : count + 1, :, None]]))
         poses = Poses((), len(times), True, shape, times=times)
         forces, energy = self.question.acting(poses, configuration, rows, moving)
-        held = balance(linear, forces).efforts
-        table = np.array([np.broadcast_to(effort, (count + 1, *shape)) for effort in held])
-        rest, matrix = table[:, 0], table[:, 1:] - table[:, :1]
         loading = Loading(self.study, section.loads, poses, rows)
         given = [loading.value(self.section.efforts.get(d.name, NOTHING), forces, moving) for d in self.drives]
         efforts = np.array([np.broadcast_to(effort, shape) for effort in given], dtype=float)
-        velocities, columns = self._of_all(moves, shape), self._of_all(moving.acceleration, (count + 1, *shape))
+        for drive, effort in zip(self.drives, efforts, strict=True):
+            forces.on_coordinate(drive, effort)
+        accelerations, friction = self._accelerations(linear, forces, moving, shape)
+        velocities, columns = self._of_all(moves, shape), self._of_all(moving.acceleration, (cases, *shape))
         # What the unit accelerations add are derivatives of the positions by the chart's coordinates.
-        slopes = columns[:, 1:] - columns[:, :1]
-        by = np.array([self.positions.rate(d, slopes) for d in self.drives])
-        accelerations = _solve(matrix, np.einsum("dp,dkp->kp", efforts, by) - rest)
+        slopes = columns[:, 1 : count + 1] - columns[:, :1]
         accelerated = columns[:, 0] + np.einsum("mkp,kp->mp", slopes, accelerations)
         power = np.sum(
             [e * self.positions.rate(d, velocities) for e, d in zip(efforts, self.drives, strict=True)], axis=0
@@ -217,10 +246,35 @@ class EquationsOfMotion:
             loads = Forces(configuration)
             loading.add(loads, moving)
             power = power + loads.power(moves)
-        power, kinetic, potential = (
-            np.array(np.broadcast_to(value, shape)) for value in (power, energy.kinetic, energy.potential)
-        )
-        return Rates(velocities, accelerated, power, kinetic, potential, efforts), regularity(linear)
+        kinetic, potential = (np.array(np.broadcast_to(value, shape)) for value in (energy.kinetic, energy.potential))
+        powers = np.array(np.broadcast_to(power, (1, *shape)))
+        if self.contacts:
+            lost = np.sum(friction * self._sliding(linear, moves, shape), axis=0)
+            powers = np.array([powers[0] + lost, lost])
+        return Rates(velocities, accelerated, powers, kinetic, potential, efforts, friction), regularity(linear)
+
+    def _accelerations(
+        self, linear: Linearization, forces: Forces, moving: Moving, shape: tuple[int, ...]
+    ) -> tuple[Floats, Floats]:
+        """Accelerations of the chart's coordinates, and friction in the contacts."""
+        count = len(self.chart.rows)
+        if not self.contacts:
+            efforts = balance(linear, forces).efforts
+            table = np.array([np.broadcast_to(effort, (count + 1, *shape)) for effort in efforts])
+            matrix = np.moveaxis(table[:, 1:] - table[:, :1], -1, 0)
+            return solved_each(matrix, -table[:, 0].T[..., None])[..., 0].T, np.empty((0, *shape))
+        mechanism, question = self.study.mechanism, self.question
+        assert moving.velocity is not None
+        assert moving.acceleration is not None
+        rubs = Rubs(question.joints, self.contacts, linear, forces, mechanism.engaged, mechanism.size)
+        offsets = self._sliding(linear, moving.acceleration, (1 + count + len(self.contacts), *shape))[:, 0]
+        answer = accelerate(rubs, self.signs, self._sliding(linear, moving.velocity, shape), offsets)
+        self.jams = next((self.contacts[k].joint for k in answer.jams if k >= 0), "")
+        return answer.values, answer.friction
+
+    def _sliding(self, linear: Linearization, rates: Directions, shape: tuple[int, ...]) -> Floats:
+        """How fast the members of contacts move against each other."""
+        return np.array([np.broadcast_to(contact.rate(linear.graph, rates), shape) for contact in self.contacts])
 
     def _of_all(self, rates: Directions | None, shape: tuple[int, ...]) -> Floats:
         """Derivatives of all positions, shape (m, ...)."""
@@ -239,22 +293,12 @@ class EquationsOfMotion:
         return table[:, 1:] - table[:, :1], linear
 
 
-def _solve(matrix: Floats, right: Floats) -> Floats:
-    """Accelerations of poses, shape (n, poses), from mass matrices of shape (n, n, poses); nan where there are none."""
-    full = np.moveaxis(matrix, -1, 0)
-    good = np.array(np.isfinite(full).all(axis=(1, 2)) & np.isfinite(right).all(axis=0))
-    good[good] = np.linalg.det(full[good]) != 0
-    solution = np.full(right.shape, np.nan)
-    solution[:, good] = np.linalg.solve(full[good], right.T[good][..., None])[..., 0].T
-    return solution
-
-
-def _beyond(coordinate: Coordinate, value: Value, pose: Configuration) -> Value:
+def _beyond(coordinate: Coordinate, value: Value, pose: Configuration, _: Floats) -> Value:
     """By how much a coordinate is beyond a value."""
     return pose.value(coordinate) - value
 
 
-def _margin(bound: Bound, places: Mapping[str, Value], k: int, pose: Configuration) -> Value:
+def _margin(bound: Bound, places: Mapping[str, Value], k: int, pose: Configuration, _: Floats) -> Value:
     """Margin of a limit by its number."""
     return bound.margins(pose, places)[k][1]
 
@@ -269,8 +313,10 @@ class Integration:
         self.count = len(self.positions.scales)
         x, velocity = equations.start
         self._check_inertia(x)
-        self.begin = np.concatenate([x, velocity, [0.0]])
-        self.scales = self._scales(x, velocity)
+        works = 2 if equations.contacts else 1
+        self.begin = np.concatenate([x, velocity, np.zeros(works)])
+        equations.signs = np.sign(self._sliding(velocity))
+        self.scales = self._scales(x, velocity, works)
         self.events: list[Event] = []
         self._parts: list[tuple[Floats, Floats, Rates, Floats, Configuration]] = []
         self._ended = ""
@@ -287,7 +333,17 @@ class Integration:
                 "dynamics.forward",
             )
 
-    def _scales(self, x: Floats, velocity: Floats) -> Floats:
+    def _sliding(self, velocity: Floats) -> Floats:
+        """How fast the members of contacts move against each other, in radians or sizes of the mechanism."""
+        positions = self.positions
+        speeds = [
+            positions.between(contact.on, contact.by, velocity) if contact.slide is None
+            else velocity[len(positions.rows) + contact.slide] / positions.size
+            for contact in self.equations.contacts
+        ]  # fmt: skip
+        return np.array(speeds).reshape(len(speeds), *velocity.shape[1:])
+
+    def _scales(self, x: Floats, velocity: Floats, works: int) -> Floats:
         """Sizes of positions, velocities and work, of which errors are parts."""
         rates = self.equations.rates(np.zeros(1), x[:, None], velocity[:, None])
         fast = np.max(np.abs(velocity) / self.positions.scales)
@@ -297,17 +353,25 @@ class Integration:
         rows = self.positions.scales[self.equations.chart.rows]
         self.pace = pace
         energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
-        return np.concatenate([self.positions.scales, self.positions.scales * pace, [energy]])
+        return np.concatenate([self.positions.scales, self.positions.scales * pace, np.full(works, energy)])
 
     def _function(self, time: float, state: Any) -> Any:
         """Derivative of the state: positions, velocities, work."""
-        x, velocity = state[: self.count, None], state[self.count : -1, None]
+        x, velocity, _ = self._parts_of(state[:, None])
         rates = self.equations.rates(np.array([time]), x, velocity)
-        return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power])
+        return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
+
+    def _parts_of(self, states: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions, velocities and works."""
+        return states[: self.count], states[self.count : 2 * self.count], states[2 * self.count :]
 
     def _solver(self, time: float, state: Floats) -> DOP853:
         tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
-        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance)
+        steps: dict[str, Any] = {}
+        if not self.equations.signs.all() and time < self.end:
+            # What begins to slide does so within the first step; a load that moves what rests is not stepped over.
+            steps = {"first_step": min(FIRST_STEP / self.pace, self.end - time), "max_step": LONGEST_REST * self.end}
+        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance, **steps)
 
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, and one more where the motion ends before."""
@@ -317,29 +381,32 @@ class Integration:
             solver = self._solver(0.0, self.begin)
             self._keep(rows[:1], self.begin[:, None])
             rows = rows[1:]
-            failed, steps, bounces, watches = False, 0, 0, bool(list(self._watched()))
+            failed, steps, bounces = False, 0, 0
+            watches = bool(self.equations.contacts or list(self._watched()))
             while solver.status == "running":
                 begin, steps = solver.t, steps + 1
-                if solver.step() is not None or steps > MAX_STEPS:
+                if not np.isfinite(solver.f).all() or solver.step() is not None or steps > MAX_STEPS:
                     failed = True
-                    why = f"{MAX_STEPS} steps are not enough" if steps > MAX_STEPS else "the motion cannot go on"
-                    self._ended = f"{why} at {begin:.6g}"
+                    self._ended = f"{self._failure(steps)} at {begin:.6g}"
                     break
                 if not watches and (not len(rows) or rows[0] > solver.t):
                     solver = self._switched(solver)
                     continue
                 dense = solver.dense_output()
-                stop = self._stop(dense, begin, solver.t) if watches else None
-                until = solver.t if stop is None else stop[1]
+                stop, until = self._stop(dense, begin, solver.t) if watches else (None, solver.t)
                 inside = rows[rows <= until]
                 if len(inside):
                     self._keep(inside, dense(inside))
                     rows = rows[len(inside) :]
                     progress.update(len(inside))
                 if stop is None:
+                    self._release(solver.y)
                     solver = self._switched(solver)
                     continue
-                state = self._bounced(stop, dense(until))
+                if stop.contact is not None:
+                    solver = self._solver(until, self._rested(stop.contact, until, dense(until)))
+                    continue
+                state = self._bounced(stop, until, dense(until))
                 bounces += 1
                 if state is None or bounces > MAX_BOUNCES:
                     self._ended = self._ended or f"after {MAX_BOUNCES} bounces"
@@ -349,12 +416,43 @@ class Integration:
                 solver = self._solver(until, state)
         return self._course(failed, steps)
 
+    def _failure(self, steps: int) -> str:
+        """Why the motion ends before its time."""
+        if steps > MAX_STEPS:
+            return f"{MAX_STEPS} steps are not enough"
+        if self.equations.jams:
+            return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
+        return "the motion cannot go on"
+
+    def _release(self, state: Floats) -> None:
+        """Let contacts that were at rest slide, once they move."""
+        speeds, signs = self._sliding(self._parts_of(state)[1]), self.equations.signs
+        self.equations.signs = np.where((signs == 0) & (np.abs(speeds) > STILL * self.pace), np.sign(speeds), signs)
+
+    def _rested(self, contact: int, time: float, state: Floats) -> Floats:
+        """The state at which a contact, and perhaps others with it, comes to rest."""
+        equations = self.equations
+        x, velocity, works = self._parts_of(state)
+        linear = equations.chart.solve(x[:, None], equations.last)
+        exact = self.positions.of(linear.configuration)[:, 0]
+        velocity = equations.slopes(linear) @ velocity[equations.chart.rows]
+        if np.abs(velocity / self.positions.scales).max() <= STILL * self.pace:
+            velocity = np.zeros_like(velocity)
+        speeds = self._sliding(velocity)
+        speeds[contact] = 0.0
+        equations.signs = np.where(np.abs(speeds) > STILL * self.pace, np.sign(speeds), 0.0)
+        if not velocity.any():
+            rates = equations.rates(np.array([time]), exact[:, None], velocity[:, None])
+            if np.abs(rates.acceleration[:, 0] / self.positions.scales).max() <= STILL * self.pace**2:
+                self.events.append(Event(STANDSTILL, time, rises=False))
+        return np.concatenate([exact, velocity, works])
+
     def _keep(self, times: Floats, states: Floats) -> None:
         """Keep the motion at some times of one chart."""
-        x, velocity = states[: self.count], states[self.count : -1]
+        x, velocity, works = self._parts_of(states)
         linear = self.equations.chart.solve(x, self.equations.last)
         rates = self.equations.rates(times, x, velocity)
-        self._parts.append((times, x, rates, states[-1], linear.configuration))
+        self._parts.append((times, x, rates, works, linear.configuration))
 
     def _course(self, failed: bool, steps: int) -> Course:
         times, x, work = (np.concatenate([part[k] for part in self._parts], axis=-1) for k in (0, 1, 3))
@@ -370,9 +468,9 @@ class Integration:
 
     def _switched(self, solver: DOP853) -> DOP853:
         """The solver with another chart, where its coordinates move much faster than those of this one."""
-        equations, state = self.equations, solver.y
-        x = state[: self.count, None]
-        linear = equations.chart.solve(x, equations.last)
+        equations = self.equations
+        x, velocity, works = self._parts_of(solver.y)
+        linear = equations.chart.solve(x[:, None], equations.last)
         if not regularity(linear)[0] >= MEETING:
             return solver
         equations.last = linear.configuration.take(0)
@@ -383,77 +481,80 @@ class Integration:
         if chart is equations.chart or volume * np.prod(self.positions.scales[rows]) < FASTER:
             return solver
         exact = self.positions.of(linear.configuration)[:, 0]
-        velocity = slopes @ state[self.count : -1][rows]
+        velocity = slopes @ velocity[rows]
         equations.chart = chart
-        return self._solver(solver.t, np.concatenate([exact, velocity, state[-1:]]))
+        return self._solver(solver.t, np.concatenate([exact, velocity, works]))
 
-    def _watched(self) -> Iterator[tuple[str, Coordinate | None, Callable[[Configuration], Value]]]:
-        """Crossings and limits: name, of a limit its coordinate, and what changes its sign."""
+    def _watched(self) -> Iterator[Watch]:
+        """Crossings, limits, and contacts that slide."""
         for name, coordinate in self.equations.crossings:
             value = radians(self.equations.study, coordinate, float(self.section.events[name].value))
-            yield name, None, partial(_beyond, coordinate, value)
+            yield Watch(name, partial(_beyond, coordinate, value))
         places = self.mechanism.nominal
         for bound in self.mechanism.bounds:
             for k, (label, _) in enumerate(bound.margins(self.equations.last, places)):
-                yield label, bound.coordinate, partial(_margin, bound, places, k)
+                yield Watch(label, partial(_margin, bound, places, k), limit=bound.coordinate)
+        for k, contact in enumerate(self.equations.contacts):
+            if self.equations.signs[k]:
+                yield Watch(contact.joint, partial(self._ahead, k), contact=k)
+
+    def _ahead(self, contact: int, _: Configuration, states: Floats) -> Floats:
+        """How fast a contact slides on the way that it slides."""
+        speed: Floats = self.equations.signs[contact] * self._sliding(self._parts_of(states)[1])[contact]
+        return speed
 
     def _stop(
         self, dense: Callable[[Floats], Floats], begin: float, end: float
-    ) -> tuple[str, float, Coordinate] | None:
-        """The first limit that is reached in a step; crossings up to there are noted."""
+    ) -> tuple[Watch | None, float]:  # fmt: skip
+        """What ends a step first, if anything, and when; crossings up to there are noted."""
         times = begin + np.append(0.0, LOOKED_AT) * (end - begin)
-        places = self._pose(dense(times))
-        found: list[tuple[str, float, Coordinate | None, bool]] = []
-        for name, limit, function in self._watched():
-            values = np.broadcast_to(function(places), times.shape)
+        states = dense(times)
+        poses = self._pose(states)
+        stop, until, crossings = None, end, list[Event]()
+        for watch in self._watched():
+            values = np.broadcast_to(watch.function(poses, states), times.shape)
             for k in range(len(times) - 1):
                 one, other = float(values[k]), float(values[k + 1])
-                if limit is not None and other < 0:
+                if watch.stops and other < 0:
                     # A limit that was just left counts as inside.
-                    time = times[k] if one <= 0 else self._root(dense, function, times[k], times[k + 1])
-                elif limit is None and one * other <= 0 and one != 0:
-                    time = self._root(dense, function, times[k], times[k + 1])
-                else:
-                    continue
-                found.append((name, float(time), limit, other > one))
-                if limit is not None:
+                    time = float(times[k]) if one <= 0 else self._root(dense, watch, times[k], times[k + 1])
+                    if stop is None or time < until:
+                        stop, until = watch, time
                     break
-        stops = [event for event in found if event[2] is not None]
-        stop = min(stops, key=lambda event: event[1], default=None)
-        for name, time, limit, rises in found:
-            if limit is None and (stop is None or time <= stop[1]):
-                self.events.append(Event(name, time, rises))
-        if stop is None or stop[2] is None:
-            return None
-        self.events.append(Event(stop[0], stop[1], rises=False))
-        return stop[0], stop[1], stop[2]
+                if not watch.stops and one * other <= 0 and one != 0:
+                    crossings.append(Event(watch.name, self._root(dense, watch, times[k], times[k + 1]), other > one))
+        self.events += [event for event in crossings if event.time <= until]
+        if stop is not None and stop.limit is not None:
+            self.events.append(Event(stop.name, until, rises=False))
+        return stop, until
 
-    def _root(
-        self, dense: Callable[[Floats], Floats], function: Callable[[Configuration], Value], begin: float, end: float
-    ) -> float:
+    def _root(self, dense: Callable[[Floats], Floats], watch: Watch, begin: float, end: float) -> float:
         def at(time: float) -> float:
-            return float(np.ravel(function(self._pose(dense(np.array([time])))))[0])
+            states = dense(np.array([time]))
+            return float(np.ravel(watch.function(self._pose(states), states))[0])
 
         return float(brentq(at, begin, end, xtol=1e-14 * self.end, rtol=1e-14))
 
     def _pose(self, states: Floats) -> Configuration:
         return self.equations.chart.solve(states[: self.count], self.equations.last).configuration
 
-    def _bounced(self, stop: tuple[str, float, Coordinate], state: Floats) -> Floats | None:
+    def _bounced(self, stop: Watch, time: float, state: Floats) -> Floats | None:
         """The state behind a stop; None where the motion ends there.
 
         An impulse along the limit's coordinate g changes velocities by -(1 + e) M^-1 g (g v) / (g M^-1 g).
         """
-        name, time, coordinate = stop
+        name, coordinate = stop.name, stop.limit
+        assert coordinate is not None
         if self.section.restitution is None:
             self._ended = f"limit {name} is reached at {time:.6g}"
             return None
-        matrix, linear = self.equations.matrix(time, state[: self.count])
+        x, velocity, works = self._parts_of(state)
+        matrix, linear = self.equations.matrix(time, x)
         rows = self.equations.chart.rows
         along = np.array([np.ravel(first(linear.configuration, coordinate, part))[0] for part in linear.by_drives])
-        velocity = state[self.count : -1][rows]
+        velocity = velocity[rows]
         speed = float(along @ velocity)
-        scale = self.mechanism.size if coordinate.quantity == "length" else 1.0
+        scale = self.positions.size if coordinate.quantity == "length" else 1.0
         if not self.section.restitution * abs(speed) > REST * self.pace * scale:
             self._ended = f"the mechanism rests at limit {name} from {time:.6g} on"
             return None
@@ -461,4 +562,6 @@ class Integration:
         after = velocity - (1 + self.section.restitution) * impulse * speed / (along @ impulse)
         lost = 0.5 * (after @ matrix @ after - velocity @ matrix @ velocity)
         exact = self.positions.of(linear.configuration)[:, 0]
-        return np.concatenate([exact, self.equations.slopes(linear) @ after, [state[-1] + lost]])
+        velocity = self.equations.slopes(linear) @ after
+        self.equations.signs = np.sign(self._sliding(velocity))
+        return np.concatenate([exact, velocity, works[:1] + lost, works[1:]])

@@ -18,7 +18,7 @@ from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
-from mechdesign.numerics.arrays import Ints
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import Friction, Slipping
@@ -46,6 +46,7 @@ class ForceQuestion:
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
     tempo: float  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
     subset: frozenset[str] | None = None  # columns of `statics` that are computed; None for all, with parts
+    rubbing: Floats | None = None  # friction of a motion in time, shape (contacts, instants)
 
     @classmethod
     def of(cls, study: Study, *, moves: bool, tempo: float = 0.0) -> ForceQuestion:
@@ -135,7 +136,8 @@ class ForceQuestion:
             held: Balance | Slipping = balance(linear, forces, mechanism.engaged)
         else:
             back = self.subset is None or "back_efficiency" in self.subset
-            held = self.friction.solve(linear, forces, moving.velocity, back=back)
+            given = None if self.rubbing is None else self.rubbing[:, rows]
+            held = self.friction.solve(linear, forces, moving.velocity, back=back, given=given)
             columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort

@@ -151,9 +151,6 @@ class DynamicsSection(MotionSection):
                     f"'forward' and {key!r} are both given; what efforts bring about has poses and rates of its own"
                 )
                 checker.report((self.command, key), message, at_key=True)
-            if checker.mechanism.friction:
-                message = "a motion in time knows no friction yet; leave 'forward' out, or mechanism.friction"
-                checker.report((self.command, "forward"), message, at_key=True)
         check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=timed)
         check_friction(checker)
         return super().checked(checker)

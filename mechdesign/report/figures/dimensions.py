@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plates import hull
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -60,7 +62,14 @@ def dimensions_figure(study: Study) -> Figure:
     figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=above, pad=0.75)
     axes.grid(visible=False)
     axes.set_title(title, loc="left")
-    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False)
+    draw_dimensions(axes, mechanism, mechanism.sketch_configuration, scene)
+    _table(figure, study, scene)
+    return figure
+
+
+def draw_dimensions(axes: Axes, mechanism: Mechanism, configuration: Configuration, scene: Scene) -> None:
+    """Draw a mechanism in a pose, its scene, with dimension lines and the names of points and links."""
+    draw_mechanism(axes, mechanism, configuration, labels=False, drives=False)
     net = covered(axes)
     boxes: list[Floats] = []
     # The shortest nearest to their links.
@@ -70,8 +79,6 @@ def dimensions_figure(study: Study) -> Figure:
     for box in boxes:
         net = np.concatenate([net, _inside(box)])
     place_labels(axes, [*point_labels(scene), *link_labels(scene, link_colors(mechanism))], net, order=_ORDER + 1)
-    _table(figure, study, scene)
-    return figure
 
 
 def _number(value: float, angle: float) -> str:

@@ -25,7 +25,7 @@ BROWSERS = (
     r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
 )  # fmt: skip
 _SECONDS = 120.0  # that a browser may take
-_DATE = re.compile(rb"D:\d{14}")
+_DATE, _NODE = re.compile(rb"D:\d{14}"), re.compile(rb"node\d{8}")
 
 
 def browser() -> str:
@@ -46,7 +46,7 @@ def browser() -> str:
 
 
 def pdf(page: Path) -> bytes:
-    """A page as it is printed, without dates, with the mark of our pages at its end.
+    """A page as it is printed, the same at any time, with the mark of our pages at its end.
 
     Raises
     ------
@@ -72,4 +72,7 @@ def pdf(page: Path) -> bytes:
             why = done.stderr.decode(errors="replace").strip().splitlines()
             raise OutputError(f"{page}: {program} did not print it: {why[-1] if why else 'it gave no reason'}")
         data = printed.read_bytes()
+    # Numbers of the page's elements differ from run to run: they are counted in the order of the file.
+    nodes = {node: b"node%08d" % k for k, node in enumerate(dict.fromkeys(_NODE.findall(data)), start=1)}
+    data = _NODE.sub(lambda node: nodes[node[0]], data)
     return _DATE.sub(b"D:19700101000000", data) + f"% {GENERATOR}\n".encode()

@@ -41,7 +41,7 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount, written
+from mechdesign.study.text.units import Amount
 
 # Of teeth as ISO 53 has them (radians).
 PRESSURE_ANGLE = np.radians(20.0)
@@ -383,41 +383,47 @@ def _friction(builder: Builder) -> dict[str, Friction]:
 
 
 def _plates(builder: Builder) -> Plates | None:
-    """Plates without mistakes in their names; their numbers become places."""
-    given, path = builder.section.plates, ("plates",)
-    if given is None:
-        return None
+    """Plates without mistakes in their names, where the study gives a width; their numbers become places."""
+    given, links = builder.section.plates or models.Plates(), builder.section.links
+    widths = {
+        name: builder.place(f"{name}.width", link.width) for name, link in links.items() if link.width is not None
+    }
+    layers = {name: link.layer for name, link in links.items() if link.layer is not None}
     lengths = {
         key: builder.place(f"plates.{key}", getattr(given, key))
         for key in given.given("width", "pin", "thickness", "kerf", "sheet")
     }
-    widths, layers, pins = dict[str, Term](), dict[str, int](), dict[str, Term]()
-    for name, plate in given.links.items():
-        if not builder.reporter.check_name(name, builder.section.links, "link", (*ROOT, *path, "links", name),
-                                           at_key=True):  # fmt: skip
-            continue
-        if plate.width is not None:
-            widths[name] = builder.place(f"plates.{name}.width", plate.width)
-        if plate.layer is not None:
-            layers[name] = plate.layer
-    for name, diameter in given.pins.items():
-        if builder.reporter.check_name(name, builder.section.owners, "point", (*ROOT, *path, "pins", name),
-                                       at_key=True):  # fmt: skip
-            pins[name] = builder.place(f"plates.{name}.pin", diameter)
-    _check_holes(builder, given)
-    return Plates(**lengths, widths=widths, pins=pins, layers=layers)
+    if "width" not in lengths and not widths:
+        if builder.section.plates is not None:
+            builder.report(("plates",), "plates need a 'width', of all or of a link", at_key=True)
+        for name in layers:
+            builder.report(("links", name), "a 'layer' belongs to plates; give mechanism.plates.width", at_key=True)
+        return None
+    lengths.setdefault("width", min(widths.values(), key=builder.nominal, default=0.0))
+    pins = {
+        name: builder.place(f"plates.{name}.pin", diameter)
+        for name, diameter in given.pins.items()
+        if builder.reporter.check_name(
+            name, builder.section.owners, "point", (*ROOT, "plates", "pins", name), at_key=True
+        )
+    }
+    plates = Plates(**lengths, widths=widths, pins=pins, layers=layers)
+    _check_holes(builder, plates)
+    return plates
 
 
-def _check_holes(builder: Builder, given: models.Plates) -> None:
+def _check_holes(builder: Builder, plates: Plates) -> None:
     """Check that no hole of a given diameter is as wide as its link."""
     for point, links in builder.section.owners.items():
-        diameter = given.pins.get(point, given.pin)
+        diameter = plates.pins.get(point, plates.pin)
+        if len(links) < 2 or diameter is None:
+            continue
         for link in links:
-            own = given.links.get(link)
-            width = given.width if own is None or own.width is None else own.width
-            if len(links) > 1 and diameter is not None and diameter >= width:
-                message = f"the pin {point!r} has {written(diameter)}, and link {link!r} is only {written(width)} wide"
-                builder.report(("plates",), f"{message}: its hole would cut the link through", at_key=True)
+            pin, width = builder.nominal(diameter), builder.nominal(plates.widths.get(link, plates.width))
+            if pin >= width:
+                message = f"the pin {point!r} has {pin:g}, and link {link!r} is only {width:g} wide"
+                path: KeyPath = ("plates",) if builder.section.plates is not None else ("links", link)
+                builder.report(path, f"{message}: its hole would cut the link through", at_key=True)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:

@@ -22,7 +22,7 @@ from mechdesign.study.text.fields import Context, failure, read_expression, read
 from mechdesign.study.text.inputs import file_of
 from mechdesign.study.text.units import Amount, QuantityError, check_unit
 
-LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod")
+LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod", "width", "layer")
 _BRANCHES = {
     "side": "in every pose each joint lies on the side on which the sketch has it",
     "follow": "a sweep goes on smoothly through change points, where the sides meet",
@@ -105,6 +105,12 @@ class Link(fields.Model):
     """Moment of inertia about the centre of mass. Left out: 0, a point mass. Example: 0.002 kg*m^2"""
     rod: Rod | None = None
     """Mass of the second body of a telescopic link, the one with ``to``. Example: {mass: 1.2 kg, center: [-100, 0]}"""
+    width: fields.PositiveLengthPlace | None = None
+    """Width of the link as a plate: its ends are round with half of it. Left out: that of ``plates``. Example: 12 mm"""
+    layer: Annotated[int, fields.whole(1, 1000)] | None = None
+    """Layer in which the link lies as a plate, counted from the bottom. Left out: `mechdesign export --to layers.csv`
+    finds one. Example: 2
+    """
 
     @model_validator(mode="before")
     @classmethod
@@ -414,31 +420,19 @@ class Friction(fields.Model):
     """
 
 
-class Plate(fields.Model):
-    """Width and layer of one link as a plate; a number alone is its width."""
-
-    bare, short = "width", (fields.NUMBER_FORM,)
-    width: fields.PositiveLengthPlace | None = None
-    """Width of this link: its ends are round with half of it. Left out: that of all. Example: 12 mm"""
-    layer: Annotated[int, fields.whole(1, 1000)] | None = None
-    """Layer in which this link lies, counted from the bottom. Left out: `mechdesign export --to layers.csv` finds one.
-    Example: 2
-    """
-
-
 class Plates(fields.Model):
     """Links as flat plates that are cut to size, and the pins that join them."""
 
-    width: fields.PositiveLengthPlace
-    """Width of every link: the outline is as far from its points as half of it. Example: 20 mm"""
+    width: fields.PositiveLengthPlace | None = None
+    """Width of every link that has none of its own: the outline is as far from its points as half of it. Left out: the
+    least ``width`` of a link. Example: 20 mm
+    """
     pin: fields.PositiveLengthPlace | None = None
     """Diameter of every pin and its holes. Left out: 0.4 of ``width``. Example: 6 mm"""
     thickness: fields.PositiveLengthPlace | None = None
     """Thickness of a plate, and so the height of a layer. Left out: 0.25 of ``width``. Example: 5 mm"""
     pins: dict[fields.PointName, fields.PositiveLengthPlace] = Field(default_factory=dict)
     """Diameters of pins that differ, by their point. Example: {A: 8 mm}"""
-    links: dict[fields.LinkName, Plate] = Field(default_factory=dict)
-    """Widths and layers of links that differ. Example: {coupler: {width: 12 mm, layer: 2}, crank: 15}"""
     kerf: fields.NonNegativeLengthPlace | None = None
     """Width of the cut that laser, water or wire takes away: outlines are larger by half of it, holes smaller. Left
     out: 0. Example: 0.2 mm

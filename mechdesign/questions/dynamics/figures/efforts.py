@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.questions.dynamics.figures.view import DynamicsView
+from mechdesign.questions.friction import SMOOTH
 from mechdesign.report.figures import style
 from mechdesign.report.figures.joints import NOTHING, place_in_words
 from mechdesign.report.figures.panels import (
@@ -29,6 +30,7 @@ _TALL, _LOW = 1.75, 1.3  # inches
 _BEYOND = 6.0
 _CURVES = {"effort": style.BLUE, "power": style.GREEN}
 _RMS: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (6, 2)), "linewidth": 1.3}
+_SMOOTH: dict[str, Any] = {"color": style.BLUE, "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _MEAN: dict[str, Any] = {"color": style.INK, "linestyle": (0, (1.5, 1.5)), "linewidth": 1.3}
 
 
@@ -50,7 +52,10 @@ def efforts_figure(view: DynamicsView) -> Figure | None:
     tick_abscissa(panels[-1], over)
     panels[-1].set_xlim(float(over.values.min()), float(over.values.max()))
     clear_of_ticks(figure, panels)
-    handles = [Line2D([], [], label=words, **look) for words, look in (("root mean square", _RMS), ("mean", _MEAN))]
+    looks = {"root mean square": _RMS, "mean": _MEAN}
+    if any(name.startswith(SMOOTH) for name in arrays):
+        looks["effort without friction"] = _SMOOTH
+    handles = [Line2D([], [], label=words, **look) for words, look in looks.items()]
     ring = Line2D([], [], color=style.INK, marker="o", markersize=7, markerfacecolor="none", linestyle="", label="peak")
     legend_below(figure, [*handles, ring], [str(handle.get_label()) for handle in (*handles, ring)])
     return figure
@@ -71,6 +76,8 @@ def _panel(view: DynamicsView, axes: Axes, name: str, over: Along) -> None:
     low, high, size, at, mean, rms = (float(row[key][0]) for key in ("min", "max", "peak", "peak_at", "mean", "rms"))
     drive, _, kind = name.rpartition("_")
     axes.plot(over.values, values, color=_CURVES[kind], linewidth=1.8)
+    if kind == "effort" and (smooth := view.drawn.motion.arrays.get(f"{SMOOTH} {drive}")) is not None:
+        axes.plot(over.values, smooth, **_SMOOTH)
     axes.axhline(0, color=style.FAINT, linewidth=0.9, zorder=1.5)
     words = "without bound"
     if np.isfinite(size):

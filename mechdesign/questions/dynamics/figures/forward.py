@@ -24,8 +24,9 @@ def forward_figure(view: DynamicsView) -> Figure | None:
     drives = view.study.mechanism.drives
     names = [name for drive in drives for name in (drive, f"{drive}_velocity")][:MAX_PANELS]
     tall = _LOW if len(names) > _FEW_PANELS else _TALL
-    count, times = len(events), events["time"]
-    note = f"dotted: {', '.join(dict.fromkeys(events['event'].tolist()))}" if count else ""
+    happened = np.isfinite(events["time"])
+    times, words = events["time"][happened], dict.fromkeys(events["event"][happened].tolist())
+    note = f"dotted: {', '.join(words)}" if words else ""
     figure, panels = stack(len(names), "Motion in time", over.label, note=note, tall=tall)
     for axes, name in zip(panels, names, strict=True):
         column = table.column(name)

@@ -1,0 +1,152 @@
+"""Curves, motions for controllers, the study as JSON, and the drawing sheet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.exporting.exports import export_named
+from mechdesign.exporting.sheet import BLOCK, PAPERS, Sheet
+from mechdesign.exporting.view import View
+from mechdesign.report.figures import style
+from mechdesign.report.figures.scene import pose
+from mechdesign.report.tables import to_csv
+
+SLIDER = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, 30]
+    rod: [A, B, 90]
+    block: {points: [B]}
+  joints: {guide: {prismatic: [ground, block], direction: 0}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [20, 22], B: [105, 0]}
+kinematics:
+  sweep: {theta: {from: 0, to: 360, step: 30}}
+  rates: {theta: 60 rpm}
+  outputs: [B.x]
+"""
+ARM = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 100], lower: [E, T, 80]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  sketch: {E: [50, 85], T: [120, 60]}
+kinematics:
+  path: {T: {circle: {center: [110, 60], radius: 20}, points: 12}}
+  speed: 50 mm/s
+"""
+
+
+def rows_of(name, text, **said):
+    content = export_named(name).make(View(mechdesign.load(text=text), **said))
+    reader = csv.reader(io.StringIO(content.data))
+    head = next(reader)
+    return dict(zip(head, np.array([[float(cell) for cell in row] for row in reader]).T, strict=True))
+
+
+def test_a_curve_is_exact_between_the_poses_of_the_study():
+    table = rows_of("curve.csv", SLIDER)
+    assert len(table["part"]) >= 721
+    theta = np.radians(table["theta"])
+    assert table["B.x"] == pytest.approx(30 * np.cos(theta) + np.sqrt(90**2 - (30 * np.sin(theta)) ** 2), abs=1e-9)
+    assert set(table["part"]) == {1}
+
+
+def test_a_constant_rate_gives_time_to_a_sweep():
+    table = rows_of("motion.csv", SLIDER, rate="200 Hz")
+    assert table["time"] == pytest.approx(np.arange(201) / 200)
+    assert table["theta"] == pytest.approx(360 * table["time"])
+    assert set(table["theta_velocity"]) == {360}
+    assert not table["theta_acceleration"].any()
+
+
+def test_a_law_is_told_at_the_rate_of_the_controller():
+    law = "motion: {theta: [{from: 0, to: 90, time: 0.3, law: cycloidal}, {dwell: 0.1}]}\n  outputs: [B.x]\n"
+    table = rows_of("motion.csv", SLIDER.split("  sweep")[0] + "  " + law, rate="0.8 ms")
+    time = 0.0008 * np.arange(501)
+    u = np.minimum(time / 0.3, 1.0)
+    assert table["theta"] == pytest.approx(90 * (u - np.sin(2 * math.pi * u) / (2 * math.pi)), abs=1e-9)
+    assert table["theta_velocity"] == pytest.approx(90 / 0.3 * (1 - np.cos(2 * math.pi * u)), abs=1e-6)
+    moving = u < 0.999
+    assert table["theta_acceleration"][moving] == pytest.approx(
+        90 / 0.09 * 2 * math.pi * np.sin(2 * math.pi * u[moving]), abs=1e-6
+    )
+
+
+def test_a_path_is_passed_at_its_speed():
+    table = rows_of("motion.csv", ARM)
+    q1, q2 = np.radians(table["q1"]), np.radians(table["q2"])
+    place = 100 * np.exp(1j * q1) + 80 * np.exp(1j * (q1 + q2))
+    assert np.abs(place - (110 + 60j)) == pytest.approx(20, abs=1e-9)
+    assert len(place) == int(1000 * 2 * math.pi * 20 / 50) + 1
+    assert np.angle((place[1:] - (110 + 60j)) / (place[:-1] - (110 + 60j))) == pytest.approx(0.0025, abs=1e-9)
+    assert np.gradient(table["q1"], 0.001)[1:-1] == pytest.approx(table["q1_velocity"][1:-1], abs=1e-3)
+
+
+def test_a_motion_without_time_says_what_is_missing():
+    still = SLIDER.replace("  rates: {theta: 60 rpm}\n", "")
+    backwards = SLIDER.replace("60 rpm", "-60 rpm")
+    for text, words in (
+        (still, "the motion has no time: give kinematics 'rates'"),
+        (backwards, "runs against its rate"),
+        (SLIDER.replace("sweep: {theta: {from: 0, to: 360, step: 30}}", "poses: [{theta: 0}]"), "listed poses"),
+    ):
+        with pytest.raises(StudyError, match=words):
+            rows_of("motion.csv", text)
+    for rate in ("fast", "0 Hz", "2 mm", "-1 ms"):
+        with pytest.raises(StudyError, match="--rate is a rate such as"):
+            rows_of("motion.csv", SLIDER, rate=rate)
+    with pytest.raises(AssemblyError, match="has no valid pose"):
+        rows_of("motion.csv", SLIDER.replace("[A, B, 90]", "[A, B, 25]").replace("105, 0", "40, 0"))
+
+
+def test_the_study_as_json_gives_the_same_tables(tmp_path):
+    file = tmp_path / "study.yaml"
+    file.write_text(SLIDER.replace("[O, A, 30]", "[O, A, r]").replace("links:", "parameters: {r: 30}\n  links:", 1))
+    changed = mechdesign.load(file, {"mechanism.parameters.r": 20})
+    copy = tmp_path / "study.json"
+    copy.write_text(export_named("study.json").make(View(changed)).data)
+    assert json.loads(copy.read_text())["mechanism"]["links"]["crank"] == ["O", "A", "r"]
+    again = mechdesign.load(copy)
+    one, other = mechdesign.kinematics(changed).tables, mechdesign.kinematics(again).tables
+    assert {name: to_csv(table) for name, table in one.items()} == {name: to_csv(t) for name, t in other.items()}
+
+
+def test_a_sheet_is_at_a_standard_scale():
+    for text, paper, scale, words in (
+        (SLIDER, None, 1.0, "1 : 1"),
+        (SLIDER, "A3", 1.0, "1 : 1"),
+        ("units: {length: m}\n" + SLIDER, None, 1 / 1000, "1 : 1000"),
+        ("units: {length: cm}\n" + SLIDER, None, 0.1, "1 : 10"),
+    ):
+        view = View(mechdesign.load(text=text), paper=paper)
+        scene = pose(view.mechanism, view.pose)
+        sheet = Sheet.of(view, scene, 40.0)
+        assert (sheet.scale, sheet.words) == (pytest.approx(scale), words)
+        with style.context():
+            figure = sheet.draw(view, scene, [])
+        axes = figure.axes[1]
+        wide, _ = PAPERS[sheet.paper]
+        drawn = axes.get_position().width * wide / np.ptp(axes.get_xlim())
+        assert drawn == pytest.approx(scale * view.millimetres)
+        assert sheet.region[1] >= 10 + (sum(BLOCK) if sheet.paper == "A4" else 0)
+
+
+def test_a_sheet_is_the_same_bytes_and_has_the_size_of_its_paper():
+    view = View(mechdesign.load(text=SLIDER))
+    data = export_named("sheet.pdf").make(view).data
+    assert data == export_named("sheet.pdf").make(View(mechdesign.load(text=SLIDER))).data
+    assert data.startswith(b"%PDF")
+    assert b"mechdesign" in data
+    box = data.split(b"/MediaBox [")[1].split(b"]")[0].split()
+    assert [float(side) * 25.4 / 72 for side in box[2:]] == pytest.approx([210, 297], abs=0.01)
+    with pytest.raises(StudyError, match="--paper is A4 or A3, not 'A5'"):
+        export_named("sheet.pdf").make(View(mechdesign.load(text=SLIDER), paper="A5"))
