@@ -36,7 +36,8 @@ def convert(
     text : str
         The text of such a file, or an address, in place of `source`.
     drives : sequence of str
-        What is driven, in place of the file's inputs: pins of the ground, links or slides, by their names in the file.
+        What is driven, in place of the file's inputs: pins of two links (the ground is one), links or slides, by their
+        names in the file.
     unit : str
         Unit of length in place of the file's; numbers stay as they are.
     scale : float
