@@ -90,7 +90,11 @@ def _scale(sketch: Sketch, factor: float) -> None:
     sketch.points = {name: factor * place for name, place in sketch.points.items()}
     for link in sketch.links.values():
         link.center = None if link.center is None else factor * link.center
+        link.inertia = None if link.inertia is None else factor**2 * link.inertia
     sketch.forces = [replace(force, place=factor * force.place) for force in sketch.forces]
+    sketch.gears = [
+        replace(gears, radius=None if gears.radius is None else factor * gears.radius) for gears in sketch.gears
+    ]
     for index, drive in enumerate(sketch.drives):
         if drive.kind != "angle":
             span = None if drive.span is None else (factor * drive.span[0], factor * drive.span[1])

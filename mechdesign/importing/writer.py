@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from mechdesign.errors import StudyError, cut, printable
 from mechdesign.importing.draft import Draft, Span
-from mechdesign.importing.sketch import GROUND, Drive, Gears, Slide
+from mechdesign.importing.sketch import GROUND, Drive, Gears, Link, Slide
 
 _WIDTH = 116
 # Steps of a sweep, least instants of a motion in time, and instants for each turn of a drive.
@@ -84,9 +84,7 @@ class Writer:
     def _mass(self, body: str) -> dict[str, Flow]:
         """Mass, centre and moment of inertia of a body's links together; inertias count about the common centre."""
         links = [self._sketch.links[name] for name in self._draft.bodies.links(body)]
-        heavy = [
-            (link.mass, link.center, link.inertia or 0.0) for link in links if link.mass and link.center is not None
-        ]
+        heavy = [(link.mass, self._center(link), link.inertia or 0.0) for link in links if link.mass]
         mass = sum(m for m, _, _ in heavy)
         if not mass:
             return {}
@@ -97,6 +95,11 @@ class Writer:
         elif heavy[0][2]:
             entries["inertia"] = f"{digits(heavy[0][2])} {self._sketch.inertia_unit}"
         return entries
+
+    def _center(self, link: Link) -> complex:
+        """Centre of mass of a link; where the file gives none, the middle of its points."""
+        places = [self._sketch.points[point] for point in link.points]
+        return link.center if link.center is not None else sum(places) / len(places)
 
     def _slide(self, slide: Slide) -> dict[str, Flow]:
         draft, guide = self._draft, self._draft.bodies.of(slide.guide)
