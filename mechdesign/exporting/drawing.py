@@ -11,9 +11,6 @@ from typing import Self
 
 from mechdesign.mechanism.plates import hull
 
-# A corner of an outline that stands out by less is rounding.
-FLAT = 1e-12
-
 
 @dataclass(frozen=True)
 class Layer:
@@ -29,6 +26,7 @@ LAYERS = {
     layer.name: layer
     for layer in (
         Layer("cut", "what is cut through", 1, "#ff0000"),
+        Layer("pocket", "both sides of a groove, which is milled to a depth", 4, "#00a0a0"),
         Layer("drill", "centres of holes", 3, "#00a000"),
         Layer("engrave", "names and marks", 5, "#0000ff"),
         Layer("links", "links of the mechanism in a pose", 7, "#000000"),
@@ -56,6 +54,10 @@ class Path:
         """Straight lines from place to place."""
         places = tuple(corners)
         return cls(layer, places, (0.0,) * len(places), closed=False)
+
+    def close(self) -> Path:
+        """The same with a line from the last place to the first."""
+        return replace(self, closed=True)
 
     @property
     def ends(self) -> Iterator[complex]:
@@ -194,7 +196,7 @@ def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], 
 
 def around(layer: str, places: Iterable[complex], radius: float) -> Path | Circle:
     """The outline at a distance around the convex hull of some places: lines, and arcs about its corners."""
-    corners = hull(places, FLAT)
+    corners = hull(places)
     if len(corners) == 1:
         return Circle(layer, corners[0], radius)
     sides = [b - a for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]

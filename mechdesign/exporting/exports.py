@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -57,15 +57,19 @@ def export(
     return lambda make: Export(name, meaning, order, mark, make)
 
 
-def drawings(name: str, meaning: str, order: int, make: Callable[[View], Drawing]) -> tuple[Export, Export]:
-    """The exports of a drawing: as DXF, and behind it as SVG."""
-    dxf, svg = (
-        export(f"{name}.{ending}", f"{meaning}, as {ending.upper()}", order + k)(
-            lambda view, text=text: Content(text(make(view)), view.assumed + view.unmoved)  # type: ignore[misc]
-        )
-        for k, (ending, text) in enumerate((("dxf", to_dxf), ("svg", to_svg)))
+def drawings(
+    name: str, meaning: str, order: int, make: Callable[[View], Drawing],
+    cautions: Callable[[View], tuple[Caution, ...]] = lambda _: (),
+) -> tuple[Export, Export]:  # fmt: skip
+    """The exports of a drawing: as DXF, and behind it as SVG; `cautions` are warnings of its own."""
+
+    def written(to_text: Callable[[Drawing], str], view: View) -> Content:
+        return Content(to_text(make(view)), view.assumed + view.unmoved + cautions(view))
+
+    return (
+        export(f"{name}.dxf", f"{meaning}, as DXF", order)(partial(written, to_dxf)),
+        export(f"{name}.svg", f"{meaning}, as SVG", order + 1)(partial(written, to_svg)),
     )
-    return dxf, svg
 
 
 @cache

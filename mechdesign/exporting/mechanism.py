@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from mechdesign.exporting.discs import discs_of, followers, open_profiles, replace_plate
 from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around, roomiest
 from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
@@ -24,7 +27,11 @@ def mechanism_drawing(view: View) -> Drawing:
     for link in description.links:
         outline = [scale * place for place in view.in_world(link, view.outline(link))]
         radius = scale * float(sizes.radius(link))
-        shapes: list[Shape] = [around("links", outline, radius)]
+        discs, place = discs_of(view, link, 0.0), scale * view.in_world(link, [0j])[0]
+        profiles = [curve for disc in discs for curve in disc.curves] + open_profiles(view, link)
+        holes = [(scale * view.points(link)[p], scale * float(sizes.pin(p))) for p in pinned if p in view.points(link)]
+        shapes: list[Shape] = [] if replace_plate(discs, holes) else [around("links", outline, radius)]
+        shapes += [replace(curve, layer="links").moved(place, complex(view.pose.rotation(link))) for curve in profiles]
         for slot in view.slots:
             if slot.link == link:
                 ends = [scale * place for place in view.in_world(link, slot.ends)]
@@ -33,6 +40,7 @@ def mechanism_drawing(view: View) -> Drawing:
         middle, _ = roomiest(outline, pins, radius)
         shapes.append(Text("notes", middle, min(0.6 * radius, letters), link, centred=True))
         groups[link] = shapes
+    groups |= followers(view)
     for point in pinned:
         place = scale * complex(view.pose.point(point))
         groups[f"pin {point}"] = [

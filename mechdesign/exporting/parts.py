@@ -8,7 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.exporting.drawing import FLAT, Circle, Drawing, Mark, Shape, Text, around, box, roomiest
+from mechdesign.exporting.discs import DEVIATION, Disc, cautions, discs_of, open_profiles, replace_plate
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, roomiest
 from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import rod_of
@@ -33,7 +34,8 @@ class Hole:
 class Part:
     """A part in a frame of its own, in millimetres: places that its outline goes around, and its holes.
 
-    `marks` are places without a hole, and `circles` the radii of pitch circles about its points.
+    `marks` are places without a hole, and `engraved` pitch circles and profiles. A cam has the outline of its `disc`
+    instead, with the kerf in it.
     """
 
     name: str
@@ -41,12 +43,13 @@ class Part:
     radius: float
     holes: Sequence[Hole]
     marks: dict[str, complex]
-    circles: Sequence[tuple[complex, float]] = ()
+    engraved: Sequence[Shape] = ()
+    disc: Disc | None = None
 
     @property
     def turn(self) -> complex:
         """The turn by which the part is least tall: one of its sides lies level."""
-        corners = hull(self.places, FLAT)
+        corners = hull(self.places)
         sides = [b - a for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True) if a != b]
         turns = [abs(side) / side for side in sides] or [1.0 + 0j]
         return min(turns, key=lambda turn: round(float(np.ptp([(turn * corner).imag for corner in corners])), 9))
@@ -54,19 +57,25 @@ class Part:
     def shapes(self, kerf: float) -> list[Shape]:
         """What is cut, drilled and engraved; the outline is larger and the holes are smaller by half of the kerf."""
         turn = self.turn
-        cut: list[Shape] = [around("cut", self.places, self.radius + kerf / 2)]
+        outline = [around("cut", self.places, self.radius + kerf / 2)]
+        cut: list[Shape] = [*outline] if self.disc is None else [*self.disc.curves]
         cut += [around("cut", hole.ends, max(hole.radius - kerf / 2, 0.0)) for hole in self.holes]
         drilled = [Mark("drill", hole.ends[0]) for hole in self.holes if len(hole.ends) == 1]
         marked = [Mark("engrave", place) for place in self.marks.values()]
-        circles = [Circle("engrave", center, radius) for center, radius in self.circles]
-        turned = [shape.moved(0j, turn) for shape in (*cut, *drilled, *marked, *circles)]
+        turned = [shape.moved(0j, turn) for shape in (*cut, *drilled, *marked, *self.engraved)]
         return [*turned, *self._name(turn)]
 
     def _name(self, turn: complex) -> list[Text]:
         """Its name, where most room is between the holes."""
         holes = [(turn * end, hole.radius) for hole in self.holes for end in _along(hole.ends)]
+        if self.disc is not None:
+            sides = [(a, b) for curve in self.disc.curves for a, b, _ in curve.pieces()]
+            ends = [end for a, b in sides for end in (_along((a, b)) if abs(b - a) > self.radius / 2 else [a])]
+            holes += [(turn * end, 0.0) for end in ends]
         place, room = roomiest([turn * place for place in self.places], holes, self.radius)
         share, least, most = ENGRAVED
+        if self.disc is not None and not self.disc.holds(place / turn, 0.0):
+            return []
         height = min(2 * share * self.radius, most, 1.6 * room / (0.65 * max(len(self.name), 1)))
         return [Text("engrave", place, height, self.name, centred=True)] if height >= least else []
 
@@ -77,7 +86,10 @@ def _along(ends: tuple[complex, ...]) -> list[complex]:
 
 
 def parts_of(view: View) -> list[Part]:
-    """Every link as a part, the ground too; of a telescopic link its body, and its rod."""
+    """Every link as a part, the ground too; of a telescopic link its body, and its rod.
+
+    A cam in which all holes of its link lie is the link, others are parts of their own.
+    """
     scale, sizes, pins = view.millimetres, view.sizes, joined(view.mechanism.description)
     parts = []
     for name, link in view.mechanism.description.links.items():
@@ -92,21 +104,38 @@ def parts_of(view: View) -> list[Part]:
                 holes.append(Hole(slot.point, ends, scale * float(sizes.pin(slot.point))))
         marks = {point: place for point, place in points.items() if point not in pins}
         places = [scale * place for place in view.outline(name)]
-        parts.append(Part(name, places, radius, holes, marks, _pitch_circles(view, name)))
+        engraved: list[Shape] = [*_pitch_circles(view, name), *open_profiles(view, name)]
+        plate = Part(name, places, radius, holes, marks, engraved)
+        discs = discs_of(view, name, scale * float(sizes.kerf))
+        whole = replace_plate(discs, [(end, hole.radius) for hole in holes for end in hole.ends])
+        parts += [] if whole else [plate]
+        for disc in discs:
+            title = name if whole and len(discs) == 1 else f"{name} {disc.coupling}"
+            parts.append(_cam_part(title, plate, disc))
         if link.telescopic and link.ends:
             tip = Hole(link.ends[1], (0j,), scale * float(sizes.pin(link.ends[1])))
             parts.append(Part(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
     return parts
 
 
-def _pitch_circles(view: View, link: str) -> list[tuple[complex, float]]:
-    """Centres and radii of the pitch circles of a link's wheels, in its frame."""
+def _cam_part(name: str, plate: Part, disc: Disc) -> Part:
+    """A cam of a link, with those of its holes and marks that lie in it."""
+    holes = [hole for hole in plate.holes if all(disc.holds(end, hole.radius) for end in hole.ends)]
+    marks = {point: place for point, place in plate.marks.items() if disc.holds(place, 0.0)}
+    profile = disc.curves[-1].corners
+    places = [*(end for hole in holes for end in hole.ends), *profile[:: max(len(profile) // 12, 1)]]
+    return Part(name, places, plate.radius, holes, marks, disc=disc)
+
+
+def _pitch_circles(view: View, link: str) -> list[Circle]:
+    """The pitch circles of a link's wheels, in its frame."""
     mechanism, circles = view.mechanism, []
     for mesh in mechanism.meshes:
         for k, radius in enumerate(mesh.radii(view.pose)):
             size, point = float(radius), mechanism.graph.nodes[mesh.axes[k]]
             if mesh.links[k] == link and size > 0 and point in view.points(link):
-                circles.append((view.millimetres * view.points(link)[point], round(view.millimetres * size, 9)))
+                center = view.millimetres * view.points(link)[point]
+                circles.append(Circle("engrave", center, round(view.millimetres * size, 9)))
     return [*dict.fromkeys(circles)]
 
 
@@ -149,7 +178,8 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
         slots = [f"slot of {hole.point} {abs(hole.ends[1] - hole.ends[0]):.6g} mm long between centres"
                  for hole in part.holes if len(hole.ends) > 1]  # fmt: skip
         holes = [f"hole {hole.point} {2 * hole.radius:.6g} mm" for hole in part.holes if len(hole.ends) == 1]
-        lines.append(f"{part.name}: {', '.join([*apart, *holes, *slots])}")
+        shaped = [] if part.disc is None else [f"profile of cam {part.disc.coupling}, within {DEVIATION:g} mm"]
+        lines.append(f"{part.name}: {', '.join([*apart, *holes, *slots, *shaped])}")
     if study.reliability is not None:
         for name, dimension in study.reliability.dimensions.items():
             low, high = dimension.ends(study.sizes.get(name, 0.0))
@@ -160,4 +190,4 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
     return lines
 
 
-parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing)
+parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing, cautions)

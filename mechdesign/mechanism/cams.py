@@ -33,10 +33,12 @@ from mechdesign.mechanism.graph import Turn, turns_of
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.wheels import Pressed
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
 UNMOVED = 1e-9
+# A profile is not divided more finely than into so many parts.
+MOST_PARTS = 100_000
 # The ends of a profile that closes meet within this part of its size.
 CLOSED = 1e-6
 
@@ -105,6 +107,16 @@ class Cam:
     plan: Plan
 
     @property
+    def nodes(self) -> tuple[int, int]:
+        """Nodes of the roller's centre, or of a point of the flat face, and of a point of the cam."""
+        return self.node, self.base
+
+    @property
+    def presses(self) -> bool:
+        """The contact force is known."""
+        return True
+
+    @property
     def flat(self) -> bool:
         """Whether its follower has a flat face."""
         return self.given.radius is None
@@ -150,14 +162,43 @@ class Cam:
     @cached_property
     def outlines(self) -> list[Complexes]:
         """The profile in the cam's frame, of each of its sides."""
-        touches = (self.touch(self._whole, side) for side in self.sides)
-        return [np.asarray(self.local(self._whole, touch.place)) for touch in touches]
+        return [self._outline(self._whole, side, 0.0) for side in self.sides]
+
+    def _outline(self, configuration: Configuration, side: str, away: float) -> Complexes:
+        touch = self.touch(configuration, side)
+        return np.asarray(self.local(configuration, touch.place + away * touch.normal))
+
+    @quiet
+    def cut(self, side: str, away: float, deviation: float) -> Complexes:
+        """The curve at a distance out of the cam along the normals of one of its sides, in the cam's frame.
+
+        Lines from place to place lie beside it by less than `deviation`.
+        """
+        parts = 2 * self.given.steps
+        while True:
+            outline = self._outline(self.along(np.linspace(*self.given.span, parts + 1)), side, away)
+            chord, arm = outline[2::2] - outline[:-2:2], outline[1::2] - outline[:-2:2]
+            beside = np.abs(cross(chord, arm)) / np.abs(chord)
+            if not np.any(beside > deviation) or parts > MOST_PARTS:
+                return outline
+            parts *= 2
 
     @property
     def closed(self) -> bool:
         """Whether the profile ends where it begins."""
         outline = self.outlines[0]
         return bool(abs(outline[-1] - outline[0]) <= CLOSED * (np.ptp(outline.real) + np.ptp(outline.imag)))
+
+    @quiet
+    def undercuts(self, radius: Value, roller: Value) -> Flags:
+        """Where a profile of some radius of curvature loses what the roller, or a flat face, has touched before."""
+        return np.asarray((np.asarray(radius) <= 0) & (self.flat | np.asarray(radius > -roller)))
+
+    @property
+    def undercut(self) -> bool:
+        """Whether its profile is undercut anywhere, at the nominal dimensions."""
+        radii = (self.touch(self._whole, side).radius for side in self.sides)
+        return any(self.undercuts(radius, self.roller(self._whole)).any() for radius in radii)
 
     @cached_property
     def face(self) -> tuple[float, float]:
@@ -234,6 +275,11 @@ class Cam:
     def place(self, configuration: Configuration) -> Vector:
         """Where the follower touches the cam."""
         return self.touch(configuration).place
+
+    @quiet
+    def lever(self, configuration: Configuration) -> Value:
+        """How fast the follower moves along the normal for each unit of its coordinate."""
+        return self.touch(configuration).lever
 
     @quiet
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:

@@ -197,7 +197,7 @@ def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
     return np.where(lost, np.nan, np.where(np.isneginf(largest), 0.0, largest))
 
 
-def hull(places: Iterable[complex], flat: float = 1e-3) -> list[complex]:
+def hull(places: Iterable[complex], flat: float = 1e-12) -> list[complex]:
     """Corners of the convex hull, counter-clockwise; two where all lie on one line.
 
     A corner that stands out by less than `flat`, in squares of the size, counts as a place on a side.

@@ -230,7 +230,7 @@ class Joints:
             if isinstance(joint, Fixed):
                 one, other = joint.links
                 self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
-        touching = [Contact(pair.coupling, *pair.links, pair.node, (), engaged=pair) for pair in engaged]
+        touching = [Contact(pair.coupling, *pair.links, pair.nodes[0], (), engaged=pair) for pair in engaged]
         self.contacts = (*self._slides(), *self._pins(), *touching)
         self.order, self.open = self._tie_order()
 

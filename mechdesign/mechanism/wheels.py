@@ -57,11 +57,18 @@ class Engagement(Protocol):
         """The link that follows, then what moves it."""
 
     @property
-    def node(self) -> int:
-        """A node of the link that follows."""
+    def nodes(self) -> tuple[int, int]:
+        """Nodes of both, at which they hold their wheels, or the roller or face and the cam."""
+
+    @property
+    def presses(self) -> bool:
+        """Whether the forces between its links are known."""
 
     def place(self, configuration: Configuration) -> Vector:
         """Where they touch."""
+
+    def lever(self, configuration: Configuration) -> Value:
+        """How fast they move along the pitch circles, the belt or the normal for each unit of what follows."""
 
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
         """The force of an effort on the coordinate that follows.
@@ -109,9 +116,9 @@ class Mesh:
     radius: float
 
     @property
-    def node(self) -> int:
-        """Axis of the wheel that follows, or a point of a rack."""
-        return self.axes[0]
+    def nodes(self) -> tuple[int, int]:
+        """Axes of both wheels; of a rack a point of it."""
+        return self.axes
 
     @property
     def presses(self) -> bool:
@@ -159,6 +166,10 @@ class Mesh:
         """Where the pitch circles touch."""
         return self.contact(configuration)[0]
 
+    def lever(self, configuration: Configuration) -> Value:
+        """Radius of the wheel that follows; see `Engagement`."""
+        return 1 / self.weight(configuration) if self.slide >= 0 else self.radii(configuration)[0]
+
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
         """The force of an effort on the link that follows; see `Engagement`.
 
@@ -167,13 +178,13 @@ class Mesh:
         """
         apart: Value = 1.0 if pressed is None else np.sign(effort * pressed)
         driving = effort if pressed is None else pressed
-        radius = self.radii(configuration)[0]
+        tangential = effort / self.lever(configuration)
         if self.belt:
             # Its tight part pulls.
             place, _, along = self.strand(configuration, np.where(driving > 0, -1.0, 1.0))
-            return Pressed(place, along * (apart * np.abs(effort / radius)))
+            return Pressed(place, along * (apart * np.abs(tangential)))
         place, along = self.contact(configuration)
-        force = along * (effort * self.weight(configuration) if self.slide >= 0 else effort / radius)
+        force = along * tangential
         inside = np.logical_and(self.slide < 0, self.ratio(configuration) > 1)
         outwards = dot(1j * along, place - configuration.nodes[self.axes[1]]) > 0
         away = 1j * along * np.where(outwards != inside, 1.0, -1.0)

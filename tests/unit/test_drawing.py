@@ -8,12 +8,11 @@ from matplotlib.patches import PathPatch
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.mechanism.plates import hull
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import Label, paper, place_labels, positions
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.scene import pose
+from mechdesign.report.figures.scene import hull, pose
 from mechdesign.report.figures.shapes import BAR, Line, Symbol, link_colors, mechanism_shapes
 from mechdesign.results import Result
 

@@ -148,6 +148,65 @@ def test_the_mechanism_is_drawn_at_a_pose_with_the_paths_of_its_points():
     assert min(abs(place - complex(pose["P.x"], pose["P.y"])) for curve in path for place in curve) < 0.2
 
 
+CAM = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [0, 90]}
+    disc: [O, N, 20]
+    stem: {F: [0, 0], T: [60, 0]}
+  joints: {valve: {prismatic: [ground, stem], through: G, direction: 90, point: F}}
+  drives: {cam: {angle: disc}}
+  couplings: {lift: {set: valve, to: -50 - 10*cos(cam), cam: {link: disc, %s}}}
+  sketch: {N: [20, 0], F: [0, 30], T: [0, 90]}
+  plates: {width: 14, pin: 6, kerf: 0.2}
+kinematics: {sweep: {cam: {from: 0, to: 360, step: 10}}, outputs: [T]}
+"""
+
+
+def test_a_cam_is_cut_along_its_profile_and_half_of_the_kerf():
+    """Under a flat face in harmonic motion it is a circle of 40 mm, 10 mm beside its shaft."""
+    found = entities(exported(CAM % "flat: F, direction: 90", "parts.dxf"))
+    (outline,) = (e for e in found if e[8] == "cut" and len(e.get("vertices", ())) > 100)
+    corners = [at(vertex) for vertex in outline["vertices"]]
+    middle = sum(corners) / len(corners)
+    sizes = [abs(a - b) / 2 for a, b in zip(corners, corners[len(corners) // 2 :], strict=False)]
+    assert sizes == pytest.approx([40.1] * len(sizes), abs=1e-9)
+    assert abs(area(outline)) == pytest.approx(math.pi * 40.1**2, abs=0.01 * 2 * math.pi * 40)
+    (shaft,) = (at(e) for e in found if e["kind"] == "CIRCLE" and abs(at(e) - middle) < 11)
+    assert abs(shaft - middle) == pytest.approx(10, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("roller", "names", "layer", "number"),
+    [
+        ("side: groove", {"ground", "disc", "stem"}, "pocket", 2),
+        ("side: inner", {"ground", "disc", "disc lift", "stem"}, "cut", 1),
+        ("range: [0, 90]", {"ground", "disc", "stem"}, "cut", 1),
+    ],
+)
+def test_a_roller_runs_along_what_is_cut_or_milled(roller, names, layer, number):
+    """In the drawing of the mechanism the profile touches the roller; a ring is a part beside the plate of its link."""
+    study = CAM % f"roller: F, radius: 8, {roller}"
+    labels = {e[1] for e in entities(exported(study, "parts.dxf")) if e["kind"] == "TEXT" and e[8] == "notes"}
+    assert labels >= names
+    assert ("disc lift" in labels) == ("disc lift" in names)
+    milled = [e for e in entities(exported(study, "parts.dxf")) if len(e.get("vertices", ())) > 200 and e[8] == layer]
+    assert len(milled) >= number
+    found = entities(exported(study, "mechanism.dxf", at="cam=70"))
+    (center,) = {at(e) for e in found if e["kind"] == "CIRCLE" and e[40] == 8}
+    profiles = [e["vertices"] for e in found if len(e.get("vertices", ())) > 200]
+    apart = [min(abs(at(vertex) - center) for vertex in profile) for profile in profiles]
+    assert sum(distance == pytest.approx(8, abs=0.02) for distance in apart) == number
+
+
+def test_a_profile_that_bounds_no_part_is_engraved():
+    content = export_named("parts.dxf").make(view(CAM % "roller: F, radius: 8, side: groove, range: [0, 90]"))
+    assert "its profile bounds no part: it is engraved on 'disc', and not cut" in str(content.warnings)
+    text = (CAM % "roller: F, radius: 20").replace("10*cos(cam)", "4*cos(4*cam)")
+    undercut = export_named("parts.dxf").make(view(text))
+    assert "its profile is undercut" in str(undercut.warnings)
+
+
 def test_dxf_passes_the_audit_of_ezdxf():
     ezdxf = pytest.importorskip("ezdxf")
     for name, text in itertools.product(("parts.dxf", "mechanism.dxf"), (FOUR_BAR, QUICK_RETURN)):

@@ -115,6 +115,32 @@ def test_a_cam_reflects_the_stiffness_of_its_motor_by_its_slope() -> None:
     assert ask_stiffness(text).main["k_x"] == pytest.approx(1 / (slope**2 / 1e5 + 1 / 4e3), rel=1e-12)
 
 
+# An offset follower with a roller on a cam, whose shaft gives.
+VALVE = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [6, 0]}
+    disc: [O, N, 20]
+    stem: {F: [0, 0], T: [60, 0]}
+  joints: {valve: {prismatic: [ground, stem], through: G, direction: 90, point: F}}
+  drives: {cam: {angle: disc}}
+  couplings: {lift: {set: valve, to: 40 - 10*cos(cam), cam: {link: disc, roller: F, radius: 8}}}
+  sketch: {N: [20, 0], F: [6, 30], T: [6, 90]}
+"""
+
+
+def test_a_cam_gives_along_its_normal_and_loads_its_shaft() -> None:
+    """A push F on the follower is F/cos(phi) on the cam and its shaft, tan(phi) = (s' - e)/s, and F s' on the motor."""
+    text = VALVE + (
+        "stiffness: {at: T, actuators: {cam: 100 N*m/rad}, couplings: {lift: 4e3 N/mm}, bearings: {O: 5e3 N/mm},"
+        " poses: [{cam: 50}]}\n"
+    )
+    slope, s = 10 * np.sin(np.radians(50)), 40 - 10 * np.cos(np.radians(50))
+    steep = 1 + ((slope - 6) / s) ** 2
+    found = matrix(ask_stiffness(text), "C")
+    assert found == pytest.approx(np.diag([0, slope**2 / 1e5 + steep * (1 / 4e3 + 1 / 5e3)]), rel=1e-12, abs=1e-16)
+
+
 FIVE_BAR = """
 mechanism:
   parameters: {p: 0}
@@ -195,6 +221,38 @@ stiffness:
 )
 
 
+# An arm that bends, with a roller on a cam whose shaft gives.
+ROCKED = """
+mechanism:
+  links:
+    ground: {O: [0, 0], P: [-60, 40]}
+    disc: [O, N, 20]
+    arm: {from: P, to: H, length: 100, points: {F: [60, -10]}}
+  drives: {cam: {angle: disc}}
+  couplings: {lift: {set: arm, to: 8 - 12*cos(cam), cam: {link: disc, roller: F, radius: 8}}}
+  sketch: {N: [20, 0], H: [40, 35]}
+stiffness:
+  at: H
+  sections: {bar: {E: 2e5, width: 10, height: 15}}
+  elastic: {arm: bar}
+  bearings: {O: 1e4 N/mm, P: 3e4 N/mm}
+  actuators: {cam: 200 N*m/rad}
+  couplings: {lift: 5e3 N/mm}
+  loads: [[0, -50], [0, 50]]
+  poses: [{cam: 70}, {cam: 200}]
+"""
+
+
+def rolling(pose: Configuration, _: int) -> Teeth:
+    """The cam of ROCKED presses square to the motion of the roller against it."""
+    turn = np.angle(np.ravel(pose.rotation("disc"))[0])
+    arm = (60 - 10j) * np.exp(1j * np.radians(8 - 12 * np.cos(turn)))
+    roller = -60 + 40j + arm
+    normal = -1j * (1j * arm * np.radians(12) * np.sin(turn) - 1j * roller)
+    normal *= np.sign((normal * np.conj(roller)).real) / abs(normal)
+    return Teeth((("arm", "F"), ("disc", "O")), ((complex(roller - 8 * normal), complex(normal)),))
+
+
 def meshing(pressure: float) -> Callable[[Configuration, int], Teeth]:
     """The mesh of GEARED: wheel two, of 100/3 mm, touches wheel one at x = 200/3."""
 
@@ -224,8 +282,9 @@ def belt(pose: Configuration, side: int) -> Teeth:
         (GEARED % 0.0, "gears", meshing(0.0), False),
         (GEARED % 20.0, "gears", meshing(20.0), True),
         (STRAPPED, "elbow", belt, True),
+        (ROCKED, "lift", rolling, False),
     ],
-    ids=["teeth along", "teeth", "belt"],
+    ids=["teeth along", "teeth", "belt", "cam"],
 )
 def test_wheels_on_links_and_pins_that_give_are_those_of_finite_elements(
     text: str, coupling: str, of_side: Callable[[Configuration, int], Teeth], odd: bool
@@ -272,11 +331,12 @@ mechanism:
         (RACK.partition("stiffness:")[0], "[{pinion: 40}]", "[{at: R, force: [%s, 5]}]"),
         (PULLED, "[{arm: 15, motor: 40}]", "[{at: P, force: [3, %s]}]"),
         (RINGED, "[{arm: 10}, {arm: 60}]", "[{link: sun, moment: %s}]"),
+        (VALVE, "[{cam: 50}, {cam: 200}]", "[{at: T, force: [3, %s]}]"),
     ],
 )
 @pytest.mark.parametrize("push", [40.0, -40.0])
 def test_rigid_links_and_teeth_bear_what_dynamics_says(mechanism: str, poses: str, loads: str, push: float) -> None:
-    at = next(point for point in ("B", "R", "P") if f"{point}: [" in mechanism)
+    at = next(point for point in ("B", "R", "P", "T") if f"{point}: [" in mechanism)
     section = f"{{poses: {poses}, loads: {loads % push}}}\n"
     study = study_of(f"{mechanism}stiffness: {{at: {at}, dynamics: true}}\ndynamics: {section}")
     ours, theirs = mechdesign.stiffness(study).tables["forces"], mechdesign.dynamics(study).tables["joint_forces"]

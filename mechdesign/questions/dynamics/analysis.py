@@ -14,11 +14,11 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
-from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
@@ -31,7 +31,7 @@ from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, pose_in_words, study_poses
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
@@ -44,8 +44,6 @@ A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
 TABLES = (*A_ROW_A_POSE, "extremes")
 # Before the name of a cam: the poses in which its follower lifts off.
 _LIFTED = "lifted off "
-# Part of the forces by which a contact force is rounding.
-PRESSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,18 +108,9 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
         marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
         unknown &= ~friction.jammed(motion.arrays)
     singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
-    return {"singular": singular, "undefined": undefined, **marks, **_lifted(motion)}
-
-
-def _lifted(motion: Motion) -> dict[str, Flags]:
-    """By cam, the poses in which its follower would have to be pulled; a groove pulls it."""
-    question, lifted = question_of(motion), dict[str, Flags]()
-    for name, contact in zip(question.forces, question.joints.contacts, strict=True):
-        cam = contact.engaged
-        if isinstance(cam, Cam) and cam.given.side != "groove":
-            pulled = motion.arrays[f"{name}.normal"] < -PRESSED * question.size
-            lifted[f"{_LIFTED}{cam.coupling}"] = motion.valid & pulled
-    return lifted
+    return {"singular": singular, "undefined": undefined, **marks} | {
+        f"{_LIFTED}{coupling}": where for coupling, where in lift_off.lifted(motion)
+    }  # fmt: skip
 
 
 def tables(
@@ -185,12 +174,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     for name, mark in passage.marks[k].items():
         if name.startswith(_LIFTED) and mark.number:
-            first = pose_in_words(study, poses, mark.first + k * count)
-            message = (
-                f"cam {name.removeprefix(_LIFTED)}: the follower lifts off at {mark.number} of {count} poses, where it "
-                f"would have to be pulled; a spring holds it on the cam; the first: {first}"
-            )
-            warnings.append(Caution("cam", message, "joint_forces", mark.first, first))
+            warnings.append(lift_off.caution(study, poses, name.removeprefix(_LIFTED), mark, k))
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")

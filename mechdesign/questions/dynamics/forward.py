@@ -12,12 +12,14 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
+from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, EquationsOfMotion, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.outputs import expand_outputs
 from mechdesign.questions.poses import MAX_SHOWN_POSES, Shown, SolvedPoses, in_study_units
 from mechdesign.results import Column, Result, Scope, Table
@@ -56,6 +58,10 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
         warnings.append(
             Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward")
         )
+    for coupling, where in lift_off.lifted(motion):
+        if where.any():
+            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
+            warnings.append(lift_off.caution(study, motion.question.poses, coupling, mark))
     counts = {"instants": len(course.times), "steps": course.steps}
     return Result("dynamics", tables, warnings, counts), motion, shown
 

@@ -40,8 +40,7 @@ class Profile:
     @property
     def undercut(self) -> Flags:
         """Where the roller, or a flat face, cuts away what it has touched before."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray((self.radius <= 0) & (self.cam.flat | (self.radius > -self.roller)))
+        return self.cam.undercuts(self.radius, self.roller)
 
     def caution(self, study: Study, design: int, kind: str, where: Flags, text: str) -> Iterator[Caution]:
         """A warning where some places of a design's profile are concerned."""

@@ -1,9 +1,10 @@
 """Couplings of a network: the wrenches by which they act on its vertices, and how much they give.
 
 An effort on the gap of a coupling does the work of these wrenches on any displacement of the network [virtual work]. Of
-gears and a rack they are the forces between their teeth, of a belt the pulls of its strands; of others the moments,
-forces along slides and forces at points whose work is that of the effort. A wheel is a rigid disc on its link at its
-axis, a rack at its joint's point.
+gears and a rack they are the forces between their teeth, of a belt the pulls of its strands, of a cam the contact force
+along its normal; of others the moments, forces along slides and forces at points whose work is that of the effort. A
+wheel is a rigid disc on its link at its axis, a rack at its joint's point, a cam at the first point of its link, a
+roller or a flat face at its point.
 
 Which flank of the teeth, or strand of a belt, takes an effort depends on its sign. Those of a side 1 or -1 take it
 alone. A side 0 is their mean, which is linear: teeth that touch on both flanks, a belt whose pretension keeps both
@@ -39,7 +40,7 @@ class Efforts:
     acting : ndarray, shape (n, freedoms, couplings)
         What they put on each freedom, and on that of the coupling itself where it gives.
     teeth : complex ndarray, shape (n, couplings)
-        Force of teeth or of a belt on the link that follows; 0 without wheels.
+        Force of teeth, of a belt or of a cam on the link that follows; 0 of other couplings.
     """
 
     through: Floats
@@ -61,7 +62,7 @@ def efforts_on(
         side = np.zeros(configuration.shape) if sides is None else sides[:, case]
         wrenches = list(_wrenches(transmission, configuration, case, _unit(transmission, length), side))
         vertices += wrenches
-        if transmission.mesh is not None:
+        if transmission.engagement is not None:
             # Those on the link that follows come first of each pair.
             teeth[:, case] = sum(wrench.force for _, wrench in wrenches[::2])
     return borne(network, vertices, len(network.transmissions), origin), teeth
@@ -76,12 +77,9 @@ def compliance_of(
         return None
     soft: list[Value] = []
     if given.force is not None:
-        mesh = transmission.mesh
-        tangential: Value = 1.0
-        if mesh is not None:
-            racked = mesh.slide >= 0
-            tangential = mesh.weight(configuration) if racked else 1 / mesh.radii(configuration)[0]
-        soft.append(tangential**2 / given.force)
+        pair = transmission.engagement
+        lever: Value = 1.0 if pair is None else pair.lever(configuration)
+        soft.append((1 / lever) ** 2 / given.force)
     if given.moment is not None:
         soft.append(1 / given.moment)
     return sum(soft) * _unit(transmission, length) ** 2
@@ -96,13 +94,13 @@ def _wrenches(
     transmission: Transmission, configuration: Configuration, case: int, effort: Value, side: Floats
 ) -> Iterator[tuple[str, Wrench]]:
     """Wrenches on vertices by an effort on the gap of a coupling."""
-    mesh = transmission.mesh
-    if mesh is not None:
-        follower, wheel = transmission.seats[mesh.coupling]
+    pair = transmission.engagement
+    if pair is not None:
+        follower, driving = transmission.seats[pair.coupling]
         for way in (1.0, -1.0):
-            push = mesh.press(configuration, effort * (1 + way * side) / 2, way)
+            push = pair.press(configuration, effort * (1 + way * side) / 2, way)
             yield follower, Wrench(case, push.place, push.force)
-            yield wheel, Wrench(case, push.place, -1.0 * push.force)
+            yield driving, Wrench(case, push.place, -1.0 * push.force)
         return
     for part, share in shares(configuration, transmission.coupling.gap, effort):
         seats = transmission.seats[part.name]

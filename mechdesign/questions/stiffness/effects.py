@@ -21,7 +21,7 @@ class Effects:
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
         Force and moment about the joint's place, exerted on the first body by the second; joints as in `joints_of`, and
-        after them the teeth and belts of couplings, whose moment is 0.
+        after them the teeth, belts and cams of couplings, whose moment is 0.
     places : complex ndarray, shape (n, points)
         Places without a load of the points that `points_of` lists.
     moves : complex ndarray, shape (n, points, loads)
@@ -40,7 +40,7 @@ class Effects:
     def unknown(network: Network, poses: int, loads: int, size: int) -> Effects:
         """A record of effects to be filled, all nan."""
         nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
-        count = len(joints_of(network)) + sum(network.one_sided)
+        count = len(joints_of(network)) + sum(network.pressing)
         forces, moved = np.full((poses, count, loads, 3), np.nan), np.zeros((poses, loads, size))
         return Effects(forces, nowhere[:, :, 0].copy(), nowhere, moved)
 
@@ -78,7 +78,7 @@ def effects_of(
         moment = moments_about(configuration.point(network.edges[k].point) - origin, wrench)
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
     if couplings is not None:
-        teeth = (couplings.teeth[:, :, None] * (loaded.efforts @ applied))[:, network.one_sided]
+        teeth = (couplings.teeth[:, :, None] * (loaded.efforts @ applied))[:, network.pressing]
         effects.forces[:, len(joints) :] = np.stack([teeth.real, teeth.imag, np.zeros(teeth.shape)], axis=-1)
     for row, (_, point, vertex) in enumerate(points_of(network)):
         dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)

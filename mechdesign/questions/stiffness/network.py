@@ -18,12 +18,13 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, leaves
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.statics import PIN
-from mechdesign.mechanism.wheels import Mesh
+from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -64,15 +65,15 @@ class Transmission:
 
     Parameters
     ----------
-    mesh : Mesh or None
-        The wheels that press or pull each other; None of a coupling without wheels.
+    engagement : Engagement or None
+        The wheels that press or pull each other, or the cam and its follower; None of other couplings.
     seats : mapping of str to tuple of str
-        Vertices of the wheel that follows and of the other, by the coupling's name; or by each coordinate of the gap
-        those of both links of an angle, of a slider and its guide, or of points.
+        Vertices of the link that follows and of the one that moves it, by the coupling's name; or by each coordinate of
+        the gap those of both links of an angle, of a slider and its guide, or of points.
     """
 
     coupling: Coupled
-    mesh: Mesh | None
+    engagement: Engagement | None
     seats: Mapping[str, tuple[str, ...]]
 
 
@@ -279,16 +280,18 @@ class _Builder:
 
     def transmissions(self) -> tuple[Transmission, ...]:
         """The couplings, each with the vertices on which it acts."""
-        graph, wheels = self.mechanism.graph, {mesh.coupling: mesh for mesh in self.mechanism.meshes}
+        mechanism, graph = self.mechanism, self.mechanism.graph
+        pairs: list[Engagement] = [*mechanism.meshes, *mechanism.cams]
+        engagements = {pair.coupling: pair for pair in pairs}
         transmissions = []
-        for coupling in self.mechanism.couplings:
-            mesh = wheels.get(coupling.name)
-            if mesh is not None:
-                axes = zip(mesh.links, mesh.axes, strict=True)
-                seats = {coupling.name: tuple(self._on_link(link, graph.nodes[axis]) for link, axis in axes)}
+        for coupling in mechanism.couplings:
+            pair = engagements.get(coupling.name)
+            if pair is not None:
+                ends = zip(pair.links, pair.nodes, strict=True)
+                seats = {coupling.name: tuple(self._on_link(link, graph.nodes[node]) for link, node in ends)}
             else:
                 seats = {part.name: self._seats(part) for part in leaves(coupling.gap)}
-            transmissions.append(Transmission(coupling, mesh, seats))
+            transmissions.append(Transmission(coupling, pair, seats))
         return tuple(transmissions)
 
     def _seats(self, part: Coordinate) -> tuple[str, ...]:
@@ -388,10 +391,19 @@ class Network(Bodies):
     loops: tuple[EdgePath, ...]
 
     @cached_property
+    def pressing(self) -> list[bool]:
+        """Of each coupling whether the force between its links is known."""
+        pairs = [transmission.engagement for transmission in self.transmissions]
+        return [pair is not None and pair.presses for pair in pairs]
+
+    @cached_property
     def one_sided(self) -> list[bool]:
-        """Of each coupling whether the sign of its effort says which flanks of teeth press, or which strand pulls."""
-        meshes = [transmission.mesh for transmission in self.transmissions]
-        return [mesh is not None and mesh.presses for mesh in meshes]
+        """Of each coupling whether the sign of its effort says which flanks of teeth press, or which strand pulls.
+
+        A cam presses along its normal whatever the sign.
+        """
+        cams = [isinstance(transmission.engagement, Cam) for transmission in self.transmissions]
+        return [presses and not cam for presses, cam in zip(self.pressing, cams, strict=True)]
 
     @cached_property
     def edges_along_beams(self) -> tuple[tuple[int, ...], ...]:

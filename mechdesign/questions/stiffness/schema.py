@@ -113,8 +113,8 @@ class CouplingStiffness(fields.Model):
 
     bare, short = "force", (fields.NUMBER_FORM,)
     force: fields.PositiveNumber | None = None
-    """Force per displacement: of teeth along the pitch circles, of a belt or rack along it, of a slide or length that
-    follows a cam or a controller. Example: 2e4 N/mm
+    """Force per displacement: of teeth along the pitch circles, of a belt or rack along it, of a `cam` along the normal
+    of the contact, else of the slide or length that follows. Example: 2e4 N/mm
     """
     moment: fields.PositiveNumber | None = None
     """Moment per radian of the angle that follows. Example: 1e4 N*m/rad"""
@@ -298,9 +298,11 @@ class StiffnessSection(PoseSection):
             angle = checker.mechanism.coordinates.get(sets) == "angle"
             if given.force is not None:
                 checker.kind((*path, "force"), "stiffness")
-                wheels = compiled is None or any(m.coupling == name and m.presses for m in compiled.meshes)
-                if angle and not wheels:
-                    message = "it has no pitch circles, and a belt no radius: give {moment: stiffness per radian}"
+                touches = compiled is None or any(pair.coupling == name for pair in compiled.engaged)
+                if angle and not touches:
+                    message = (
+                        "it has no cam, no pitch circles, and a belt no radius: give {moment: stiffness per radian}"
+                    )
                     checker.report(path, message)
             if given.moment is not None:
                 checker.kind((*path, "moment"), "rotational_stiffness")

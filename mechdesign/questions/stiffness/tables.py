@@ -137,11 +137,11 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats, o
 
 
 def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
-    """``forces.csv``: what every joint bears, a row for each pose, load and joint, and of each for teeth or a belt."""
+    """``forces.csv``: what every joint bears, a row for each pose, load and joint, and for teeth, belts and cams."""
     edges = (network.edges[k] for k in joints_of(network))
-    meshes = (transmission.mesh for transmission in network.transmissions if transmission.mesh is not None)
+    engagements = (transmission.engagement for transmission in network.transmissions)
     pairs = [(edge.name, _link(edge.a), _link(edge.b)) for edge in edges]
-    pairs += [(mesh.coupling, *mesh.links) for mesh in meshes if mesh.presses]
+    pairs += [(pair.coupling, *pair.links) for pair in engagements if pair is not None and pair.presses]
     count, joints, loads, _ = effects.forces.shape
     fx, fy, mz = effects.forces.swapaxes(1, 2).reshape(-1, 3).T
     words = dict(zip(("joint", "on", "by"), zip(*pairs, strict=True), strict=True))

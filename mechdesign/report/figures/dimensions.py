@@ -15,7 +15,6 @@ from matplotlib.textpath import text_to_path
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.plates import hull
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
 from mechdesign.questions.stiffness.schema import Profile
@@ -23,7 +22,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, framed
 from mechdesign.report.figures.labels import covered, paper, place_labels
-from mechdesign.report.figures.scene import Scene, pose
+from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import link_colors, link_labels, point_labels
 from mechdesign.study import Study
 

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism import Mechanism, plates
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.configuration import Configuration
@@ -231,6 +231,11 @@ def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
             low, high = ranges.get(guide.joint, (math.inf, -math.inf))
             ranges[guide.joint] = min(low, guide.travel), max(high, guide.travel)
     return ranges
+
+
+def hull(places: Sequence[complex]) -> list[complex]:
+    """Corners of the convex hull, counter-clockwise, as pictures show it; two where the places lie on one line."""
+    return plates.hull(places, 1e-3)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,9 @@ from matplotlib.colors import to_rgb
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Spring
-from mechdesign.mechanism.plates import hull
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.scene import CamPair, Guide, Scene, Wheels, spring_points
+from mechdesign.report.figures.scene import CamPair, Guide, Scene, Wheels, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link

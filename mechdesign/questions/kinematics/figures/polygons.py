@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.plates import hull
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.figures.poses import KINDS, arrow, place_of, rates_of
 from mechdesign.questions.kinematics.figures.view import MotionView
@@ -20,6 +19,7 @@ from mechdesign.report.figures.framing import LEFT, fit
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import fitting, legend_at_left
 from mechdesign.report.figures.pictures import picture
+from mechdesign.report.figures.scene import hull
 from mechdesign.report.figures.shapes import link_colors
 
 MOST_POSES = 3

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.plates import hull
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
@@ -29,7 +28,7 @@ from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
 from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, pose
+from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import ARC, arc, force
 from mechdesign.study import Study
 

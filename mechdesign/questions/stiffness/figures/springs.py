@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.mechanism.plates import hull
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
@@ -23,7 +22,7 @@ from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import quantity
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, pose
+from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import point_labels
 from mechdesign.study import Poses, Study
 
