@@ -112,8 +112,8 @@ def parts_of(view: View) -> list[Part]:
         for disc in discs:
             title = name if whole and len(discs) == 1 else f"{name} {disc.coupling}"
             parts.append(_cam_part(title, plate, disc))
-        if link.telescopic and link.ends:
-            tip = Hole(link.ends[1], (0j,), scale * float(sizes.pin(link.ends[1])))
+        if link.tip is not None:
+            tip = Hole(link.tip, (0j,), scale * float(sizes.pin(link.tip)))
             parts.append(Part(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
     return parts
 
