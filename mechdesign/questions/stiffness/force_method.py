@@ -128,9 +128,9 @@ class Loaded:
     Parameters
     ----------
     stress : ndarray, shape (n, 3 loops and couplings, loads)
-        Scaled wrenches of the loops, and efforts of couplings, under each load.
+        Wrenches of the loops and efforts of couplings under scaled unit loads, and under the others.
     shift : ndarray, shape (n, freedoms, loads)
-        Displacements in all freedoms under each load.
+        Displacements in all freedoms under the same loads.
     rigid : ndarray, shape (n, 3 loops and couplings, as many), or None
         Projector onto the states of self-stress that store no energy; None where no pose has any.
     """
@@ -149,12 +149,17 @@ class Loaded:
     @cached_property
     def wrenches(self) -> Floats:
         """Wrench that each edge bears about the asked point, a column for each load, shape (n, edges, 3, loads)."""
+        size, scale = self.size, self.twists.scale
         _, onward = _ways(self.twists.network)
+        around = self._around(self.stress)
         # The load on the edges of its path to the ground, less the wrenches of the loops and couplings.
-        through = onward[:, None, None] * moved_to(self.twists.arm).swapaxes(1, 2)[:, None, :, : self.size]
-        if self.twists.elsewhere is not None:
-            through = np.concatenate([through, self.twists.elsewhere.through], axis=3)
-        return np.asarray(self._back @ (through - self._around(self.stress)))
+        through = onward[:, None, None] * np.eye(3)[:, :size] - around[..., :size]
+        unscaled = through / scale[:, None, :, None] * scale[:, None, None, :size]
+        units = np.asarray(self._back @ unscaled @ self._loads[:, None])
+        if self.twists.elsewhere is None:
+            return units
+        others = self.twists.elsewhere.through - around[..., size:] / scale[:, None, :, None]
+        return np.concatenate([units, self._back @ others], axis=3)
 
     @property
     def efforts(self) -> Floats:
@@ -162,41 +167,54 @@ class Loaded:
 
         A moment is divided by the length as which a radian counts.
         """
-        return self.stress[:, 3 * len(self.twists.network.loops) :]
+        size, (around, _) = self.size, _ways(self.twists.network)
+        efforts = self.stress[:, 3 * len(around) :]
+        units = (efforts[:, :, :size] * self.twists.scale[:, None, :size]) @ self._loads
+        return np.concatenate([units, efforts[:, :, size:]], axis=2)
 
     @cached_property
     def open_wrenches(self) -> Floats:
         """Wrenches of each edge about the asked point that nothing determines, shape (n, edges, 3, states)."""
         if self.rigid is None:
             return np.zeros((len(self.stress), len(self.twists.network.edges), 3, 0))
-        return np.asarray(self._back @ self._around(self.rigid))
+        return np.asarray(self._back @ (self._around(self.rigid) / self.twists.scale[:, None, :, None]))
 
     @cached_property
     def displacements(self) -> dict[str, Floats]:
         """Twist of each vertex about the asked point, a column for each load, shape (n, 3, loads)."""
-        twists = self.twists
-        to_point = moved_to(twists.arm) * twists.scale[:, None]
+        twists, size = self.twists, self.size
+        scale = twists.scale
+        to_point = moved_to(twists.arm) * scale[:, None]
+        shift = (self.shift[:, :, :size] * scale[:, None, :size]) @ self._loads
+        shift = np.concatenate([shift, self.shift[:, :, size:]], axis=2)
         twists_of_vertices = {}
         for vertex, path in twists.network.paths.items():
             signs = twists.network.signs(path) @ twists.within
             on = np.flatnonzero(signs.any(axis=0))
-            twists_of_vertices[vertex] = to_point @ ((signs[:, None, on] * twists.twist[:, :, on]) @ self.shift[:, on])
+            twists_of_vertices[vertex] = to_point @ ((signs[:, None, on] * twists.twist[:, :, on]) @ shift[:, on])
         return twists_of_vertices
 
     def _around(self, stress: Floats) -> Floats:
-        """What each edge takes of the wrenches of its loops and of couplings, shape (n, edges, 3, loads)."""
+        """What each edge takes of the scaled wrenches of its loops and of couplings, shape (n, edges, 3, loads)."""
         around, _ = _ways(self.twists.network)
         rows = 3 * len(around)
         of_loops = stress[:, :rows].reshape(len(stress), len(around), 3, stress.shape[2])
-        taken = np.asarray(np.einsum("le,nlis->neis", around, of_loops)) / self.twists.scale[:, None, :, None]
+        taken = np.asarray(np.einsum("le,nlis->neis", around, of_loops))
         if self.twists.couplings is not None:
-            taken -= self.twists.couplings.through @ stress[:, None, rows:]
+            through = self.twists.couplings.through * self.twists.scale[:, None, :, None]
+            taken -= through @ stress[:, None, rows:]
         return taken
 
     @property
     def _back(self) -> Floats:
         """What moves wrenches from the origin of the twists to the asked point, shape (n, 1, 3, 3)."""
         return moved_to(-self.twists.arm).swapaxes(1, 2)[:, None]
+
+    @property
+    def _loads(self) -> Floats:
+        """Unit loads at the asked point, moved to the origin of the twists, shape (n, size, size)."""
+        size = self.size
+        return moved_to(self.twists.arm).swapaxes(1, 2)[:, :size, :size]
 
 
 def twists_of(
@@ -321,10 +339,6 @@ def load(twists: Twists, size: int) -> Loaded:
         moves = rest > RANK * np.abs(others.acting).max(axis=1, initial=0.0)
         for part in (stress, shift):
             part[:, :, size:][np.broadcast_to(moves[:, None], part[:, :, size:].shape)] = np.nan
-    # Unit loads were scaled, and at the origin of the twists; now they are those at the asked point.
-    units = moved_to(twists.arm).swapaxes(1, 2)[:, :size, :size] * twists.scale[:, :size, None]
-    for part in (stress, shift):
-        part[:, :, :size] = part[:, :, :size] @ units
     return Loaded(held.seen_from(twists.arm), twists, stress, shift, rigid)
 
 
