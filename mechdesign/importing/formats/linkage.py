@@ -169,7 +169,7 @@ class _Reader:
             elif anchor:
                 sketch.omitted.append(f"that link {name!r} is fastened to a connector which is no anchor")
         for key, connector in self._connectors.items():
-            holder = self._names.get(connector.get("fastenlink") or connector.get("fasten", ""))
+            holder = self._names.get(connector.get("fastenlink", "") or connector.get("fasten", ""))
             if holder is not None and self._points[key] not in sketch.links[holder].points:
                 sketch.links[holder].points.append(self._points[key])
             if _is_true(connector, "input") and _is_true(connector, "anchor"):

@@ -203,8 +203,9 @@ def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[com
     for _, wrench in _applied(body, configuration).vertices if body.others else ():
         k = body.others[wrench.case]
         if k < len(body.given.loads):
-            fx, fy, mz = wrench.about(wrench.place)[:, 0].tolist()
-            forces.setdefault(k, []).append((complex(wrench.place[0]), complex(fx, fy), mz))
+            place = np.broadcast_to(np.asarray(wrench.place, dtype=complex), configuration.shape)
+            fx, fy, mz = wrench.about(place)[:, 0].tolist()
+            forces.setdefault(k, []).append((complex(place[0]), complex(fx, fy), mz))
     return forces
 
 
