@@ -549,8 +549,8 @@ class MechanismSection(fields.Model):
     {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
     """
     plates: Plates | None = None
-    """Links as plates: widths, pins and layers, for `mechdesign export` and ``kinematics.collisions``. Example: {width:
-    20 mm, thickness: 5 mm, pin: 6 mm, links: {coupler: {width: 12 mm, layer: 2}}}
+    """Links as plates: widths and pins, for `mechdesign export` and ``kinematics.collisions``. Example: {width: 20 mm,
+    thickness: 5 mm, pin: 6 mm}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
