@@ -110,7 +110,7 @@ def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Ca
             )
             yield from side.caution(study, design, "cam", steep, text)
         rows = np.rint((cam.corners - cam.values[0]) / np.diff(cam.values[:2])).astype(int)
-        corner = np.isin(np.arange(side.x.shape[1]), rows)
+        corner = np.isin(np.arange(cam.given.steps + 1), rows)
         values = ", ".join(f"{value:.6g}" for value in side.coordinates[cam.followed.name][design][corner][:MOST_NAMED])
         text = f"the profile is broken, as the law of the follower has a corner ({values})"
         yield from side.caution(study, design, "cam", corner, text)
