@@ -33,8 +33,10 @@ def is_long(study: Study, command: str) -> bool:
 
 
 def with_fewer_rows(result: Result) -> Collection[str]:
-    """Tables of which a look may have fewer rows than the full answer: designs, and what happens in time."""
-    return result.tables if result.command == "optimize" else ("events",)
+    """Tables of which a look may have fewer rows than the full answer: those of designs, and of a motion in time."""
+    if result.command == "optimize":
+        return result.tables
+    return result.tables.keys() - {"extremes"} if "forward" in result.tables else ()
 
 
 def look(study: Study, command: str) -> Result:
