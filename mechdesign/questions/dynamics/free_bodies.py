@@ -25,7 +25,8 @@ from mechdesign.study import Study
 class Acting:
     """A force (x + iy) at a place and a moment about it in n poses, on a link or on the pin of several ('').
 
-    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring`` or ``effort``, its `name` that of what acts.
+    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring``, ``effort`` or ``coupling``, its `name` that
+    of what acts.
     What a joint does to its second body is a `reaction` to what it does to its first.
     """
 
@@ -91,6 +92,9 @@ class _Poses:
         yield from self._loads()
         yield from self._springs()
         yield from self._efforts()
+        for coupling, body in self.question.turned:
+            moment = self.motion.arrays[f"{coupling}_moment_on_{body}.moment"][self.rows]
+            yield self._acting("coupling", coupling, _link(body), self._base(body), 0j, moment)
 
     def _acting(
         self, kind: str, name: str, link: str, place: Vector, force: Vector = 0j, moment: Vector = 0.0,

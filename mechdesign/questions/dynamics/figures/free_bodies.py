@@ -50,6 +50,7 @@ LOOKS = {
     "load": _Look("load", style.VERMILION),
     "spring": _Look("spring", shapes.SPRING_COLOR, (0, (4, 1, 1, 1))),
     "effort": _Look("drive", style.PURPLE),
+    "coupling": _Look("coupling", style.INK),
 }
 
 
@@ -112,7 +113,7 @@ def _worst(view: DynamicsView) -> int | None:
 
 def _outside(action: Action, acting: Sequence[Action]) -> bool:
     """Whether it comes from outside of the moving links: not from a joint or spring between two of them."""
-    if action.kind not in ("joint", "spring", "effort"):
+    if action.kind not in ("joint", "spring", "effort", "coupling"):
         return True
     same = [other for other in acting if other.kind == action.kind and other.name == action.name]
     return any(other.link == GROUND and abs(other.force + action.force) <= LEAST * action.size
