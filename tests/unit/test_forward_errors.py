@@ -41,6 +41,7 @@ def ask(forward: str = "", more: str = "", mass: str = ", mass: 1", limits: str 
         ({"more": "rates: {arm: 3}, "}, "'forward' and 'rates' are both given"),
         ({"more": "modes: true, "}, "'forward' and 'modes' are both given"),
         ({"mass": ""}, "no inertia"),
+        ({"forward": "efforts: {arm: 'log(time)'}"}, "ended early: the effort of arm is not finite at 0 s"),
         ({"limits": "limits: [{drive: arm, min: 10, max: 50}]", "forward": "start: {arm: 0}"},
          "limit; arm is 0 deg, beyond limits.0"),
         (

@@ -422,7 +422,7 @@ class Integration:
                 steps += 1
                 if steps > MAX_STEPS or not solver.step():
                     failed = True
-                    self._ended = f"{self._failure(steps)} at {reached:.6g}"
+                    self._ended = f"{self._failure(steps, solver)} at {reached:.6g}"
                     break
                 piece = solver.piece
                 stop, reached = self._stop(piece) if watches else (None, piece.end)
@@ -448,12 +448,17 @@ class Integration:
     def _stretch(self, piece: Piece, until: float) -> Stretch:
         return Stretch(piece, until, self.equations.chart, self.equations.last, self.equations.signs)
 
-    def _failure(self, steps: int) -> str:
+    def _failure(self, steps: int, solver: Solver) -> str:
         """Why the motion ends before its time."""
         if steps > MAX_STEPS:
             return f"{MAX_STEPS} steps are not enough"
         if self.equations.jams:
             return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
+        x, velocity, _ = self._parts_of(solver.state[:, None])
+        efforts = self.equations.rates(np.array([solver.time]), x, velocity).efforts[:, 0]
+        for drive, effort in zip(self.equations.drives, efforts, strict=True):
+            if not np.isfinite(effort):
+                return f"the effort of {drive.name} is not finite"
         return "the motion cannot go on"
 
     def _release(self, state: Floats) -> None:
