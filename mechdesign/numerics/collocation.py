@@ -18,8 +18,8 @@ from mechdesign.numerics.arrays import Floats
 DEGREE = 20
 # Places of the points in a step, from -1 to 1; what makes a series of values there, and values of its integral.
 POINTS: Floats = -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
-SERIES: Floats = np.linalg.inv(chebyshev.chebvander(POINTS, DEGREE))
-INTEGRAL: Floats = chebyshev.chebint(SERIES, lbnd=-1)
+SERIES: Floats = np.asarray(np.linalg.inv(chebyshev.chebvander(POINTS, DEGREE)), dtype=float)
+INTEGRAL: Floats = np.asarray(chebyshev.chebint(SERIES, lbnd=-1), dtype=float)
 INTEGRATED: Floats = chebyshev.chebvander(POINTS, DEGREE + 1) @ INTEGRAL
 # The last coefficients of a series, whose largest is its error.
 LAST = 3
@@ -47,8 +47,7 @@ class Piece(NamedTuple):
     def at(self, times: Floats) -> Floats:
         """States at times, shape (n, times)."""
         places = 2 * (times - self.begin) / (self.end - self.begin) - 1
-        states: Floats = chebyshev.chebval(places, self.series.T)
-        return states
+        return np.asarray(chebyshev.chebval(places, self.series.T), dtype=float)
 
 
 class Solver:

@@ -38,13 +38,20 @@ dynamics:
   loads: [{at: P, force: [0, -100]}, {link: rocker, moment: 500}, {between: [A, D], force: 7}]
 """
 
-# A controller turns the hand against the arm, without wheels.
+# A belt along the arm drives the fore; a controller turns the hand against the arm.
 HELD = """
 mechanism:
-  links: {ground: {O: [0, 0]}, arm: {from: O, to: A, length: 210, mass: 2}, fore: [A, P, 130], hand: [P, T, 40]}
-  drives: {one: {angle: arm}, two: {angle: fore}}
-  couplings: {hold: {set: hand, to: 0.5*arm.angle - fore.angle}}
-  sketch: {A: [200, 60], P: [180, 190], T: [220, 190]}
+  links:
+    ground: {O: [0, 0]}
+    arm: {from: O, to: A, length: 210, mass: 2}
+    fore: [A, P, 130]
+    hand: [P, T, 40]
+    motor: [O, M, 20]
+  drives: {one: {angle: arm}, two: {angle: motor}}
+  couplings:
+    belt: {set: fore, of: motor, ratio: 1, phase: 60, wheels: belt, radius: 18}
+    hold: {set: hand, to: 0.5*arm.angle - fore.angle}
+  sketch: {A: [200, 60], P: [180, 190], T: [220, 190], M: [10, 15]}
 dynamics:
   sweep: {one: {from: 0, to: 100, step: 10}, two: {from: 120, to: 140, step: 10}}
   loads: [{at: T, force: [5, -20]}]

@@ -126,7 +126,12 @@ class ForceQuestion:
             for name, reaction in zip(self.forces, borne, strict=True):
                 columns |= self._parts(name, reaction) if self.subset is None else {name: np.abs(reaction.force)}
         if self.subset is None:
-            columns |= self._turned(linear.configuration, held.balance if isinstance(held, Slipping) else held)
+            whole = held.balance if isinstance(held, Slipping) else held
+            columns |= self._turned(linear.configuration, whole)
+            for name, contact in zip(self.forces, self.joints.contacts, strict=True):
+                if contact.engaged is not None:
+                    place = np.asarray(whole.pressing[contact.joint].place)
+                    columns |= {f"{name}.x": place.real, f"{name}.y": place.imag}
         return columns
 
     @property
