@@ -269,7 +269,7 @@ OUT_STUDY = typer.Option(
 DRIVE = typer.Option(
     "--drive",
     metavar="NAME",
-    help="What is driven, in place of the file's inputs: a pin of the ground, a link or a slide; may be repeated.",
+    help="What is driven, in place of the file's inputs: a pin of two links, a link or a slide; may be repeated.",
     show_default=False,
 )
 UNIT = typer.Option("--unit", metavar="UNIT", help="Unit of length in place of the file's.", show_default=False)

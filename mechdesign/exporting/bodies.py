@@ -314,8 +314,7 @@ class Bodies:
                 add(Joint(f"fixed.{clamp.name}", "fixed", one, other, self.place(node)))
         for number, name in enumerate(graph.slides):
             guide, slider, node = self._sliding(number, at_nodes)
-            edge = next(k for k, edge in enumerate(graph.edges) if edge.slide == number)
-            along = complex(self.view.pose.direction(edge))
+            along = complex(self.view.pose.direction(graph.edge_of(number)))
             value = self.scales.length * float(self.view.pose.slides[number])
             slide = Joint(slide_name(name), "slide", guide, slider, self.place(node), along, value)
             if not whole.join(guide, slider):

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.exporting.drawing import Circle, Path, Shape, around, hull
+from mechdesign.exporting.drawing import Circle, Path, Shape, around
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.algebra import cross
 from mechdesign.mechanism.cams import Cam
-from mechdesign.mechanism.plates import joined
+from mechdesign.mechanism.plates import hull, joined
 from mechdesign.numerics.arrays import Complexes
 
 # By how much the lines between the corners of a profile may lie beside it (mm).

@@ -7,6 +7,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Self
+
+from mechdesign.mechanism.plates import hull
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ LAYERS = {
 class Path:
     """Lines and arcs from corner to corner, and back to the first where it is `closed`.
 
-    `bulges` are by corner that of what leads on from it: 0 of a line, else the tangent of a quarter of the arc's angle,
+    `bulges` says for each corner what begins there: 0 a line, else an arc, by the tangent of a quarter of its angle,
     positive counter-clockwise.
     """
 
@@ -58,7 +61,7 @@ class Path:
 
     @property
     def ends(self) -> Iterator[complex]:
-        """Places between which it lies: its corners, and of each arc the outermost in x and y."""
+        """Places that bound it: its corners, and the outermost places of each arc in x and y."""
         yield from self.corners
         for corner, following, bulge in self.pieces():
             if bulge:
@@ -80,46 +83,43 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Circle:
-    """A circle."""
+class _Placed:
+    """What lies at a place and keeps its form when it is turned."""
 
     layer: str
-    center: complex
+    place: complex
+
+    def moved(self, by: complex, turn: complex = 1.0) -> Self:
+        """The same with its place turned about 0 by the angle of a unit vector, and then moved."""
+        return replace(self, place=by + turn * self.place)
+
+
+@dataclass(frozen=True)
+class Circle(_Placed):
+    """A circle about its place."""
+
     radius: float
 
     @property
     def ends(self) -> Iterator[complex]:
         """Its outermost places in x and y."""
-        return (self.center + self.radius * way for way in (1, 1j, -1, -1j))
-
-    def moved(self, by: complex, turn: complex = 1.0) -> Circle:
-        """The same turned about 0 by the angle of a unit vector, and then moved."""
-        return replace(self, center=by + turn * self.center)
+        return (self.place + self.radius * way for way in (1, 1j, -1, -1j))
 
 
 @dataclass(frozen=True)
-class Mark:
+class Mark(_Placed):
     """A place that is marked, such as the centre of a hole."""
-
-    layer: str
-    place: complex
 
     @property
     def ends(self) -> Iterator[complex]:
         """The place."""
         return iter((self.place,))
 
-    def moved(self, by: complex, turn: complex = 1.0) -> Mark:
-        """The same turned about 0 by the angle of a unit vector, and then moved."""
-        return replace(self, place=by + turn * self.place)
-
 
 @dataclass(frozen=True)
-class Text:
+class Text(_Placed):
     """A line of text, level, whose lower left corner is at `place`, or with `centred` its middle."""
 
-    layer: str
-    place: complex
     height: float
     words: str
     centred: bool = False
@@ -134,10 +134,6 @@ class Text:
         """About its corners."""
         begin = self.place - complex(self.width, self.height) / 2 if self.centred else self.place
         return iter((begin, begin + complex(self.width, self.height)))
-
-    def moved(self, by: complex, turn: complex = 1.0) -> Text:
-        """The same moved, with its place turned about 0 by the angle of a unit vector; the text stays level."""
-        return replace(self, place=by + turn * self.place)
 
 
 Shape = Path | Circle | Mark | Text
@@ -182,31 +178,8 @@ def arc(begin: complex, end: complex, bulge: float) -> tuple[complex, float]:
     return center, abs(chord) * (1 + bulge * bulge) / (4 * abs(bulge))
 
 
-def hull(places: Iterable[complex]) -> list[complex]:
-    """Corners of the convex hull, counter-clockwise, without places on its sides; two where all lie on one line."""
-    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
-    if len(ordered) < 3:
-        return ordered
-    size = max(abs(place - ordered[0]) for place in ordered)
-
-    def half(sequence: Sequence[complex]) -> list[complex]:
-        chain: list[complex] = []
-        for place in sequence:
-            while len(chain) > 1 and _left(chain[-2], chain[-1], place) <= 1e-12 * size**2:
-                chain.pop()
-            chain.append(place)
-        return chain[:-1]
-
-    return half(ordered) + half(ordered[::-1])
-
-
-def _left(a: complex, b: complex, c: complex) -> float:
-    """Twice the area of a triangle, positive counter-clockwise."""
-    return ((b - a).conjugate() * (c - a)).imag
-
-
 def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], empty: float) -> tuple[complex, float]:
-    """The place for a name among the middles of `places` that is farthest from any hole, and that distance.
+    """Where a name has most room: of the middles of `places` the one farthest from all holes, and its distance.
 
     `holes` are centres and radii; without any the distance is `empty`.
     """

@@ -48,7 +48,7 @@ def _pairs(drawing: Drawing) -> Iterator[Pair]:
 
 def _entity(shape: Shape) -> Iterator[Pair]:
     if isinstance(shape, Circle):
-        yield from _headed("CIRCLE", shape, shape.center)
+        yield from _headed("CIRCLE", shape, shape.place)
         yield 40, shape.radius
     elif isinstance(shape, Mark):
         yield from _headed("POINT", shape, shape.place)

@@ -1,16 +1,19 @@
-"""What can be exported: each is a function that is declared by the names of its files where it stands."""
+"""Files that can be exported: functions, each declared with the name of its file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pkgutil import iter_modules
 
 from mechdesign import exporting
 from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError, suggestion
+from mechdesign.exporting.drawing import Drawing
+from mechdesign.exporting.dxf import to_dxf
+from mechdesign.exporting.svg import to_svg
 from mechdesign.exporting.view import View
 
 
@@ -35,9 +38,9 @@ class Export:
     order : int
         Its place in the list of what can be exported.
     mark : bytes
-        What every file of the kind contains, by which an older one may be replaced.
+        What every file of the kind contains: only such a file is written over.
     make : callable
-        The function: what it holds, of a study and a pose.
+        Makes the content from a study and a pose.
     """
 
     name: str
@@ -50,8 +53,23 @@ class Export:
 def export(
     name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign"
 ) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
-    """Declare that a function makes the file of this name from a view; see `Export` for what is said of it."""
+    """Declare that a function makes the file of this name from a view; see `Export` for the arguments."""
     return lambda make: Export(name, meaning, order, mark, make)
+
+
+def drawings(
+    name: str, meaning: str, order: int, make: Callable[[View], Drawing],
+    cautions: Callable[[View], tuple[Caution, ...]] = lambda _: (),
+) -> tuple[Export, Export]:  # fmt: skip
+    """The exports of a drawing: as DXF, and behind it as SVG; `cautions` are warnings of its own."""
+
+    def written(to_text: Callable[[Drawing], str], view: View) -> Content:
+        return Content(to_text(make(view)), view.assumed + view.unmoved + cautions(view))
+
+    return (
+        export(f"{name}.dxf", f"{meaning}, as DXF", order)(partial(written, to_dxf)),
+        export(f"{name}.svg", f"{meaning}, as SVG", order + 1)(partial(written, to_svg)),
+    )
 
 
 @cache

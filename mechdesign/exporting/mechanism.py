@@ -8,27 +8,13 @@ import numpy as np
 
 from mechdesign.exporting.discs import discs_of, followers, open_profiles, replace_plate
 from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around, roomiest
-from mechdesign.exporting.dxf import to_dxf
-from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.svg import to_svg
+from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.plates import joined
 from mechdesign.report.figures.scene import ranks
 
 # Height of letters as a part of the mechanism's size, and the least one (mm).
 LETTERS, SMALLEST = 0.04, 1.0
-
-
-@export("mechanism.dxf", "the mechanism in a pose and the paths of its points, as DXF", order=30)
-def mechanism_dxf(view: View) -> Content:
-    """The mechanism in a pose as DXF."""
-    return Content(to_dxf(mechanism_drawing(view)), view.assumed + view.unmoved)
-
-
-@export("mechanism.svg", "the mechanism in a pose and the paths of its points, as SVG", order=31)
-def mechanism_svg(view: View) -> Content:
-    """The mechanism in a pose as SVG."""
-    return Content(to_svg(mechanism_drawing(view)), view.assumed + view.unmoved)
 
 
 def mechanism_drawing(view: View) -> Drawing:
@@ -68,3 +54,8 @@ def mechanism_drawing(view: View) -> Drawing:
             curves = [part for part in np.split(places, last + 1) if len(part) > 1]
             groups[f"path of {point}"] = [Path.line("curves", curve.tolist()) for curve in curves]
     return Drawing(f"{view.study.name}: the mechanism at {view.posed}", groups)
+
+
+mechanism_dxf, mechanism_svg = drawings(
+    "mechanism", "the mechanism in a pose and the paths of its points", 30, mechanism_drawing
+)

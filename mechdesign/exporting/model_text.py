@@ -9,9 +9,9 @@ from xml.etree.ElementTree import Comment, Element, SubElement
 from mechdesign import __version__
 from mechdesign.errors import printable
 from mechdesign.exporting.bodies import Bodies, Body
-from mechdesign.exporting.drawing import hull
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.plates import hull
 from mechdesign.report.figures.shapes import link_colors
 
 # Name of what does not move.

@@ -9,30 +9,16 @@ from itertools import combinations
 import numpy as np
 
 from mechdesign.exporting.discs import DEVIATION, Disc, cautions, discs_of, open_profiles, replace_plate
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, hull, roomiest
-from mechdesign.exporting.dxf import to_dxf
-from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.svg import to_svg
+from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, roomiest
+from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.plates import joined
+from mechdesign.mechanism.plates import hull, joined
 from mechdesign.questions.reliability.schema.section import in_words
 
 SHEET = 600.0  # width of the sheet where the study gives none
 SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
 ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
-
-
-@export("parts.dxf", "every link as a part to cut at 1:1, as DXF", order=10)
-def parts_dxf(view: View) -> Content:
-    """All parts as DXF."""
-    return Content(to_dxf(parts_drawing(view)), view.assumed + view.unmoved + cautions(view))
-
-
-@export("parts.svg", "every link as a part to cut at 1:1, as SVG", order=11)
-def parts_svg(view: View) -> Content:
-    """All parts as SVG."""
-    return Content(to_svg(parts_drawing(view)), view.assumed + view.unmoved + cautions(view))
 
 
 @dataclass(frozen=True)
@@ -126,8 +112,8 @@ def parts_of(view: View) -> list[Part]:
         for disc in discs:
             title = name if whole and len(discs) == 1 else f"{name} {disc.coupling}"
             parts.append(_cam_part(title, plate, disc))
-        if link.telescopic and link.ends:
-            tip = Hole(link.ends[1], (0j,), scale * float(sizes.pin(link.ends[1])))
+        if link.tip is not None:
+            tip = Hole(link.tip, (0j,), scale * float(sizes.pin(link.tip)))
             parts.append(Part(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
     return parts
 
@@ -202,3 +188,6 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
                 lines.append(f"tolerance: {name} {float(low):+.6g} to {float(high):+.6g} {unit}".rstrip())
         lines += in_words(study.reliability, study.mechanism.graph, study.sizes)
     return lines
+
+
+parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing, cautions)

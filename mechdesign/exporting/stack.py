@@ -56,11 +56,11 @@ class Meeting:
 
     @property
     def weight(self) -> int:
-        """How much it counts where it cannot be avoided."""
+        """Its weight in a stack that has it."""
         return 1 if self.one.pin or self.other.pin else OF_PLATES
 
     def broken(self, layers: Mapping[str, int]) -> bool:
-        """Whether both share a layer, of the links that have one."""
+        """Whether both share a layer, among the links that are placed."""
         (begin, end), (first, last) = _span(self.one, layers), _span(self.other, layers)
         return max(begin, first) < min(end, last)
 
@@ -79,7 +79,7 @@ def _span(item: Item, layers: Mapping[str, int]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Stack:
-    """The layer of each link, from 1 at the bottom, what meets nevertheless, and whether all stacks were looked at."""
+    """The layer of each link, from 1 at the bottom, what meets in it, and whether all stacks were tried."""
 
     layers: Mapping[str, int]
     meetings: Sequence[Meeting] = ()
@@ -188,16 +188,16 @@ class _Search:
     def best(self, count: int) -> dict[str, int] | None:
         """The best stack of so many layers; None if there is none, or none was found."""
         self._least: tuple[int, int] | None = None
-        self._found: dict[str, int] | None = None
+        self._cheapest: dict[str, int] | None = None
         self._place(0, {}, 0, count)
-        return None if self._found is None else {link: self._found[link] for link in self.of_link}
+        return None if self._cheapest is None else {link: self._cheapest[link] for link in self.of_link}
 
     def _place(self, rank: int, layers: dict[str, int], broken: int, count: int) -> None:
         cost = broken, self._length(layers)
         if self.spent or (self._least is not None and cost >= self._least):
             return
         if rank == len(self.order):
-            self._least, self._found = cost, dict(layers)
+            self._least, self._cheapest = cost, dict(layers)
             return
         link = self.order[rank]
         before = self._cost(link, layers)
@@ -210,7 +210,7 @@ class _Search:
             del layers[link]
 
     def _cost(self, link: str, layers: Mapping[str, int]) -> int:
-        """What the meetings of a link count, in some layers."""
+        """Weight of the meetings of a link that share a layer."""
         return sum(meeting.weight for meeting in self.of_link[link] if meeting.broken(layers))
 
     def _length(self, layers: Mapping[str, int]) -> int:

@@ -44,7 +44,7 @@ def _group(name: str, shapes: Sequence[Shape], color: str) -> list[str]:
 
 def _element(shape: Shape, color: str) -> str:
     if isinstance(shape, Circle):
-        x, y = shape.center.real, -shape.center.imag
+        x, y = shape.place.real, -shape.place.imag
         return f'<circle cx="{_n(x)}" cy="{_n(y)}" r="{_n(shape.radius)}"/>'
     if isinstance(shape, Mark):
         x, y = shape.place.real, -shape.place.imag

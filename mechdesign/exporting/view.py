@@ -23,7 +23,7 @@ from mechdesign.study.text.fields import Context, read_number
 
 # Width of links of a study without plates, as a part of the mechanism's size.
 WIDTH = 0.08
-# Least number of poses at which a motion is looked at.
+# Least number of poses of a motion.
 LOOKS = 721
 
 
@@ -38,7 +38,7 @@ class Track:
     follows : bool array, shape (n - 1,)
         Whether the motion goes on from each pose to the one behind it.
     places : ndarray, shape (n,)
-        Where each lies, in rows of the motion's poses.
+        Row of each among the study's poses, with a fraction between two of them.
     """
 
     configuration: Configuration
@@ -107,9 +107,7 @@ class View:
             name: (joint.line.link, joint.point)
             for name, joint in description.joints.items() if not isinstance(joint, Fixed)
         }  # fmt: skip
-        slides |= {
-            name: (name, link.ends[1]) for name, link in description.links.items() if link.telescopic and link.ends
-        }
+        slides |= {name: (name, link.tip) for name, link in description.links.items() if link.tip is not None}
         for name, (link, point) in slides.items():
             travel = self.track.configuration.slides[self.mechanism.graph.slides.index(name)]
             ends = [self.in_frame(link, point, int(index(travel))) for index in (np.argmin, np.argmax)]
@@ -118,30 +116,25 @@ class View:
 
     def in_frame(self, link: str, point: str, row: int) -> complex:
         """Place of a point in the frame of a link, in a pose of the motion."""
-        configuration, base = self.track.configuration, self._base(link)
-        away = configuration.point(point)[row] - configuration.point(base)[row]
-        return self._local(link, base) + complex(away * np.conj(configuration.rotation(link)[row]))
+        configuration = self.track.configuration
+        origin, along = self.mechanism.frame(link, configuration)
+        places = (configuration.point(point) - origin) * np.conj(along)
+        return complex(np.broadcast_to(places, configuration.shape)[row])
 
     def in_world(self, link: str, places: Iterable[complex]) -> list[complex]:
         """Places of the frame of a link in the world, in the pose that is shown."""
-        base = self._base(link)
-        origin, turn = complex(self.pose.point(base)), complex(self.pose.rotation(link))
-        return [origin + turn * (place - self._local(link, base)) for place in places]
+        origin, along = self.mechanism.frame(link, self.pose)
+        return [complex(origin + along * place) for place in places]
 
     def points(self, link: str) -> dict[str, complex]:
         """Points of a link in its frame; the tip of a telescopic one is that of its rod."""
-        return {point: self._local(link, point) for point in self.mechanism.description.links[link].points}
+        local, points = self.mechanism.geometry.local, self.mechanism.description.links[link].points
+        return {point: complex(local(link, point, {})) for point in points}
 
     def outline(self, link: str) -> list[complex]:
         """Places of a link's frame that its plate goes around: its points, and the ends of its slots."""
         ends = [end for slot in self.slots if slot.link == link for end in slot.ends]
         return [*self.points(link).values(), *ends]
-
-    def _base(self, link: str) -> str:
-        return next(iter(self.mechanism.description.links[link].points))
-
-    def _local(self, link: str, point: str) -> complex:
-        return complex(self.mechanism.geometry.local(link, point, {}))
 
     @property
     def posed(self) -> str:
@@ -167,7 +160,7 @@ class View:
 
     @cached_property
     def track(self) -> Track:
-        """The motion of kinematics: its poses, and between them so many that `LOOKS` are there; else the sketch.
+        """The motion of kinematics in at least `LOOKS` poses; without a motion the pose of the sketch.
 
         Raises
         ------

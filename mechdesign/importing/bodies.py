@@ -1,4 +1,4 @@
-"""The rigid bodies of a sketch: links that are one body put together, and what moves with nothing left out."""
+"""The rigid bodies of a sketch: links that are one body are merged, links that nothing holds are left out."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from mechdesign.importing.sketch import GROUND, Sketch
 
 
 class Bodies:
-    """Which body each link of a sketch belongs to, the ground among them, and the points of each body.
+    """The body to which each link of a sketch belongs, the ground among them, and the points of each body.
 
-    Links that are fastened to each other, and links that share two points, are one body, which is called as its first
-    link. What is not joined to the ground, and what has a single pin and carries nothing, is left out of `points`.
+    Links that are fastened to each other, and links that share two points, are one body, with the name of its first
+    link. `points` leaves out bodies that nothing joins to the ground, and those of a single pin that carry nothing.
     """
 
     def __init__(self, sketch: Sketch) -> None:
@@ -40,23 +40,24 @@ class Bodies:
     def _merge(self, one: str, other: str) -> None:
         first, second = sorted((self.of(one), self.of(other)), key=[*self._groups].index)
         if first != second:
-            together = self._groups[first] | self._groups[second]
-            if any(self.sketch.links[link].telescopic for link in together - {GROUND}):
+            if self._telescopic(first) or self._telescopic(second):
                 raise StudyError(
                     f"{one!r} and {other!r} are fastened to each other, and one of them changes its length"
                 )
             self._groups[first] |= self._groups.pop(second)
 
+    def _telescopic(self, body: str) -> bool:
+        return any(self.sketch.links[link].telescopic for link in self.links(body))
+
     def _all_points(self, body: str) -> list[str]:
-        links = [link for name, link in self.sketch.links.items() if name in self._groups[body]]
         own = self.sketch.fixed if body == GROUND else []
-        return list(dict.fromkeys([*own, *(point for link in links for point in link.points)]))
+        return list(dict.fromkeys([*own, *(p for link in self.links(body) for p in self.sketch.links[link].points)]))
 
     def _sharing_two(self) -> tuple[str, str] | None:
         """Two rigid bodies that share two points at different places."""
         owners: dict[str, list[str]] = {}
-        for body, group in self._groups.items():
-            if not any(self.sketch.links[link].telescopic for link in group - {GROUND}):
+        for body in self._groups:
+            if not self._telescopic(body):
                 for point in self._all_points(body):
                     owners.setdefault(point, []).append(body)
         shared: dict[tuple[str, str], str] = {}
@@ -82,9 +83,9 @@ class Bodies:
         for body in [body for body in self.points if body not in reached]:
             sketch.omitted.append(f"link {body!r}, which nothing joins to the ground")
             del self.points[body]
-        merged = [sorted(group) for body, group in self._groups.items() if len(group - {GROUND}) > 1 and body != GROUND]
-        for group in merged:
-            sketch.choices.append(f"{' and '.join(map(repr, group))} are one rigid link")
+        for body, group in self._groups.items():
+            if body != GROUND and len(group) > 1:
+                sketch.choices.append(f"{' and '.join(map(repr, sorted(group)))} are one rigid link")
         held = sorted(self._groups[GROUND] - {GROUND})
         if held:
             sketch.choices.append(f"part of the ground: {', '.join(map(repr, held))}")

@@ -10,14 +10,12 @@ import numpy as np
 
 from mechdesign import study as studies
 from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
-from mechdesign.importing.draft import Draft, Span
+from mechdesign.importing.draft import Draft
 from mechdesign.importing.formats import FORMATS
 from mechdesign.importing.sketch import Drive, Sketch
 from mechdesign.importing.source import Source
 from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
-
-_APART = "the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits there"
 
 
 def convert(
@@ -38,7 +36,8 @@ def convert(
     text : str
         The text of such a file, or an address, in place of `source`.
     drives : sequence of str
-        What is driven, in place of the file's inputs: pins of the ground, links or slides, by their names in the file.
+        What is driven, in place of the file's inputs: pins of two links (the ground is one), links or slides, by their
+        names in the file.
     unit : str
         Unit of length in place of the file's; numbers stay as they are.
     scale : float
@@ -88,11 +87,14 @@ def convert(
 def _scale(sketch: Sketch, factor: float) -> None:
     if not 0 < factor < 1e6:
         raise StudyError(f"a scale of {factor:g}; it is a positive number")
-    for name, point in sketch.points.items():
-        sketch.points[name] = replace(point, x=factor * point.x, y=factor * point.y)
+    sketch.points = {name: factor * place for name, place in sketch.points.items()}
     for link in sketch.links.values():
-        link.center = None if link.center is None else (factor * link.center[0], factor * link.center[1])
-    sketch.forces = [replace(f, place=(factor * f.place[0], factor * f.place[1])) for f in sketch.forces]
+        link.center = None if link.center is None else factor * link.center
+        link.inertia = None if link.inertia is None else factor**2 * link.inertia
+    sketch.forces = [replace(force, place=factor * force.place) for force in sketch.forces]
+    sketch.gears = [
+        replace(gears, radius=None if gears.radius is None else factor * gears.radius) for gears in sketch.gears
+    ]
     for index, drive in enumerate(sketch.drives):
         if drive.kind != "angle":
             span = None if drive.span is None else (factor * drive.span[0], factor * drive.span[1])
@@ -123,52 +125,37 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
 
 def _named(sketch: Sketch, name: str) -> Drive:
     """The drive that a name stands for, with the speed that the file has for it."""
-    of = name
-    if name in sketch.points and name in sketch.fixed:
-        links = sketch.moving_at(name)
-        if len(links) != 1:
-            raise StudyError(f"{len(links)} links turn about {name!r}: name the one that is driven")
-        of = links[0]
+    if name in sketch.fixed:
+        chosen = sketch.drive_at(name)
+    elif name in sketch.links:
+        chosen = Drive("length" if sketch.links[name].telescopic else "angle", name)
+    elif name in sketch.slides:
+        chosen = Drive("slide", name)
     elif name in sketch.points:
-        of = next((slide for slide, s in sketch.slides.items() if s.point == name), name)
-    for drive in sketch.drives:
-        if drive.of == of:
-            return drive
-    if of in sketch.slides:
-        return Drive("slide", of)
-    if of in sketch.links:
-        return Drive("length" if sketch.links[of].telescopic else "angle", of)
-    raise StudyError(f"--drive {cut(name)}: no pin of the ground, link or slide of the file has this name")
+        chosen = sketch.drive_at(name)
+    else:
+        raise StudyError(f"--drive {cut(name)}: no joint, link or slide of the file has this name")
+    return next((drive for drive in sketch.drives if drive.of == chosen.of), chosen)
 
 
 def _settled(draft: Draft, source: str) -> str:
     """The study, whose drive goes no farther than the mechanism lets it."""
-    writer = Writer(draft)
-    spans = {name: draft.span(name) for name in draft.drives}
-    if len(spans) == 1:
-        ((name, span),) = spans.items()
-        drive, start = draft.drives[name], draft.start(name)
-        turns = drive.kind == "angle" and drive.span is None
-        wide = (start - 180, start + 180) if turns else span
-        solve = _loaded(writer.text(source, {name: wide})).mechanism.solve
-
-        def assembled(values: Floats) -> Flags:
-            return np.asarray(solve({name: values}).valid)
-
-        values = np.unique([*np.linspace(*wide, 2 * STEPS + 1), start])
-        valid = assembled(values)
-        spans[name] = _passed(values, valid, start, assembled)
-        if turns and valid.all():
-            spans[name] = span
-        remark = []
-        if not valid.all():
-            low, high = spans[name]
-            remark = [f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"]
-        return writer.text(source, spans, remark)
+    writer, spans = Writer(draft), {name: draft.span(name) for name in draft.drives}
     text = writer.text(source, spans)
-    if not _loaded(text).mechanism.solve({name: [draft.start(name)] for name in spans}).valid.all():
-        raise AssemblyError(_APART)
-    return text
+    solve = _loaded(text).mechanism.solve
+    if not solve({name: [draft.start(name)] for name in spans}).valid.all():
+        raise AssemblyError("the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits")
+    if len(spans) > 1:
+        return text
+    ((name, drive),) = draft.drives.items()
+    start = draft.start(name)
+    turns = drive.kind == "angle" and drive.span is None
+    wide = (start - 180, start + 180) if turns else spans[name]
+    low, high = (_farthest(lambda values: solve({name: values}).valid, start, end) for end in wide)
+    if (low, high) == wide:
+        return text
+    remark = f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"
+    return writer.text(source, {name: (low, high)}, [remark])
 
 
 def _loaded(text: str) -> studies.Study:
@@ -181,22 +168,13 @@ def _loaded(text: str) -> studies.Study:
         raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
 
 
-def _passed(values: Floats, valid: Flags, start: float, assembled: Callable[[Floats], Flags]) -> Span:
-    """The ends of the values around the start, without a gap, at which the mechanism is assembled."""
-    middle = int(np.argmin(np.abs(values - start)))
-    if not valid[middle]:
-        raise AssemblyError(_APART)
-    ends = []
-    for step in (-1, 1):
-        end = middle
-        while 0 <= end + step < len(values) and valid[end + step]:
-            end += step
-        inside = float(values[end])
-        if 0 <= end + step < len(values):
-            outside = float(values[end + step])
-            for _ in range(2):
-                tried = np.linspace(inside, outside, STEPS + 1)
-                last = int(np.argmin(assembled(tried))) - 1
-                inside, outside = float(tried[last]), float(tried[last + 1])
-        ends.append(inside)
-    return ends[0], ends[1]
+def _farthest(valid: Callable[[Floats], Flags], start: float, end: float) -> float:
+    """How far a drive goes from its start towards an end while the mechanism is assembled."""
+    inside, outside = start, end
+    for _ in range(3):
+        values = np.linspace(inside, outside, STEPS + 1)
+        gaps = np.flatnonzero(~valid(values))
+        if not len(gaps):
+            return outside
+        inside, outside = float(values[gaps[0] - 1]), float(values[gaps[0]])
+    return inside

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 from mechdesign.errors import StudyError
 from mechdesign.importing.bodies import Bodies
-from mechdesign.importing.names import Names
-from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide
+from mechdesign.importing.names import Names, distinct
+from mechdesign.importing.sketch import GROUND, Drive, Force, Sketch, Slide
 
 Span = tuple[float, float]
 """First and last value of a drive, in degrees or the unit of length."""
@@ -26,7 +27,7 @@ class Draft:
         self.sketch = sketch
         self.bodies = Bodies(sketch)
         self.names = Names()
-        self.places = {name: (point.x, point.y) for name, point in sketch.points.items()}
+        self.places = dict(sketch.points)
         self.points = {body: list(points) for body, points in self.bodies.points.items()}
         self._marks()
         self.loads = self._forces()
@@ -59,14 +60,13 @@ class Draft:
             for link, axis, share in ((gears.follower, 0, 1), (gears.leader, 1, abs(gears.ratio))):
                 body = self.bodies.of(link)
                 if body in self.points and body != GROUND and len(self.points[body]) == 1:
-                    x, y = self.places[gears.axes[axis]]
                     mark = f"{body}_mark"
-                    self.places[mark] = x + 0.8 * distance * share / (1 + abs(gears.ratio)), y
+                    self.places[mark] = self.places[gears.axes[axis]] + 0.8 * distance * share / (1 + abs(gears.ratio))
                     self.points[body].append(mark)
                     self.sketch.choices.append(f"{mark!r} is a point on wheel {body!r}, which shows how it is turned")
 
-    def _forces(self) -> list[tuple[str, str, tuple[float, float], bool]]:
-        """Point, body, vector and kind of each force; the body gets a point where it acts."""
+    def _forces(self) -> list[tuple[str, str, Force]]:
+        """Point and body of each force; the body gets a point where it acts."""
         loads = []
         for force in self.sketch.forces:
             body = self.bodies.of(force.link)
@@ -75,31 +75,30 @@ class Draft:
                 continue
             point = next((name for name in self.points[body] if self.places[name] == force.place), None)
             if point is None:
-                point = force.name
-                while point in self.places:
-                    point += "_"
+                point = distinct(force.name, self.places.__contains__)
                 self.places[point] = force.place
                 self.points[body].append(point)
-            loads.append((point, body, force.vector, force.local))
+            loads.append((point, body, force))
         return loads
 
-    def _frame(self, body: str) -> tuple[float, float, float]:
+    def _frame(self, body: str) -> tuple[complex, float]:
         """Origin and angle of a body's frame; of a link with several points it leads from the first to another."""
         if body == GROUND:
-            return 0.0, 0.0, 0.0
-        (x, y), *others = (self.places[point] for point in self.points[body])
-        far = next(((u, v) for u, v in others if (u, v) != (x, y)), (x + 1, y))
-        return x, y, math.atan2(far[1] - y, far[0] - x)
+            return 0j, 0.0
+        origin, *others = (self.places[point] for point in self.points[body])
+        return origin, cmath.phase(next((place for place in others if place != origin), origin + 1) - origin)
 
     def turn(self, body: str) -> float:
         """Angle of a body's frame in the sketch."""
-        return self._frames[body][2]
+        return self._frames[body][1]
 
-    def local(self, body: str, x: float, y: float) -> tuple[float, float]:
+    def local(self, body: str, place: complex) -> complex:
         """A place of the sketch in a body's frame."""
-        ox, oy, angle = self._frames[body]
-        turned = complex(x - ox, y - oy) * complex(math.cos(angle), -math.sin(angle))
-        return turned.real, turned.imag
+        return self.turned_back(body, place - self._frames[body][0])
+
+    def turned_back(self, body: str, vector: complex) -> complex:
+        """A vector of the sketch in a body's frame."""
+        return vector * cmath.rect(1.0, -self.turn(body))
 
     def _carries(self, name: str, slide: Slide) -> bool:
         guide = self.bodies.of(slide.guide)
@@ -117,13 +116,13 @@ class Draft:
         """Angle of a slide's line in the sketch."""
         if len(slide.through) == 1:
             return slide.direction
-        (x, y), (u, v) = (self.places[point] for point in slide.through)
-        return math.atan2(v - y, u - x)
+        begin, end = (self.places[point] for point in slide.through)
+        return cmath.phase(end - begin)
 
     def _slid(self, slide: Slide) -> float:
         """How far along its line the point of a slide is in the sketch."""
-        (x, y), (u, v), angle = self.places[slide.through[0]], self.places[slide.point], self.direction(slide)
-        return (u - x) * math.cos(angle) + (v - y) * math.sin(angle)
+        way = self.places[slide.point] - self.places[slide.through[0]]
+        return (way * cmath.rect(1.0, -self.direction(slide))).real
 
     def _drives(self) -> dict[str, Drive]:
         drives = {}
@@ -153,8 +152,7 @@ class Draft:
         """Where a drive may go: through a turn, or where the file says it goes."""
         drive, start = self.drives[name], self.start(name)
         if drive.span is not None:
-            factor = math.degrees(1) if drive.kind == "angle" else 1.0
-            return factor * drive.span[0], factor * drive.span[1]
+            return drive.factor * drive.span[0], drive.factor * drive.span[1]
         if drive.kind == "angle":
             return start, start + 360
         if drive.kind == "slide" and len(through := self.sketch.slides[drive.of].through) == 2:
@@ -167,7 +165,7 @@ class Draft:
         drive = self.drives[name]
         low, high = self.span(name)
         way = abs(high - low) * (2 if drive.span is not None else 1)
-        return way / abs((drive.speed or 0.0) * (math.degrees(1) if drive.kind == "angle" else 1.0))
+        return way / abs(drive.rate)
 
     def turned(self, body: str) -> bool:
         """Whether a drive turns a body."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
+from collections.abc import Callable
 
 from mechdesign.errors import cut
 from mechdesign.expressions import RESERVED
@@ -11,7 +13,7 @@ from mechdesign.mechanism.graph import GROUND
 
 _UNFIT = re.compile(r"\W+")
 _LONGEST = 40
-_TAKEN = {GROUND, "time", "true", "false", "null", *RESERVED}
+_RESERVED = {GROUND, "time", "true", "false", "null", *RESERVED}
 
 
 def clean(raw: str, noun: str = "part") -> str:
@@ -20,26 +22,28 @@ def clean(raw: str, noun: str = "part") -> str:
     return name if name and name[0].isalpha() else f"{noun}_{name}".rstrip("_")
 
 
+def distinct(name: str, taken: Callable[[str], object]) -> str:
+    """The name, or with a number behind it where it is taken."""
+    numbered = (f"{name}_{count}" for count in itertools.count(2))
+    return next(free for free in itertools.chain([name], numbered) if not taken(free))
+
+
 class Names:
     """Distinct names, each of letters, digits and underscores with a letter first."""
 
     def __init__(self) -> None:
         self._given: dict[tuple[str, str], str] = {}
-        self._taken = set(_TAKEN)
+        self._taken = set[str]()
 
     def make(self, noun: str, raw: str) -> str:
         """The study's name of a `noun` (point, link, ...) that the file calls `raw`; a new one is distinct."""
         if (noun, raw) not in self._given:
-            base = clean(raw, noun)
-            name, count = base, 1
-            while name.lower() in _TAKEN or name in self._taken:
-                count += 1
-                name = f"{base}_{count}"
+            name = distinct(clean(raw, noun), lambda name: name in self._taken or name.lower() in _RESERVED)
             self._taken.add(name)
             self._given[noun, raw] = name
         return self._given[noun, raw]
 
     def changed(self) -> list[str]:
-        """What is called otherwise in the study than in the file."""
+        """Sentences about the names that differ from those of the file."""
         pairs = [(noun, raw, name) for (noun, raw), name in self._given.items() if raw != name]
         return [f"{name} is the file's {noun} {cut(raw)!r}" for noun, raw, name in pairs]

@@ -1,17 +1,18 @@
 """The mechanism that a file of another tool shows, whatever the tool: points, links, slides, drives, gears, forces.
 
-Points, links and slides are known by the names that the file has for them; `names` makes them names of a study.
+Points, links and slides have the names of the file; `names` makes names of a study from them.
 Lengths are in the unit of the sketch, angles in radians, positive counter-clockwise, speeds per second.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from mechdesign.errors import StudyError, cut
+from mechdesign.importing.names import clean
 
 # Most points, and most links, of a file; most points on links; and the largest number.
 MOST = 1000
@@ -21,23 +22,14 @@ GROUND = ""
 LARGEST = 1e12
 
 
-@dataclass(frozen=True)
-class Point:
-    """A place in the sketch; the path of a traced point is what the file asks for."""
-
-    x: float
-    y: float
-    traced: bool = False
-
-
 @dataclass
 class Link:
-    """A rigid body by its points; a telescopic one is as long as its drive says."""
+    """A rigid body by its points, or a telescopic link of two points, whose length is driven."""
 
     points: list[str]
     telescopic: bool = False
     mass: float | None = None
-    center: tuple[float, float] | None = None  # in the sketch
+    center: complex | None = None  # in the sketch
     inertia: float | None = None
 
 
@@ -68,6 +60,16 @@ class Drive:
     span: tuple[float, float] | None = None  # values between which it goes to and fro; None: a turn
     held: bool = False
 
+    @property
+    def factor(self) -> float:
+        """What a number of the sketch is in the study: degrees of an angle, else the same."""
+        return math.degrees(1) if self.kind == "angle" else 1.0
+
+    @property
+    def rate(self) -> float:
+        """Speed in degrees or lengths a second; 0 where the file says none."""
+        return self.factor * (self.speed or 0.0)
+
 
 @dataclass(frozen=True)
 class Gears:
@@ -90,20 +92,24 @@ class Force:
 
     name: str
     link: str
-    place: tuple[float, float]
-    vector: tuple[float, float]
+    place: complex
+    vector: complex
     local: bool
 
 
 @dataclass
 class Sketch:
-    """What a file shows. `choices` say how it was read, `omitted` what of it a study does not have."""
+    """The mechanism of a file. `choices` say how the file was read, `omitted` what the study leaves out.
+
+    The paths of `traced` points are what the file asks for.
+    """
 
     tool: str
     name: str = ""
     units: dict[str, str] = field(default_factory=lambda: {"length": "mm"})
     inertia_unit: str = ""
-    points: dict[str, Point] = field(default_factory=dict)
+    points: dict[str, complex] = field(default_factory=dict)
+    traced: set[str] = field(default_factory=set)
     links: dict[str, Link] = field(default_factory=dict)
     fixed: list[str] = field(default_factory=list)
     welds: list[tuple[str, ...]] = field(default_factory=list)
@@ -125,7 +131,9 @@ class Sketch:
             If there is one of this name, or its coordinates are no numbers.
         """
         _check_new("joint", name, self.points)
-        self.points[name] = Point(number(x, f"x of joint {name!r}"), number(y, f"y of joint {name!r}"), traced)
+        self.points[name] = complex(number(x, f"x of joint {name!r}"), number(y, f"y of joint {name!r}"))
+        if traced:
+            self.traced.add(name)
         if fixed:
             self.fixed.append(name)
 
@@ -151,32 +159,88 @@ class Sketch:
         """Put points on the ground; those that the sketch does not have are passed over."""
         self.fixed += [point for point in points if point in self.points and point not in self.fixed]
 
-    def links_at(self, point: str) -> list[str]:
-        """The links that have a point."""
-        return [name for name, link in self.links.items() if point in link.points]
+    def add_line(self, point: str, place: complex, angle: float) -> str:
+        """Let a point slide along a fixed line through a place, and return the name of the slide."""
+        line, slide = clean(f"{point}_line"), clean(f"{point}_slide")
+        self.add_point(line, place.real, place.imag, fixed=True)
+        self.slides[slide] = Slide(point, GROUND, (line,), angle)
+        return slide
+
+    def add_track(self, point: str, ends: Sequence[str], *, limited: bool = False) -> None:
+        """Let a point slide along the line of two points of the ground or of one link.
+
+        Raises
+        ------
+        StudyError
+            If nothing has both points, or the point is one of them.
+        """
+        one, other = ends
+        guides = [GROUND] if {one, other} <= {*self.fixed} else self.links_with(one, other)
+        if not guides or point in ends:
+            raise StudyError(f"{point!r} slides on the line of {one!r} and {other!r}, which are on no common link")
+        self.slides[clean(f"{point}_slide")] = Slide(point, guides[0], (one, other), limited=limited)
+
+    def links_with(self, *points: str) -> list[str]:
+        """The links that have all of these points."""
+        return [name for name, link in self.links.items() if {*points} <= {*link.points}]
 
     def moving_at(self, point: str) -> list[str]:
         """The links that have a point, but those whose points are all on the ground."""
-        return [name for name in self.links_at(point) if not {*self.links[name].points} <= {*self.fixed}]
+        return [name for name in self.links_with(point) if not {*self.links[name].points} <= {*self.fixed}]
+
+    def turned_at(self, point: str) -> list[str]:
+        """The moving links that a pin joins, after the ground where it is fixed there."""
+        return [GROUND] * (point in self.fixed) + self.moving_at(point)
+
+    def drive_at(self, point: str, speed: float | None = None) -> Drive:
+        """The drive that moves a point along its slide, or turns the two links that a pin joins.
+
+        Raises
+        ------
+        StudyError
+            If the pin does not join two links, the ground among them.
+        """
+        for name, slide in self.slides.items():
+            if slide.point == point:
+                return Drive("slide", name)
+        links = self.turned_at(point)
+        if len(links) != 2:
+            raise StudyError(
+                f"the drive at joint {point!r} turns one link against another, or against the ground; {len(links)} "
+                "meet there: name the link that is driven"
+            )
+        return Drive("angle", links[1], links[0], speed)
 
     def distance(self, one: str, other: str) -> float:
         """Distance of two points."""
-        a, b = self.points[one], self.points[other]
-        return math.hypot(b.x - a.x, b.y - a.y)
+        return abs(self.points[other] - self.points[one])
 
     def size(self) -> float:
         """The larger side of the sketch."""
-        xs, ys = [p.x for p in self.points.values()], [p.y for p in self.points.values()]
-        return max(max(xs) - min(xs), max(ys) - min(ys)) if xs else 0.0
+        xs, ys = [place.real for place in self.points.values()], [place.imag for place in self.points.values()]
+        return max(max(xs) - min(xs), max(ys) - min(ys))
 
 
-def _check_new(noun: str, name: str, known: dict[str, Any]) -> None:
+def _check_new(noun: str, name: str, present: dict[str, Any]) -> None:
     if not name:
         raise StudyError(f"a {noun} without a name")
-    if name in known:
+    if name in present:
         raise StudyError(f"two {noun}s have the name {cut(name)!r}")
-    if len(known) >= MOST:
+    if len(present) >= MOST:
         raise StudyError(f"the file has more than {MOST} {noun}s; take a part of it")
+
+
+def mapping(raw: Any, noun: str) -> dict[str, Any]:
+    """A mapping of a file.
+
+    Raises
+    ------
+    StudyError
+        If it is none.
+    """
+    if not isinstance(raw, dict):
+        raise StudyError(f"a {noun} is {cut(repr(raw))}, not a mapping")
+    return raw
 
 
 def number(raw: Any, meaning: str) -> float:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.mechanism import coordinates as names
-from mechdesign.mechanism.algebra import TURN, Value, norm2, wrap
+from mechdesign.mechanism.algebra import TURN, Value, Vector, norm2, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Geometry
@@ -145,6 +145,13 @@ class Core:
             If there is none of that name.
         """
         return names.resolve(name, self.description, self.graph)
+
+    def frame(self, body: str, configuration: Configuration) -> tuple[Vector, Vector]:
+        """Origin and x axis of a body's frame in the world."""
+        base = next(point for owner, point in self.graph.points if owner == body)
+        along = configuration.body_rotation(body)
+        local = self.geometry.local(body, base, configuration.places)
+        return configuration.nodes[self.graph.nodes.index(base)] - local * along, along
 
     def margins(self, configuration: Configuration, *, smooth: bool = False) -> list[tuple[str, Value]]:
         """Named margins of all limits: positive inside; see `Bound.margins`."""

@@ -74,6 +74,10 @@ class Graph:
         """Index of the node of a point, ``B``; the point of a link, ``rod.B``, has the node of its pin."""
         return self.nodes.index(name.rpartition(".")[2])
 
+    def edge_of(self, slide: int) -> int:
+        """Index of the edge of a slide."""
+        return next(k for k, edge in enumerate(self.edges) if edge.slide == slide)
+
     def is_point(self, name: str) -> bool:
         """Whether a name is that of a point, ``B``, or of a point of a link, ``rod.B``."""
         link, _, point = name.rpartition(".")

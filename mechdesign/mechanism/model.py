@@ -60,6 +60,16 @@ class Link:
         """The points between which its beams run where it bends; of a telescopic link a single beam."""
         return self.ends or tuple(self.points)
 
+    @property
+    def tip(self) -> str | None:
+        """The second end of a telescopic leg, which is on its rod; None of a rigid link."""
+        return self.ends[1] if self.telescopic and self.ends is not None else None
+
+    @property
+    def all_points(self) -> tuple[str, ...]:
+        """Names of its points, its ends first, with the tip of a telescopic leg."""
+        return tuple(dict.fromkeys((*(self.ends or ()), *self.points)))
+
 
 @dataclass(frozen=True)
 class Mass:

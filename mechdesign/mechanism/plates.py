@@ -10,17 +10,17 @@ them, or along the line between two corners, so that all of these are tried.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
-from mechdesign.mechanism.model import Description, Fixed, Link, Plates
+from mechdesign.mechanism.model import Description, Fixed, Plates
 
 # Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
 PIN, THICKNESS = 0.4, 0.25
@@ -28,16 +28,11 @@ PIN, THICKNESS = 0.4, 0.25
 CLEARANCE = "clearance"
 
 
-def points_of(link: Link) -> tuple[str, ...]:
-    """Names of a link's points, its ends first; of a telescopic one also the tip."""
-    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
-
-
 def joined(description: Description) -> dict[str, tuple[str, ...]]:
     """Every point at which a pin, a slide or a clamp joins links, and these links."""
     links: dict[str, list[str]] = {}
     for name, link in description.links.items():
-        for point in points_of(link):
+        for point in link.all_points:
             links.setdefault(point, []).append(name)
     for joint in description.joints.values():
         if not isinstance(joint, Fixed) and joint.line.link not in links[joint.point]:
@@ -165,11 +160,10 @@ class Clearances:
             return [self._node(item.name)]
         link = self.mechanism.description.links[item.name]
         if item.name not in self.corners:
-            return [self._node(point) for point in points_of(link)]
-        base, turn = next(iter(link.points)), self.configuration.body_rotation(item.name)
-        local = self.mechanism.geometry.local(item.name, base, self.configuration.places)
-        tip = [self._node(link.ends[1])] if link.telescopic and link.ends else []
-        return [*(self._node(base) + (corner - local) * turn for corner in self.corners[item.name]), *tip]
+            return [self._node(point) for point in link.all_points]
+        origin, along = self.mechanism.frame(item.name, self.configuration)
+        tip = [self._node(link.tip)] if link.tip is not None else []
+        return [*(origin + along * corner for corner in self.corners[item.name]), *tip]
 
     def moved(self, item: Item) -> Value:
         """The longest way of a place of an item from each pose to the next, shape (n - 1,)."""
@@ -201,3 +195,24 @@ def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
         largest = np.where(length > 0, np.fmax(largest, apart), largest)
     lost = np.isnan(sum(np.abs(corner) for corner in (*one, *other)))
     return np.where(lost, np.nan, np.where(np.isneginf(largest), 0.0, largest))
+
+
+def hull(places: Iterable[complex], flat: float = 1e-12) -> list[complex]:
+    """Corners of the convex hull, counter-clockwise; two where all lie on one line.
+
+    A corner that stands out by less than `flat`, in squares of the size, counts as a place on a side.
+    """
+    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
+    if len(ordered) < 3:
+        return ordered
+    size = max(abs(place - ordered[0]) for place in ordered)
+
+    def half(sequence: Sequence[complex]) -> list[complex]:
+        chain: list[complex] = []
+        for place in sequence:
+            while len(chain) > 1 and cross(chain[-1] - chain[-2], place - chain[-2]) <= flat * size**2:
+                chain.pop()
+            chain.append(place)
+        return chain[:-1]
+
+    return half(ordered) + half(ordered[::-1])

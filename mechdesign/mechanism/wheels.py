@@ -133,7 +133,7 @@ class Mesh:
         return _ratio(by_class, bodies[self.links[1]][0], bodies[self.carrier][0])
 
     def weight(self, configuration: Configuration) -> Value:
-        """What the coupling's gap changes by for each unit of the rack's displacement."""
+        """Change of the coupling's gap for each unit of the rack's displacement."""
         return pulled(configuration, self.gap, 1.0).slides[self.slide]
 
     def radii(self, configuration: Configuration) -> tuple[Value, Value]:
@@ -153,7 +153,7 @@ class Mesh:
         """Where the pitch circles touch, and the unit vector in which the link that follows moves there by its rate."""
         centre, ratio = configuration.nodes[self.axes[1]], self.ratio(configuration)
         if self.slide >= 0:
-            along = self.sense * configuration.direction(_edge_of(configuration.graph, self.slide))
+            along = self.sense * configuration.direction(configuration.graph.edge_of(self.slide))
             return centre - 1j * along * ratio, along
         driven = configuration.nodes[self.axes[0]]
         way = (driven - centre) / np.abs(driven - centre)
@@ -222,6 +222,15 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
     return wheels
 
 
+def carrier_of(description: Description, graph: Graph, wheels: Sequence[str]) -> str | None:
+    """The link that carries the axes of two wheels, at two places; None where no one does."""
+    for carrier in description.links:
+        axes = [_axis(graph, wheel, carrier) for wheel in wheels]
+        if carrier not in wheels and min(axes) >= 0 and axes[0] != axes[1]:
+            return carrier
+    return None
+
+
 def pitch_radius(mechanism: Core, coupling: str, places: Mapping[str, Value]) -> Value | None:
     """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
 
@@ -272,12 +281,12 @@ def _rack(description: Description, graph: Graph, coupling: Coupled, drawn: Conf
                 continue
             rack, senses = _along(description, graph, carrier, moved.slides)
             lines = [
-                complex(sense * drawn.direction(_edge_of(graph, slide)) / moved.slides[slide])
+                complex(sense * drawn.direction(graph.edge_of(slide)) / moved.slides[slide])
                 for slide, sense in senses.items()
             ]
             if lines and all(abs(line - lines[0]) < SAME_RATE * abs(lines[0]) for line in lines):
                 last, sense = [*senses.items()][-1]
-                edge = graph.edges[_edge_of(graph, last)]
+                edge = graph.edges[graph.edge_of(last)]
                 node = edge.head if sense > 0 else edge.tail
                 return (rack, wheel), carrier, (node, axis), first, senses[first]
     return None
@@ -313,10 +322,6 @@ def _axis(graph: Graph, wheel: str, carrier: str) -> int:
         graph.nodes.index(point) for link, point in graph.points if link == wheel and (carrier, point) in graph.points
     ]
     return nodes[0] if nodes else -1
-
-
-def _edge_of(graph: Graph, slide: int) -> int:
-    return next(k for k, edge in enumerate(graph.edges) if edge.slide == slide)
 
 
 def _rates(gap: Coordinate, configuration: Configuration) -> dict[int, Value]:

@@ -16,7 +16,6 @@ from mechdesign.errors import StudyError
 from mechdesign.exporting.exports import export_named, exports
 from mechdesign.exporting.stack import stack_of
 from mechdesign.exporting.view import View
-from mechdesign.mechanism.plates import points_of
 from tests.helpers.drawings import area, at, distance, entities, parts
 
 FOUR_BAR = """
@@ -220,7 +219,7 @@ def met(study, layers, poses):
     """Pairs that share a layer and meet at one of some poses: plates, and pins with the plates between their ends."""
     mechanism = study.mechanism
     solved = mechanism.solve({mechanism.drives[0]: poses})
-    links = {name: points_of(link) for name, link in mechanism.description.links.items()}
+    links = {name: link.all_points for name, link in mechanism.description.links.items()}
     width, found = mechanism.nominal["plates.width"], set()
     radius = {name: mechanism.nominal.get(f"{name}.width", width) / 2 for name in links}
     pins = {}

@@ -151,6 +151,22 @@ def test_a_planetary_gear_of_linkage_with_a_chain_turns_nine_times_as_fast_as_it
     assert other["link_0.angle"] - one["link_0.angle"] == pytest.approx(0, abs=1e-9)
 
 
+def test_a_scale_is_that_of_pulleys_and_moments_of_inertia_too():
+    scaled = {}
+    for scale in (1.0, 2.0):
+        text = mechdesign.convert(DATA / "orbit_gears.linkage2", scale=scale)
+        scaled[scale] = float(re.search(r"wheels: belt, radius: ([\d.]+)", text)[1])
+    assert scaled[2.0] == pytest.approx(2 * scaled[1.0])
+    heavy = OLD_FILE.replace("crank,R,1,1,", "crank,R,3,5,")
+    inertia = re.search(r"mass: 3, center: \[1, 0\], inertia: (\d+)", mechdesign.convert(text=heavy, scale=2.0))
+    assert float(inertia[1]) == 4 * 5
+
+
+def test_a_mass_without_a_centre_is_in_the_middle_of_its_points():
+    heavy = OLD_FILE.replace("crank,R,1,1,0.5,0,", "crank,R,3,1,Null,Null,")
+    assert "mass: 3, center: [0.5, 0]" in mechdesign.convert(text=heavy)
+
+
 def test_an_actuator_of_linkage_that_pulls_lifts_the_scissors():
     study = study_of(DATA / "scissors.linkage2")
     sweep = study.resolved["kinematics"]["sweep"]["link_11"]

@@ -41,7 +41,7 @@ def by_forces(*chains: LegScrews, size: int = 3) -> Held:
     """A body at the origin by the force method: every leg is one edge from the ground."""
     edges = tuple(NetworkEdge(GROUND, "body", (), f"leg {k}", "P") for k in range(len(chains)))
     loops = tuple(((k, 1), (0, -1)) for k in range(1, len(chains)))
-    network = Network(edges, "body", {GROUND: (), "body": ((0, 1),)}, loops, {})
+    network = Network(edges, "body", "body", {}, {}, (), {GROUND: (), "body": ((0, 1),)}, loops)
     freedoms = [
         (k, twist, compliance)
         for k, leg in enumerate(chains)

@@ -9,13 +9,14 @@ lines along which the pins on them move; LINK, if there is such a layer, all tha
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections import Counter
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from itertools import pairwise
+
+import numpy as np
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import GROUND, MOST, Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import GROUND, MOST, Sketch, Slide, number
 from mechdesign.importing.source import Source
 
 NAME = "DXF sketch (ASCII)"
@@ -28,16 +29,11 @@ _WORDS = ("ground", "drive", "trace", "slide")
 _READ = ("LINE", "LWPOLYLINE", "POLYLINE", "VERTEX", "SEQEND", "CIRCLE", "POINT")
 
 
-class _Place(NamedTuple):
-    x: float
-    y: float
-
-
 @dataclass
 class _Shape:
     kind: str
     layer: str
-    places: list[_Place] = field(default_factory=list)
+    places: list[complex] = field(default_factory=list)
     closed: bool = False
 
     def on(self, word: str) -> bool:
@@ -61,7 +57,7 @@ def read(source: Source) -> Sketch:
     if source.text.startswith("AutoCAD Binary DXF"):
         raise StudyError("a binary DXF: save it as ASCII")
     sketch = source.started(_TOOL)
-    shapes, others, unit = _shapes(list(_pairs(source.text)))
+    shapes, others, unit = _shapes(source.text)
     if unit is None:
         sketch.choices.append("the drawing says no unit: lengths are taken as mm")
     sketch.units = {"length": unit or "mm"}
@@ -73,43 +69,36 @@ def read(source: Source) -> Sketch:
     return sketch
 
 
-def _pairs(text: str) -> Iterator[tuple[int, str]]:
+def _entities(text: str) -> list[tuple[str, list[tuple[int, str]]]]:
+    """Each kind of an entity, with the groups of code and value that follow; a section is one, too."""
+    entities: list[tuple[str, list[tuple[int, str]]]] = []
     lines = text.splitlines()
     for index in range(0, len(lines) - 1, 2):
-        code = lines[index].strip()
+        code, value = lines[index].strip(), lines[index + 1].strip()
         if not code.lstrip("-").isdigit() or len(code) > 5:
             raise StudyError(f"line {index + 1} of the drawing is {cut(code)!r}, not the number of a group")
-        yield int(code), lines[index + 1].strip()
+        if int(code) == 0:
+            entities.append((value.upper(), []))
+        elif entities:
+            entities[-1][1].append((int(code), value))
+    return entities
 
 
-def _shapes(pairs: list[tuple[int, str]]) -> tuple[list[_Shape], dict[str, int], str | None]:
+def _shapes(text: str) -> tuple[list[_Shape], dict[str, int], str | None]:
     """Shapes of the model, how many there are of other kinds, and the unit of length."""
     shapes: list[_Shape] = []
-    others: dict[str, int] = {}
-    unit, section, kind, variable = None, "", "", ""
-    groups: list[tuple[int, str]] = []
-
-    def end() -> None:
-        if section == "ENTITIES" and kind in _READ:
+    others = Counter[str]()
+    unit, section = None, ""
+    for kind, groups in _entities(text):
+        if kind in ("SECTION", "ENDSEC"):
+            section = next((value.upper() for code, value in groups if code == 2), "")
+            for (_, name), (_, value) in pairwise(groups):
+                if section == "HEADER" and name == "$INSUNITS":
+                    unit = _UNITS.get(int(number(value, name)))
+        elif section == "ENTITIES" and kind in _READ:
             _add_shape(shapes, kind, groups)
-        elif section == "ENTITIES" and kind not in ("", "SECTION", "ENDSEC"):
-            others[kind] = others.get(kind, 0) + 1
-
-    for code, value in pairs:
-        if code == 0:
-            end()
-            kind, groups = value.upper(), []
-        elif code == 2 and kind == "SECTION" and not groups:
-            section = value.upper()
-        elif code == 9:
-            variable = value
-        elif code == 70 and variable == "$INSUNITS" and section == "HEADER":
-            unit, variable = _UNITS.get(int(number(value, "$INSUNITS"))), ""
-        else:
-            groups.append((code, value))
-        if kind == "ENDSEC":
-            section = ""
-    end()
+        elif section == "ENTITIES":
+            others[kind] += 1
     return shapes, others, unit
 
 
@@ -117,7 +106,7 @@ def _add_shape(shapes: list[_Shape], kind: str, groups: list[tuple[int, str]]) -
     layer = next((value for code, value in groups if code == 8), "").lower()
     xs = [number(value, f"x of a {kind}") for code, value in groups if code in (10, 11)]
     ys = [number(value, f"y of a {kind}") for code, value in groups if code in (20, 21)]
-    places = [_Place(x, y) for x, y in zip(xs, ys, strict=False)]
+    places = [complex(x, y) for x, y in zip(xs, ys, strict=False)]
     closed = any(code == 70 and value.isdigit() and int(value[:9]) & 1 for code, value in groups)
     if kind == "VERTEX":
         if shapes and shapes[-1].kind == "POLYLINE":
@@ -148,7 +137,7 @@ class _Drawing:
         if not [bar for bar in self.bars if not bar.on("ground")]:
             raise StudyError("the drawing has no line or polyline that could be a link")
         corners = [place for shape in shapes for place in shape.places]
-        size = max(max(p[k] for p in corners) - min(p[k] for p in corners) for k in (0, 1))
+        size = float(max(np.ptp(np.real(corners)), np.ptp(np.imag(corners))))
         self.close = _CLOSE * size or _CLOSE
 
     def add(self) -> None:
@@ -161,29 +150,29 @@ class _Drawing:
             if self._at(place) is None:
                 self._add_point(place)
         pinned = {self._at(circle.places[0]) for circle in pins}
-        groups = self._links(pinned)
-        for count, group in enumerate(groups, 1):
+        for count, group in enumerate(self._links(pinned), 1):
             self.sketch.add_link(f"link_{count}", group)
-        self._add_slides(pinned)
+        self._add_slides()
         for circle in self.circles:
             if circle.on("drive"):
-                self._add_drive(str(self._at(circle.places[0])))
+                self.sketch.drives.append(self.sketch.drive_at(str(self._at(circle.places[0]))))
         if pins:
             self.sketch.choices.append("circles are pins; lines that touch without one are one rigid link")
         else:
             self.sketch.choices.append("the drawing has no circles: common ends of lines are pins")
 
-    def _at(self, place: _Place) -> str | None:
-        return next((n for n, p in self.sketch.points.items() if math.dist((p.x, p.y), place) <= self.close), None)
+    def _at(self, place: complex) -> str | None:
+        return next((name for name, other in self.sketch.points.items() if abs(other - place) <= self.close), None)
 
-    def _add_point(self, place: _Place) -> None:
-        marks = [c for c in self.circles if math.dist(c.places[0], place) <= self.close]
-        grounds = [s for s in self.bars if s.on("ground") and any(math.dist(p, place) <= self.close for p in s.places)]
-        grounds += [c for c in marks if c.on("ground") or c.on("drive")]
-        on_guides = [g for g in self.guides if any(math.dist(p, place) <= self.close for p in g.places)]
+    def _add_point(self, place: complex) -> None:
+        marks, bars, guides = (
+            [shape for shape in shapes if any(abs(corner - place) <= self.close for corner in shape.places)]
+            for shapes in (self.circles, self.bars, self.guides)
+        )
+        fixed = bool(guides) or any(shape.on("ground") for shape in (*bars, *marks))
+        fixed |= any(mark.on("drive") for mark in marks)
         traced = any(mark.on("trace") for mark in marks)
-        name = f"P{len(self.sketch.points) + 1}"
-        self.sketch.add_point(name, *place, traced=traced, fixed=bool(grounds or on_guides))
+        self.sketch.add_point(f"P{len(self.sketch.points) + 1}", place.real, place.imag, traced=traced, fixed=fixed)
 
     def _links(self, pinned: set[str | None]) -> list[list[str]]:
         """Points of each link: bars that touch without a pin are one."""
@@ -191,33 +180,31 @@ class _Drawing:
         for bar in self.bars:
             if bar.on("ground"):
                 continue
-            inside = self._inside(bar)
-            ends = {str(self._at(place)) for place in inside or bar.places}
-            for name, point in self.sketch.points.items():
-                if (name in pinned or point.traced) and self._lies_on(bar, _Place(point.x, point.y)):
-                    ends.add(name)
+            ends = {str(self._at(place)) for place in self._inside(bar) or bar.places}
+            marked = pinned | self.sketch.traced
+            ends |= {name for name, place in self.sketch.points.items() if name in marked and self._lies_on(bar, place)}
             touching = [group for group in groups if pinned and any(end not in pinned for end in group & ends)]
             groups = [group for group in groups if group not in touching]
             groups.append(ends.union(*touching))
         order = list(self.sketch.points)
         return [sorted(group, key=order.index) for group in groups]
 
-    def _inside(self, bar: _Shape) -> list[_Place]:
+    def _inside(self, bar: _Shape) -> list[complex]:
         """Circles and points in a closed outline or on it."""
         places = [circle.places[0] for circle in self.circles] if bar.closed else []
         return [place for place in places if self._lies_on(bar, place) or _encloses(bar.places, place)]
 
-    def _lies_on(self, bar: _Shape, place: _Place) -> bool:
+    def _lies_on(self, bar: _Shape, place: complex) -> bool:
         ends = bar.places[1:] + (bar.places[:1] if bar.closed else [])
         return any(_distance(a, b, place) <= self.close for a, b in zip(bar.places, ends, strict=False))
 
-    def _add_slides(self, pinned: set[str | None]) -> None:
+    def _add_slides(self) -> None:
         for count, guide in enumerate(self.guides, 1):
             ends = [str(self._at(place)) for place in guide.places[:2]]
             riders = [
-                name for name, point in self.sketch.points.items()
-                if name not in self.sketch.fixed and self.sketch.links_at(name)
-                and _distance(guide.places[0], guide.places[1], _Place(point.x, point.y)) <= self.close
+                name for name, place in self.sketch.points.items()
+                if name not in self.sketch.fixed and self.sketch.links_with(name)
+                and _distance(guide.places[0], guide.places[1], place) <= self.close
             ]  # fmt: skip
             for name in riders:
                 label = f"slide_{count}" if len(riders) == 1 else f"slide_{count}_{name}"
@@ -225,25 +212,19 @@ class _Drawing:
             if not riders:
                 self.sketch.omitted.append(f"the guide from {ends[0]!r} to {ends[1]!r}, on which no pin lies")
 
-    def _add_drive(self, name: str) -> None:
-        links = self.sketch.moving_at(name)
-        if len(links) != 1:
-            raise StudyError(f"the pin {name!r} on the layer of drives belongs to {len(links)} links, not one")
-        self.sketch.drives.append(Drive("angle", links[0]))
 
-
-def _encloses(corners: list[_Place], place: _Place) -> bool:
+def _encloses(corners: list[complex], place: complex) -> bool:
     """Whether an outline goes round a place: a ray from there crosses it an odd number of times."""
     crossed = False
     for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-        if (a.y > place.y) != (b.y > place.y):
-            crossed ^= place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
+        if (a.imag > place.imag) != (b.imag > place.imag):
+            crossed ^= place.real < (a + (place.imag - a.imag) / (b.imag - a.imag) * (b - a)).real
     return crossed
 
 
-def _distance(a: _Place, b: _Place, place: _Place) -> float:
+def _distance(a: complex, b: complex, place: complex) -> float:
     """Distance of a place from a line segment."""
-    along, to = complex(b.x - a.x, b.y - a.y), complex(place.x - a.x, place.y - a.y)
+    along, to = b - a, place - a
     if not along:
         return abs(to)
     share = min(1.0, max(0.0, (to * along.conjugate()).real / abs(along) ** 2))

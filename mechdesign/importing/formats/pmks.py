@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from urllib.parse import unquote
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.names import clean
+from mechdesign.importing.names import clean, distinct
 from mechdesign.importing.sketch import GROUND, Drive, Force, Link, Sketch, Slide, number
 from mechdesign.importing.source import Source
 
@@ -31,7 +32,7 @@ _UNITS = {
 # First characters of links that no other link contains.
 _WHOLE, _PARTS = "YAMG0123", "Namg4567"
 _NEWER = "pmks2:"
-# The speed of a driven slide that the address does not say, in units of length per second.
+# Speed of a driven slide where the address gives none, in units of length per second.
 _LINEAR = 5.0
 
 
@@ -111,6 +112,9 @@ class _Record:
     def decimal(self) -> float:
         return _whole(self.text()) / 1000
 
+    def place(self) -> complex:
+        return complex(self.decimal(), self.decimal())
+
     def has(self, bit: int) -> bool:
         return bool(_whole(self.flags, signed=False) >> bit & 1)
 
@@ -144,7 +148,7 @@ def _read_encoded(sketch: Sketch, query: str) -> None:
         if record.flags[:1] not in tuple(_WHOLE + _PARTS):
             raise StudyError(f"the address has a link of the kind {cut(record.flags[:1])!r}, which is not known")
         name, title = record.text(), record.text()
-        link = Link([], mass=record.decimal(), inertia=record.decimal(), center=(record.decimal(), record.decimal()))
+        link = Link([], mass=record.decimal(), inertia=record.decimal(), center=record.place())
         record.text()
         fields = record.rest()
         link.points = fields[: fields.index("")] if "" in fields else fields
@@ -152,7 +156,7 @@ def _read_encoded(sketch: Sketch, query: str) -> None:
             table.link(name, title, link, block=record.flags[1:] == "P")
     for record in forces:
         name, of, _ = record.text(), record.text(), record.text()
-        start, end = (record.decimal(), record.decimal()), (record.decimal(), record.decimal())
+        start, end = record.place(), record.place()
         table.force(name, of, start, end, record.decimal(), local=record.has(0), outward=record.has(1))
     sketch.gravity = not flags >> 8 & 1
     table.finish(turns, slide)
@@ -166,13 +170,12 @@ def _read_encoded(sketch: Sketch, query: str) -> None:
 
 def _tables_of_query(query: str) -> tuple[list[list[str]], list[list[str]], list[list[str]], list[str]]:
     """Rows of joints, links and forces, and the settings."""
-    parts, key = {"j": "", "l": "", "f": "", "s": ""}, "j"
-    for index, part in enumerate(query.split("&")):
-        if part[:2] in ("j=", "l=", "f=", "s="):
-            key, part = part[0], part[2:]
-        parts[key] += part if index == 0 or not parts[key] else f"&{part}"
-    rows = [[line.split(",") for line in parts[key].split("\n") if line.strip()] for key in "jlf"]
-    return rows[0], rows[1], rows[2], parts["s"].strip().split(",")
+    _, *parts = re.split("(?:^|&)([jlfs])=", query)
+    texts = dict(zip(parts[::2], parts[1::2], strict=True))
+    joints, links, forces = (
+        [line.split(",") for line in texts.get(key, "").split("\n") if line.strip()] for key in "jlf"
+    )
+    return joints, links, forces, texts.get("s", "").strip().split(",")
 
 
 def _tables_of_file(text: str) -> tuple[list[list[str]], list[list[str]], list[list[str]], list[str]]:
@@ -197,8 +200,8 @@ def _read_tables(
     unit = settings[3].strip() if len(settings) > 3 else ""
     _use_units(sketch, units.get(unit, units["cm"]))
     if unit not in units:
-        said = f"the unit {cut(repr(unit))} is not known" if unit else "the file says no unit"
-        sketch.choices.append(f"{said}: lengths are taken as cm, the unit that PMKS+ begins with")
+        reason = f"the unit {cut(repr(unit))} is not known" if unit else "the file says no unit"
+        sketch.choices.append(f"{reason}: lengths are taken as cm, the unit that PMKS+ begins with")
     table = _Joints(sketch)
     for row in joints:
         _check_length(row, 8, "joint")
@@ -210,13 +213,13 @@ def _read_tables(
         mass, inertia, x, y = (
             None if cell == "Null" else number(cell, f"mass of link {row[0]!r}") for cell in row[2:6]
         )  # fmt: skip
-        center = None if x is None or y is None else (x, y)
+        center = None if x is None or y is None else complex(x, y)
         link = Link([name for name in row[6].split("|") if name], mass=mass, inertia=inertia, center=center)
         table.link(row[0], row[0], link, block=row[1] == "P")
     for row in forces:
         _check_length(row, 9, "force")
         x, y, u, v, size = (number(cell, f"force {row[0]!r}") for cell in (*row[2:6], row[8]))
-        table.force(row[0], row[1], (x, y), (u, v), size, local=not _yes(row[6]), outward=_yes(row[7]))
+        table.force(row[0], row[1], complex(x, y), complex(u, v), size, local=not _yes(row[6]), outward=_yes(row[7]))
     sketch.gravity = len(settings) > 2 and _yes(settings[2])
     turns = number(settings[0], "the input's speed") if settings and settings[0] else 0.0
     clockwise = len(settings) > 1 and _yes(settings[1])
@@ -278,43 +281,37 @@ class _Joints:
         new.mass, new.inertia, new.center = link.mass, link.inertia, link.center
 
     def force(
-        self, name: str, link: str, start: tuple[float, float], end: tuple[float, float], size: float, *,
-        local: bool, outward: bool,
-    ) -> None:  # fmt: skip
+        self, name: str, link: str, start: complex, end: complex, size: float, *, local: bool, outward: bool
+    ) -> None:
         """Add a force along its arrow, out of the link or into it."""
         if link not in self._titles:
             self.sketch.omitted.append(f"force {name!r}, which acts on {link!r}, no link")
             return
-        length = math.hypot(end[0] - start[0], end[1] - start[1])
-        if not length:
+        if start == end:
             self.sketch.omitted.append(f"force {name!r}, which has no direction")
             return
-        factor = size / length * (1 if outward else -1)
-        vector = factor * (end[0] - start[0]), factor * (end[1] - start[1])
+        vector = (size if outward else -size) / abs(end - start) * (end - start)
         self.sketch.forces.append(Force(name, self._titles[link], start, vector, local))
 
     def finish(self, turns: float, slide: float) -> None:
         """Make slides of the blocks, and drives of the inputs, at these speeds unless a joint has its own."""
         sketch = self.sketch
-        sketch.welds += [tuple(sketch.links_at(name)) for name in self._welded]
+        sketch.welds += [tuple(sketch.links_with(name)) for name in self._welded]
         slides = {name: self._add_slide(name) for name in self._sliding}
         for name, speed in self._driven.items():
             if name in slides:
                 sketch.drives.append(Drive("slide", slides[name], speed=speed or slide))
                 continue
-            links = sketch.moving_at(name)
-            if name in sketch.fixed:
-                links.insert(0, GROUND)
+            links = sketch.turned_at(name)
             if len(links) < 2:
                 raise StudyError(f"the input at joint {name!r} moves no link")
             if len(links) > 2:
                 text = f"the input at {name!r} turns {links[1]!r} from {links[0]!r}, of {len(links)} links"
                 sketch.choices.append(text)
             sketch.drives.append(Drive("angle", links[1], links[0], speed or turns))
-        sketch.dynamic = bool(sketch.forces)
-        if not sketch.dynamic and any(link.mass not in (None, 0.0, 1.0) for link in sketch.links.values()):
-            sketch.dynamic = True
-        if not sketch.dynamic and sketch.links:
+        weighed = any(link.mass not in (None, 0.0, 1.0) for link in sketch.links.values())
+        sketch.dynamic = bool(sketch.forces) or weighed
+        if not sketch.dynamic:
             sketch.omitted.append("masses: those that PMKS+ gives every new link, and no force acts")
 
     def _add_slide(self, name: str) -> str:
@@ -331,11 +328,9 @@ class _Joints:
         if guide == GROUND and pin == name:
             # The line is fixed, and the joint on it is not.
             through = (clean(f"{name}_line"),)
-            sketch.add_point(through[0], sketch.points[name].x, sketch.points[name].y, fixed=True)
+            sketch.add_point(through[0], sketch.points[name].real, sketch.points[name].imag, fixed=True)
             sketch.fixed = [point for point in sketch.fixed if point != name]
-        riders = tuple(sketch.links_at(pin)) if pin in self._welded else ()
-        slide = clean(f"{pin}_slide")
-        while slide in sketch.slides:
-            slide += "_"
+        riders = tuple(sketch.links_with(pin)) if pin in self._welded else ()
+        slide = distinct(clean(f"{pin}_slide"), sketch.slides.__contains__)
         sketch.slides[slide] = Slide(pin, guide, through, angle, riders)
         return slide

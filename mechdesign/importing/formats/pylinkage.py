@@ -7,13 +7,13 @@ the line of two. Lengths have no unit, speeds are angles a step [HugoFara/pylink
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import Drive, Sketch, mapping, number
 from mechdesign.importing.source import Source
 
 NAME = "pylinkage (JSON)"
@@ -43,18 +43,12 @@ def read(source: Source) -> Sketch:
     sketch.name = data["name"] if isinstance(data.get("name"), str) and data["name"] else sketch.name
     sketch.units = {"length": "dimensionless"}
     sketch.choices.append("a step of pylinkage is taken as a second")
-    joints = [_mapping(joint, "joint") for joint in data["joints"]]
+    joints = [mapping(joint, "joint") for joint in data["joints"]]
     if any(joint.get("type") in _OLD for joint in joints):
         _read_linkage(sketch, joints)
     else:
-        _read_mechanism(sketch, joints, [_mapping(link, "link") for link in _list(data.get("links", []), "links")])
+        _read_mechanism(sketch, joints, [mapping(link, "link") for link in _list(data.get("links", []), "links")])
     return sketch
-
-
-def _mapping(raw: Any, noun: str) -> Mapping[str, Any]:
-    if not isinstance(raw, dict):
-        raise StudyError(f"a {noun} is {cut(repr(raw))}, not a mapping")
-    return raw
 
 
 def _list(raw: Any, key: str) -> list[Any]:
@@ -69,21 +63,21 @@ def _name(raw: Any, noun: str) -> str:
     return raw
 
 
-def _pair(raw: Any, meaning: str) -> tuple[float, float]:
+def _place(raw: Any, meaning: str) -> complex:
     if not isinstance(raw, list) or len(raw) != 2:
         raise StudyError(f"{cut(meaning)} is {cut(repr(raw))}, not [x, y]")
-    return number(raw[0], meaning), number(raw[1], meaning)
+    return complex(number(raw[0], meaning), number(raw[1], meaning))
 
 
-def _read_mechanism(sketch: Sketch, joints: list[Mapping[str, Any]], links: list[Mapping[str, Any]]) -> None:
+def _read_mechanism(sketch: Sketch, joints: list[dict[str, Any]], links: list[dict[str, Any]]) -> None:
     trackers, prismatic = [], []
     for joint in joints:
         name, kind = _name(joint.get("id"), "joint"), joint.get("type", "revolute")
         if kind == "tracker":
             trackers.append(joint)
             continue
-        place = _pair(joint.get("position"), f"the position of joint {name!r}")
-        sketch.add_point(name, *place, fixed=kind == "ground")
+        place = _place(joint.get("position"), f"the position of joint {name!r}")
+        sketch.add_point(name, place.real, place.imag, fixed=kind == "ground")
         if kind == "prismatic":
             prismatic.append(joint)
         elif kind not in _NEW:
@@ -92,16 +86,13 @@ def _read_mechanism(sketch: Sketch, joints: list[Mapping[str, Any]], links: list
         _add_link(sketch, link)
     for joint in prismatic:
         name = joint["id"]
-        x, y = _pair(joint.get("axis", [1, 0]), f"the axis of {name!r}")
-        through = _pair(joint.get("line_point", [0, 0]), f"the line of {name!r}")
-        line = clean(f"{name}_line")
-        sketch.add_point(line, *through, fixed=True)
-        sketch.slides[clean(f"{name}_slide")] = Slide(name, GROUND, (line,), math.atan2(y, x))
+        along = _place(joint.get("axis", [1, 0]), f"the axis of {name!r}")
+        sketch.add_line(name, _place(joint.get("line_point", [0, 0]), f"the line of {name!r}"), cmath.phase(along))
     for joint in trackers:
         _add_tracker(sketch, joint)
 
 
-def _add_link(sketch: Sketch, link: Mapping[str, Any]) -> None:
+def _add_link(sketch: Sketch, link: dict[str, Any]) -> None:
     name, kind = _name(link.get("id"), "link"), link.get("type", "link")
     points = [_name(joint, "joint") for joint in _list(link.get("joints", []), f"the joints of {name!r}")]
     motor = link.get("motor_joint")
@@ -119,27 +110,21 @@ def _add_link(sketch: Sketch, link: Mapping[str, Any]) -> None:
     sketch.drives.append(Drive("angle", name, speed=speed, span=span))
 
 
-def _add_tracker(sketch: Sketch, joint: Mapping[str, Any]) -> None:
+def _add_tracker(sketch: Sketch, joint: dict[str, Any]) -> None:
     """A point at a distance and an angle from two joints of a link."""
-    name, one, other = joint["id"], joint.get("ref_joint1_id"), joint.get("ref_joint2_id")
-    owner = next((link for link in sketch.links.values() if one in link.points and other in link.points), None)
-    if owner is None:
+    name, one, other = joint["id"], str(joint.get("ref_joint1_id")), str(joint.get("ref_joint2_id"))
+    links = sketch.links_with(one, other)
+    if not links:
         sketch.omitted.append(f"the traced point {name!r}, whose two joints are on no common link")
         return
-    place = _placed(sketch, str(one), str(other), joint.get("distance", 0), joint.get("angle", 0), str(name))
-    sketch.add_point(name, *place, traced=True)
-    owner.points.append(name)
-
-
-def _placed(sketch: Sketch, one: str, other: str, distance: Any, angle: Any, name: str) -> tuple[float, float]:
-    """The place at a distance from the first point, at an angle from the direction to the other."""
     a, b = sketch.points[one], sketch.points[other]
-    turn = math.atan2(b.y - a.y, b.x - a.x) + number(angle, f"the angle of {name!r}")
-    away = number(distance, f"the distance of {name!r}")
-    return a.x + away * math.cos(turn), a.y + away * math.sin(turn)
+    turn = cmath.phase(b - a) + number(joint.get("angle", 0), f"the angle of {name!r}")
+    place = a + cmath.rect(number(joint.get("distance", 0), f"the distance of {name!r}"), turn)
+    sketch.add_point(name, place.real, place.imag, traced=True)
+    sketch.links[links[0]].points.append(name)
 
 
-def _read_linkage(sketch: Sketch, joints: list[Mapping[str, Any]]) -> None:
+def _read_linkage(sketch: Sketch, joints: list[dict[str, Any]]) -> None:
     for joint in joints:
         _add_joint(sketch, joint)
     for joint in joints:
@@ -156,12 +141,12 @@ def _read_linkage(sketch: Sketch, joints: list[Mapping[str, Any]]) -> None:
                 sketch.add_link(clean(f"{name}_rod_{count + 1}"), [end, name])
         elif kind in ("Prismatic", "Linear") and len(ends) == 3:
             sketch.add_link(clean(f"{name}_rod"), [ends[0], name])
-            sketch.slides[clean(f"{name}_slide")] = Slide(name, _guide(sketch, ends[1], ends[2]), (ends[1], ends[2]))
+            sketch.add_track(name, ends[1:])
         elif kind != "Static":
             raise StudyError(f"joint {name!r} of the kind {cut(repr(kind))} names {len(ends)} others")
 
 
-def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> None:
+def _add_joint(sketch: Sketch, joint: dict[str, Any]) -> None:
     """A joint, and those without a name of their own by which it is placed."""
     name = _name(joint.get("name"), "joint")
     sketch.add_point(name, joint.get("x"), joint.get("y"), fixed=joint.get("type") == "Static")
@@ -171,22 +156,13 @@ def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> None:
             sketch.add_point(_inline(end), end.get("x"), end.get("y"), fixed=True)
 
 
-def _inline(end: Mapping[str, Any]) -> str:
+def _inline(end: dict[str, Any]) -> str:
     return str(end.get("name") or f"{end.get('x')}, {end.get('y')}")
 
 
 def _end(sketch: Sketch, raw: Any) -> str:
-    end = _mapping(raw, "reference to a joint")
+    end = mapping(raw, "reference to a joint")
     name = _inline(end) if end.get("inline") else str(end.get("ref"))
     if name not in sketch.points:
         raise StudyError(f"a joint names the joint {cut(name)!r}, which the file does not have")
     return name
-
-
-def _guide(sketch: Sketch, one: str, other: str) -> str:
-    if {one, other} <= {*sketch.fixed}:
-        return GROUND
-    links = [name for name, link in sketch.links.items() if one in link.points and other in link.points]
-    if not links:
-        raise StudyError(f"a joint slides on the line of {one!r} and {other!r}, which are on no common link")
-    return links[0]

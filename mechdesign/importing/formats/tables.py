@@ -15,8 +15,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide, number
+from mechdesign.importing.sketch import Sketch, mapping, number
 from mechdesign.importing.source import JOINTS, LINKS, Source
 
 NAME = "joints.csv and links.csv, or both as JSON"
@@ -46,8 +45,8 @@ def read(source: Source) -> Sketch:
     else:
         joints, links = source.data["joints"], source.data["links"]
         sketch.units = {"length": str(source.data.get("units", "mm"))}
-    driven = [name for name in (_add_joint(sketch, _row(joint, "joint")) for joint in joints) if name]
-    for link in (_row(raw, "link") for raw in links):
+    driven = [drive for joint in joints for drive in _add_joint(sketch, mapping(joint, "joint"))]
+    for link in (mapping(raw, "link") for raw in links):
         given = link.get("joints", "")
         points = given if isinstance(given, list) else [part for part in _BETWEEN.split(str(given)) if part]
         if str(link.get("name", "")).lower() == "ground":
@@ -56,8 +55,7 @@ def read(source: Source) -> Sketch:
             sketch.add_link(str(link.get("name", "")), map(str, points))
         if unknown := [key for key in link if key not in ("name", "joints")]:
             sketch.omitted.append(f"{', '.join(map(repr, unknown))} of link {link['name']!r}")
-    for name, speed in driven:
-        _add_drive(sketch, name, speed)
+    sketch.drives = [sketch.drive_at(*drive) for drive in driven]
     return sketch
 
 
@@ -74,12 +72,6 @@ def _rows(text: str, name: str) -> Iterator[dict[str, str]]:
         raise StudyError(f"{name} cannot be read as CSV: {error}") from None
 
 
-def _row(raw: Any, noun: str) -> Mapping[str, Any]:
-    if not isinstance(raw, dict):
-        raise StudyError(f"a {noun} is {cut(repr(raw))}, not a mapping")
-    return raw
-
-
 def _yes(raw: Any, meaning: str) -> bool:
     word = "" if raw is None else str(raw).strip().lower()
     if word not in (*_YES, *_NO, "1", "0"):
@@ -87,8 +79,8 @@ def _yes(raw: Any, meaning: str) -> bool:
     return word in (*_YES, "1")
 
 
-def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> tuple[str, float | None] | None:
-    """Add a joint; of a driven one its name and speed are returned."""
+def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> Iterator[tuple[str, float | None]]:
+    """Add a joint; yields name and speed of a driven one."""
     name = str(joint.get("name", ""))
     fixed = _yes(joint.get("ground"), f"ground of joint {name!r}")
     traced = _yes(joint.get("trace"), f"trace of joint {name!r}")
@@ -97,25 +89,7 @@ def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> tuple[str, float | N
         sketch.omitted.append(f"{', '.join(map(repr, unknown))} of joint {name!r}")
     slide = joint.get("slide")
     if slide not in (None, ""):
-        line = clean(f"{name}_line")
-        sketch.add_point(line, joint.get("x"), joint.get("y"), fixed=True)
-        angle = math.radians(number(slide, f"slide of joint {name!r}"))
-        sketch.slides[clean(f"{name}_slide")] = Slide(name, GROUND, (line,), angle)
+        sketch.add_line(name, sketch.points[name], math.radians(number(slide, f"slide of joint {name!r}")))
     drive = "" if joint.get("drive") is None else str(joint["drive"]).strip().lower().removesuffix("rpm").strip()
-    if drive in _NO:
-        return None
-    return name, None if drive in _YES else number(drive, f"drive of joint {name!r}") * math.pi / 30 or None
-
-
-def _add_drive(sketch: Sketch, name: str, speed: float | None) -> None:
-    links = sketch.moving_at(name)
-    slide = clean(f"{name}_slide")
-    if slide in sketch.slides:
-        sketch.drives.append(Drive("slide", slide))
-        return
-    if name in sketch.fixed:
-        links.insert(0, GROUND)
-    if len(links) != 2:
-        message = f"the drive at joint {name!r} turns one link against another, or against the ground"
-        raise StudyError(f"{message}; there {len(links)} are joined")
-    sketch.drives.append(Drive("angle", links[1], links[0], speed))
+    if drive not in _NO:
+        yield name, None if drive in _YES else number(drive, f"drive of joint {name!r}") * math.pi / 30 or None

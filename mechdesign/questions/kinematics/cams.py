@@ -21,6 +21,8 @@ from mechdesign.study.poses import Poses
 
 # Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.
 SLIDING, TURNING = 30.0, 45.0
+# Corners of a law that a warning names.
+MOST_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,18 +31,9 @@ class Profile:
 
     cam: Cam
     side: str
-    coordinates: Mapping[str, Floats]  # that which is followed, and the one that follows, by name
-    x: Floats
-    y: Floats
-    pressure_angle: Floats
-    radius: Floats
-    face: Floats
-    roller: Floats
-
-    @property
-    def undercut(self) -> Flags:
-        """Where the roller, or a flat face, cuts away what it has touched before."""
-        return self.cam.undercuts(self.radius, self.roller)
+    coordinates: Mapping[str, Floats]  # of the cam and of its follower, by name
+    columns: Mapping[str, Floats]  # the other numbers of the table, by the name of their column
+    undercut: Flags  # where the roller or the flat face cuts into the profile
 
     def caution(self, study: Study, design: int, kind: str, where: Flags, text: str) -> Iterator[Caution]:
         """A warning where some places of a design's profile are concerned."""
@@ -72,11 +65,13 @@ def profiles(study: Study, poses: Poses) -> list[Profile]:
         for side in cam.sides:
             touch = cam.touch(configuration, side)
             place = cam.local(configuration, touch.place)
-            columns = (
-                place, -1j * place, touch.pressure_angle / study.units.angle_factor, touch.radius, touch.face,
-                cam.roller(configuration),
-            )  # fmt: skip
-            sides.append(Profile(cam, side, coordinates, *map(whole, columns)))
+            numbers: dict[str, ArrayLike] = {
+                "x": place, "y": -1j * place, "pressure_angle": touch.pressure_angle / study.units.angle_factor,
+                "curvature_radius": touch.radius, "face": touch.face,
+            }  # fmt: skip
+            columns = {name: whole(values) for name, values in numbers.items()}
+            undercut = cam.undercuts(columns["curvature_radius"], cam.roller(configuration))
+            sides.append(Profile(cam, side, coordinates, columns, undercut))
     return sides
 
 
@@ -85,14 +80,11 @@ def cam_table(study: Study, sides: Sequence[Profile]) -> Table:
     coordinates = {c.name: c for side in sides for c in (side.cam.followed, side.cam.follower)}
 
     def column(values: Callable[[Profile], ArrayLike]) -> NDArray[Any]:
-        return np.concatenate([np.broadcast_to(values(side), side.x.shape) for side in sides], axis=1).ravel()
+        columns = [np.broadcast_to(values(side), side.undercut.shape) for side in sides]
+        return np.concatenate(columns, axis=1).ravel()
 
     words = {"coupling": column(lambda side: side.cam.coupling), "side": column(lambda side: side.side)}
-    numbers = {
-        "x": column(lambda side: side.x), "y": column(lambda side: side.y),
-        "pressure_angle": column(lambda side: side.pressure_angle),
-        "curvature_radius": column(lambda side: side.radius), "face": column(lambda side: side.face),
-    }  # fmt: skip
+    numbers = {name: column(lambda side, own=name: side.columns[own]) for name in sides[0].columns}  # type: ignore[misc]
     labels, followed = study.units.labels, []
     for name, coordinate in coordinates.items():
         values = column(lambda side, own=name: side.coordinates.get(own, np.nan))  # type: ignore[misc]
@@ -104,9 +96,9 @@ def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Ca
     """Warnings of the cams of a design."""
     angle, turn = study.units.label("angle"), study.units.angle_factor
     for side in sides:
-        cam, pressure = side.cam, np.abs(side.pressure_angle[design])
+        cam, pressure = side.cam, np.abs(side.columns["pressure_angle"][design])
         limit = np.radians(SLIDING if cam.follower.quantity == "length" else TURNING) / turn
-        lost, steep = np.isnan(side.x[design]), pressure > limit
+        lost, steep = np.isnan(side.columns["x"][design]), pressure > limit
         yield from side.caution(study, design, "unassembled", lost, "the profile cannot be assembled")
         cure = "a larger base circle helps" if cam.flat else "a larger base circle helps, or a smaller roller"
         text = f"the profile is undercut, and the follower leaves its law; {cure}"
@@ -117,6 +109,11 @@ def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Ca
                 "jam; a larger base circle or another offset helps"
             )
             yield from side.caution(study, design, "cam", steep, text)
+        rows = np.rint((cam.corners - cam.values[0]) / np.diff(cam.values[:2])).astype(int)
+        corner = np.isin(np.arange(cam.given.steps + 1), rows)
+        values = ", ".join(f"{value:.6g}" for value in side.coordinates[cam.followed.name][design][corner][:MOST_NAMED])
+        text = f"the profile is broken, as the law of the follower has a corner ({values})"
+        yield from side.caution(study, design, "cam", corner, text)
         if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN):
-            end = np.arange(side.x.shape[1]) == cam.given.steps
+            end = np.arange(cam.given.steps + 1) == cam.given.steps
             yield from side.caution(study, design, "cam", end, "the profile does not close after a turn")

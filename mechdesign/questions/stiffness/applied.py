@@ -27,10 +27,10 @@ Density = Callable[[Complexes], Vector]
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """A force (n,) at a place (n,), and a moment about it, of the load number `case`."""
+    """A force at a place, and a moment about it, in n poses or alike in all, of the load number `case`."""
 
     case: int
-    place: Complexes
+    place: Vector
     force: Vector
     moment: Value = 0.0
 
@@ -71,9 +71,9 @@ class Applied:
         for node, force in enumerate(forces.nodes):
             if np.any(force):
                 vertex = self.network.pins.get(graph.nodes[node], GROUND)
-                self.vertices.append((vertex, Wrench(case, self._all(nodes[node]), force)))
+                self.vertices.append((vertex, Wrench(case, nodes[node], force)))
         for body, force, moment, arm in forces.parts:
-            self._on_body(body, Wrench(case, self._all(nodes[forces.bases[body]] + arm), force, moment))
+            self._on_body(body, Wrench(case, nodes[forces.bases[body]] + arm, force, moment))
 
     def spread(self, case: int, link: str, density: Density) -> None:
         """Add a force per length, linear along each beam of an elastic link, to a load."""
@@ -113,7 +113,7 @@ class Applied:
             self.vertices.append((body if body in self.network.paths else min(own), wrench))
             return
         self.vertices.append((edge.a, wrench))
-        self.lumps.setdefault(link, []).append((self._line(link).foot("", wrench.place), wrench))
+        self.lumps.setdefault(link, []).append((self._line(link).foot("", self._all(wrench.place)), wrench))
 
     def _line(self, link: str) -> BeamLine:
         beam = self.beams[link].beam

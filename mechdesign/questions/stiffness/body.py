@@ -84,7 +84,7 @@ class Body:
     def loads(self) -> Floats:
         """Loads on the asked point (fx, fy, mz) in each pose, shape (poses, loads, 3), 0 of loads elsewhere.
 
-        They are of a single pose where all poses have the same.
+        The first axis is 1 where the loads are the same in all poses.
         """
         wrenches = [wrench or (0.0, 0.0, 0.0) for wrench in self.section.wrenches]
         parts = np.broadcast_arrays(*(part for wrench in wrenches for part in wrench))
@@ -203,8 +203,9 @@ def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[com
     for _, wrench in _applied(body, configuration).vertices if body.others else ():
         k = body.others[wrench.case]
         if k < len(body.given.loads):
-            fx, fy, mz = wrench.about(wrench.place)[:, 0].tolist()
-            forces.setdefault(k, []).append((complex(wrench.place[0]), complex(fx, fy), mz))
+            place = np.broadcast_to(np.asarray(wrench.place, dtype=complex), configuration.shape)
+            fx, fy, mz = wrench.about(place)[:, 0].tolist()
+            forces.setdefault(k, []).append((complex(place[0]), complex(fx, fy), mz))
     return forces
 
 

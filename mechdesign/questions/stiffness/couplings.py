@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Wrench, borne
@@ -95,25 +95,21 @@ def _wrenches(
 ) -> Iterator[tuple[str, Wrench]]:
     """Wrenches on vertices by an effort on the gap of a coupling."""
     pair = transmission.engagement
-
-    def at(place: Vector, force: Vector, moment: Value = 0.0) -> Wrench:
-        return Wrench(case, np.broadcast_to(np.asarray(place, dtype=complex), configuration.shape), force, moment)
-
     if pair is not None:
         follower, driving = transmission.seats[pair.coupling]
         for way in (1.0, -1.0):
             push = pair.press(configuration, effort * (1 + way * side) / 2, way)
-            yield follower, at(push.place, push.force)
-            yield driving, at(push.place, -1.0 * push.force)
+            yield follower, Wrench(case, push.place, push.force)
+            yield driving, Wrench(case, push.place, -1.0 * push.force)
         return
     for part, share in shares(configuration, transmission.coupling.gap, effort):
         seats = transmission.seats[part.name]
         for seat, (node, force) in zip(seats, node_forces(configuration, part, share), strict=False):
-            yield seat, at(configuration.nodes[node], force)
+            yield seat, Wrench(case, configuration.nodes[node], force)
         for seat, sign in zip(seats, (1.0, -1.0), strict=False):
             if part.kind == "angle":
-                yield seat, at(0.0, 0.0, sign * share)
+                yield seat, Wrench(case, 0.0, 0.0, sign * share)
             elif part.kind == "slide":
                 head = next(edge.head for edge in configuration.graph.edges if edge.slide == part.slide)
                 along = slide_direction(part.slide, configuration)
-                yield seat, at(configuration.nodes[head], sign * share * along)
+                yield seat, Wrench(case, configuration.nodes[head], sign * share * along)

@@ -240,8 +240,7 @@ def _bearing_freedoms(
 
 def slide_direction(slide: int, configuration: Configuration) -> Complexes:
     """Unit vector of a slide of the graph in each pose, shape (n,)."""
-    k = next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == slide)
-    direction = configuration.direction(k)
+    direction = configuration.direction(configuration.graph.edge_of(slide))
     return np.broadcast_to(np.asarray(direction, dtype=complex), configuration.shape)
 
 

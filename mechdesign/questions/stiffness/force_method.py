@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,9 +37,28 @@ from mechdesign.questions.stiffness.screws import RANK, RIGID
 SELF_STRESS = 1e-13
 # So are those with less than this fraction (rounding squared) of the largest energy that loop wrenches could store.
 STORED = 1e-26
-# Of a freedom: the edges that have it (1 or 0), its twist, its compliance, and what loads on beams put on it and strain
-# it by.
-_Row = tuple[Floats, Floats, Value | None, Floats | None, Floats | None]
+
+
+class _Freedom(NamedTuple):
+    """A freedom of a network in n poses.
+
+    Attributes
+    ----------
+    within : ndarray, shape (edges, n or 1)
+        1 for the edges that have it, else 0.
+    twist : ndarray, shape (3, n)
+        Its twist.
+    compliance : float or ndarray, shape (n,), or None
+        None of a free joint.
+    acting, strain : ndarray, shape (n, cases), or 0
+        Effort on it and strain of it by loads on beams.
+    """
+
+    within: Floats
+    twist: Floats
+    compliance: Value | None
+    acting: Floats | float = 0.0
+    strain: Floats | float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +229,8 @@ def twists_of(
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
-    rows: list[_Row] = [
-        (np.eye(len(network.edges))[k][:, None], *freedom, None, None)
+    rows = [
+        _Freedom(np.eye(len(network.edges))[k][:, None], *freedom)
         for k, edge in enumerate(network.edges) if not edge.beam
         for freedom in freedoms(edge.elements, section, configuration, origin)
     ]  # fmt: skip
@@ -218,20 +238,19 @@ def twists_of(
         rows += _beam_freedoms(network, edges, section, configuration, origin, applied)
     giving = [compliance_of(coupling, section, configuration, length) for coupling in network.transmissions]
     first = len(rows)
-    rows += [(np.zeros((len(network.edges), 1)), np.zeros((3, 1)), soft, None, None)
-             for soft in giving if soft is not None]  # fmt: skip
+    nowhere = np.zeros((len(network.edges), 1)), np.zeros((3, 1))
+    rows += [_Freedom(*nowhere, soft) for soft in giving if soft is not None]
     twist = np.zeros((n, 3, len(rows)))
     compliance = np.zeros((n, len(rows)))
-    within = np.zeros((max((over.shape[1] for over, *_ in rows), default=1), len(network.edges), len(rows)))
-    for j, (over, allowed, soft, *_) in enumerate(rows):
-        within[:, :, j] = over.T
-        twist[:, :, j] = np.broadcast_to(allowed, (3, n)).T
-        if soft is not None:
-            compliance[:, j] = soft
+    within = np.zeros((max((row.within.shape[1] for row in rows), default=1), len(network.edges), len(rows)))
+    for j, row in enumerate(rows):
+        within[:, :, j] = row.within.T
+        twist[:, :, j] = np.broadcast_to(row.twist, (3, n)).T
+        compliance[:, j] = 0.0 if row.compliance is None else row.compliance
 
     def put_on(through: Floats) -> Floats:
-        every = np.broadcast_to(within, (n, *within.shape[1:]))
-        return np.asarray(np.einsum("nej,neic,nij->njc", every, through, twist))
+        parts = np.broadcast_to(within, (n, *within.shape[1:]))
+        return np.asarray(np.einsum("nej,neic,nij->njc", parts, through, twist))
 
     elsewhere = couplings = None
     if network.transmissions:
@@ -243,25 +262,22 @@ def twists_of(
         through = borne(network, applied.vertices, applied.cases, origin)
         acting = put_on(through)
         initial = np.zeros(acting.shape)
-        for j, (*_, own, strain) in enumerate(rows):
-            if own is not None and strain is not None:
-                acting[:, j] += own
-                initial[:, j] = strain
+        for j, row in enumerate(rows):
+            acting[:, j] += row.acting
+            initial[:, j] = row.strain
         elsewhere = Elsewhere(through, acting, initial)
     twist[:, 2] *= np.reshape(length, (-1, 1))
-    free = np.array([soft is None for _, _, soft, *_ in rows], dtype=bool)
+    free = np.array([row.compliance is None for row in rows], dtype=bool)
     return Twists(network, twist, compliance, free, within, at - origin, length, elsewhere, couplings)
 
 
 def _beam_freedoms(
     network: Network, edges: Sequence[int], section: StiffnessSection, configuration: Configuration,
     origin: Complexes, applied: Applied | None,
-) -> Iterator[_Row]:  # fmt: skip
+) -> Iterator[_Freedom]:  # fmt: skip
     """Freedoms of the beams of one link, cut wherever something is attached.
 
-    Yields of each freedom the edges that run over its part of the beams (1 or 0), shape (edges, n) or (edges, 1), its
-    twist and its compliance, and what loads on the beams above it put on it and strain it by, shape (n, cases). As
-    slides change their order along the beams, parts are sorted in each pose.
+    As slides change their order along the beams, the parts of the beams are sorted in each pose.
     """
     beams = [beam for k in edges if (beam := network.edges[k].beam)]
     line, profile = beam_line(beams[0].link, configuration), section.sections[beams[0].section]
@@ -275,7 +291,7 @@ def _beam_freedoms(
         for piece in line.between(low, high):
             three = list(piece_freedoms(piece, profile, origin))
             if applied is None:
-                yield from ((over, *freedom, None, None) for freedom in three)
+                yield from (_Freedom(over, *freedom) for freedom in three)
                 continue
             own, strain = np.zeros((2, 3, len(piece.length), applied.cases))
             ways = piece.along, 1j * piece.along
@@ -286,7 +302,7 @@ def _beam_freedoms(
                 for j, way in enumerate(ways):
                     strain[j, :, case] += np.real(at_middle * np.conj(way))
                 strain[2, :, case] += twist[2]
-            yield from ((over, *freedom, own[j], strain[j]) for j, freedom in enumerate(three))
+            yield from (_Freedom(over, *freedom, own[j], strain[j]) for j, freedom in enumerate(three))
 
 
 def load(twists: Twists, size: int) -> Loaded:

@@ -77,7 +77,7 @@ class Transmission:
     seats: Mapping[str, tuple[str, ...]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bodies:
     """Bodies of a mechanism and the edges and couplings that connect them.
 
@@ -98,7 +98,7 @@ class Bodies:
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str]
-    transmissions: tuple[Transmission, ...] = ()
+    transmissions: tuple[Transmission, ...]
 
     @cached_property
     def carrying(self) -> list[NetworkEdge]:
@@ -145,8 +145,8 @@ def build_bodies(
         if ":" not in point:
             holders.setdefault(point, []).append(body)
     for name, leg in description.links.items():
-        if leg.telescopic and leg.ends is not None:
-            builder.slide(name, name, rod_of(name), leg.ends[1], base=leg.ends[0])
+        if leg.tip is not None:
+            builder.slide(name, name, rod_of(name), leg.tip, base=leg.corners[0])
     clamps = []
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
@@ -324,8 +324,8 @@ class _Builder:
             if name == GROUND:
                 continue
             vertices = [(point, self._node(name, point)) for point in link.points]
-            if link.telescopic and link.ends is not None:
-                vertices.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
+            if link.tip is not None:
+                vertices.append((link.tip, self._node(rod_of(name), link.tip)))
             points[name] = tuple(vertices)
         return points
 
@@ -349,8 +349,7 @@ class _Builder:
     def _vertex(self, body: str, point: str) -> str:
         """The vertex of a body at a joint; that of a telescopic leg's rod is at its end."""
         link = self.mechanism.description.links.get(link_of(body))
-        end = link.ends[1] if link is not None and link.telescopic and link.ends is not None else point
-        return self._node(body, end)
+        return self._node(body, point if link is None or link.tip is None else link.tip)
 
     def _drive_between(self, first: list[str], second: list[str]) -> str | None:
         """The drive of the angle between two clusters of bodies; None if there is none."""
@@ -377,8 +376,8 @@ def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]])
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
-    """Vertices, edges and loops that carry the `target` body.
+class Network(Bodies):
+    """Bodies with the paths and loops of the edges that carry the `target` body.
 
     Parameters
     ----------
@@ -386,19 +385,10 @@ class Network:
         The path from the ground to each vertex.
     loops : tuple of EdgePath
         The edges around each loop.
-    points : mapping of str to tuple of (str, str)
-        Points of each moving link, with the vertices to which they belong.
-    pins : mapping of str to str
-        By point, the vertex on which a force at its pin acts.
     """
 
-    edges: tuple[NetworkEdge, ...]
-    target: str
     paths: Mapping[str, EdgePath]
     loops: tuple[EdgePath, ...]
-    points: Mapping[str, tuple[tuple[str, str], ...]]
-    pins: Mapping[str, str] = field(default_factory=dict)
-    transmissions: tuple[Transmission, ...] = ()
 
     @cached_property
     def pressing(self) -> list[bool]:
@@ -500,4 +490,5 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
                 for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
-    return Network(edges, bodies.target, paths, tuple(loops), bodies.points, bodies.pins, bodies.transmissions)
+    given = bodies.target, bodies.link, bodies.points, bodies.pins, bodies.transmissions
+    return Network(edges, *given, paths, tuple(loops))

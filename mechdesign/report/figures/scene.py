@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism import Mechanism, plates
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description, Fixed, Link, Slot, Spring
+from mechdesign.mechanism.model import Description, Fixed, Slot, Spring
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.poses import Shown, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
@@ -115,7 +115,7 @@ class Scene:
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
-        return link_points(self.description.links[name])
+        return self.description.links[name].all_points
 
     def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
         """Points, wheels, cams, and ends of the guides for a range of each slide (see `Guide.ends`)."""
@@ -164,11 +164,6 @@ class Scene:
         return {point for spring in springs if not spring.turning for point in spring_points(spring)}
 
 
-def link_points(link: Link) -> tuple[str, ...]:
-    """Names of a link's points, its ends first; those of a telescopic leg include its tip."""
-    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
-
-
 def spring_points(spring: Spring) -> tuple[str, str]:
     """Names of the two points between which a spring is, without those of links."""
     one, other = (end.rpartition(".")[2] for end in spring.between)
@@ -182,18 +177,17 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     def pick(values: Vector) -> complex:
         return complex(np.broadcast_to(values, configuration.shape).flat[index])
 
-    names = {point for link in description.links.values() for point in link_points(link)}
+    names = {point for link in description.links.values() for point in link.all_points}
     points = {name: pick(configuration.point(name)) for name in sorted(names)}
     rotations = {name: pick(configuration.rotation(name)) for name in description.links}
     if not all(map(cmath.isfinite, (*points.values(), *rotations.values()))):
         return None
 
     graph, guides = mechanism.graph, []
-    edges = {edge.slide: k for k, edge in enumerate(graph.edges)}
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
             continue
-        k = edges[graph.slides.index(name)]
+        k = graph.edge_of(graph.slides.index(name))
         origin = pick(configuration.nodes[graph.edges[k].tail])
         along = pick(configuration.direction(k))
         slider = None if isinstance(joint, Slot) else joint.slider
@@ -208,14 +202,15 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         sides = [mesh.strand(configuration, side) for side in (1.0, -1.0) if mesh.belt]
         strands = [(pick(begin), pick(end)) for begin, end, _ in sides]
         wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, tuple(strands)))
-    cams = tuple(_cam_pair(cam, configuration, pick) for cam in mechanism.cams)
+    cams = tuple(_cam_pair(mechanism, cam, configuration, pick) for cam in mechanism.cams)
     return Scene(description, points, rotations, tuple(guides), span, tuple(wheels), cams)
 
 
-def _cam_pair(cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]) -> CamPair:
+def _cam_pair(
+    mechanism: Mechanism, cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]
+) -> CamPair:
     """A cam and its follower in the pose that `pick` takes."""
-    turn, base = pick(configuration.body_rotation(cam.links[1])), pick(configuration.nodes[cam.base])
-    start = base - turn * pick(cam.local(configuration, configuration.nodes[cam.base]))
+    start, turn = (pick(value) for value in mechanism.frame(cam.links[1], configuration))
     few = [outline[np.isfinite(outline)] for outline in cam.outlines]
     few = [outline[evenly(len(outline), _OUTLINE)] for outline in few]
     profiles = tuple(tuple((start + turn * outline).tolist()) for outline in few)
@@ -239,25 +234,8 @@ def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
 
 
 def hull(places: Sequence[complex]) -> list[complex]:
-    """Corners of the convex hull, counter-clockwise; two where the places lie on one line."""
-    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
-    if len(ordered) < 3:
-        return ordered
-    width = max(abs(place - ordered[0]) for place in ordered)
-
-    def half(sequence: Sequence[complex]) -> list[complex]:
-        chain: list[complex] = []
-        for place in sequence:
-            while len(chain) > 1 and _area(chain[-2], chain[-1], place) <= 1e-3 * width**2:
-                chain.pop()
-            chain.append(place)
-        return chain[:-1]
-
-    return half(ordered) + half(ordered[::-1])
-
-
-def _area(a: complex, b: complex, c: complex) -> float:
-    return ((b - a).conjugate() * (c - a)).imag
+    """Corners of the convex hull, counter-clockwise, as pictures show it; two where the places lie on one line."""
+    return plates.hull(places, 1e-3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +260,7 @@ class Sweep(Shown):
     @cached_property
     def places(self) -> dict[str, Complexes]:
         """Path of every moving point, nan where a pose is not valid."""
-        still = link_points(self.mechanism.description.links[GROUND])
+        still = self.mechanism.description.links[GROUND].all_points
         valid = self.configuration.valid
         return {
             point: np.where(valid, self.configuration.point(point), complex(np.nan, np.nan))
@@ -335,7 +313,7 @@ class Sweep(Shown):
     def extent(self) -> Complexes:
         """Everything the motion reaches: points, their paths and the ends of guides."""
         mechanism, configuration = self.mechanism, self.configuration
-        ground = [configuration.point(point)[:1] for point in link_points(mechanism.description.links[GROUND])]
+        ground = [configuration.point(point)[:1] for point in mechanism.description.links[GROUND].all_points]
         reached = [np.empty(0, dtype=complex), *ground, *self.traces.values()]
         for index in self.valid[[0, -1]] if len(self.valid) else ():
             scene = pose(mechanism, configuration, int(index))
@@ -373,15 +351,15 @@ def ranks(study: Study) -> dict[str, int]:
     """
     mechanism, section = study.mechanism, study.kinematics
     links = mechanism.description.links
-    ground = set(link_points(links[GROUND]))
-    uses = Counter(point for link in links.values() for point in link_points(link))
+    ground = set(links[GROUND].all_points)
+    uses = Counter(point for link in links.values() for point in link.all_points)
     simple = {
         joint.point
         for joint in mechanism.description.joints.values()
         if not isinstance(joint, Fixed) and joint.line.link == GROUND
     }
     for name, link in links.items():
-        points = link_points(link)
+        points = link.all_points
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
     outputs = {name.split(".")[0] for name in (section and section.outputs) or ()}

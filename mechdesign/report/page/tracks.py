@@ -14,7 +14,6 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Link
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.scene import link_points
 from mechdesign.report.page.linkage import Sheet
 from mechdesign.results import Column, Table
 
@@ -219,7 +218,7 @@ def places(sheet: Sheet, configuration: Configuration, links: Mapping[str, Link]
     valid = configuration.valid
     tracks: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
                              "x": {}, "y": {}, "turn": {}}  # fmt: skip
-    for point in dict.fromkeys(point for link in links.values() for point in link_points(link)):
+    for point in dict.fromkeys(point for link in links.values() for point in link.all_points):
         at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
         tracks["x"][point], tracks["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
     for name in links:

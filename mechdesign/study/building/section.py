@@ -335,7 +335,7 @@ class Cam(fields.Model):
     """First and last value of the coordinate that is followed, of the profile. Left out: the range of the ``table``, of
     an angle a turn from 0. Example: [0, 120]
     """
-    steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    steps: Annotated[int, fields.whole(8, 100_000)] = 360
     """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
 
     @model_validator(mode="after")
@@ -366,7 +366,9 @@ class Coupling(fields.Model):
     Example: planet.angle
     """
     to: fields.Bound | None = None
-    """Expression of coordinates and parameters, in the study's units. Example: -2.5*sun.angle + 3.5*arm.angle"""
+    """Expression of coordinates and parameters, in the study's units; the name of a link, joint or leg stands for its
+    coordinate. Example: -2.5*sun + 3.5*arm
+    """
     of: fields.CoordinateName | None = None
     """Coordinate that is followed, of a ``ratio`` or a ``table``. Example: sun.angle"""
     ratio: fields.AnyPlace | None = None
@@ -547,8 +549,8 @@ class MechanismSection(fields.Model):
     {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
     """
     plates: Plates | None = None
-    """Links as plates: widths, pins and layers, for `mechdesign export` and ``kinematics.collisions``. Example: {width:
-    20 mm, thickness: 5 mm, pin: 6 mm, links: {coupler: {width: 12 mm, layer: 2}}}
+    """Links as plates: widths and pins, for `mechdesign export` and ``kinematics.collisions``. Example: {width: 20 mm,
+    thickness: 5 mm, pin: 6 mm}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""

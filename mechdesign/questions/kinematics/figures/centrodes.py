@@ -16,7 +16,7 @@ from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
 from mechdesign.report.figures.panels import legend_at_left
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep, link_points
+from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Table
 
 MOST_PAIRS = 4
@@ -103,7 +103,7 @@ def centrodes(sweep: Sweep, table: Table) -> list[Centrodes]:
 
 def _frame(sweep: Sweep, link: str) -> tuple[Complexes, Complexes]:
     """A point of a link and the unit vector of its x axis at the poses."""
-    (first, *_) = link_points(sweep.mechanism.description.links[link])
+    (first, *_) = sweep.mechanism.description.links[link].all_points
     return sweep.configuration.point(first), sweep.configuration.rotation(link)
 
 

@@ -25,7 +25,7 @@ from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep, link_points, ranks
+from mechdesign.report.figures.scene import Sweep, ranks
 from mechdesign.report.figures.shapes import Color, darker, lighter, link_colors
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -224,7 +224,7 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     lift = 2 - max(ranked.values(), default=2)
     owners: dict[str, str] = {}
     for name, link in sweep.mechanism.description.links.items():
-        for point in link_points(link) if name != GROUND else ():
+        for point in link.all_points if name != GROUND else ():
             owners.setdefault(point, name)
     looks, shaded = [], Counter[str]()
     for point, path in sweep.traces.items():
@@ -241,8 +241,8 @@ def _path_names(sweep: Sweep) -> list[Label]:
     """Names of bold paths of which a link has several, each where it is far from the place of the point itself."""
     looks = [look for look in path_looks(sweep) if look.width == _LOOKS[2][0]]
     links = [link for name, link in sweep.mechanism.description.links.items() if name != GROUND]
-    several = {point for link in links if sum(look.point in link_points(link) for look in looks) > 1
-               for point in link_points(link)}  # fmt: skip
+    several = {point for link in links if sum(look.point in link.all_points for look in looks) > 1
+               for point in link.all_points}  # fmt: skip
     labels = []
     for look in looks:
         far = np.nan_to_num(np.abs(look.path - look.path[np.isfinite(look.path)][0]))

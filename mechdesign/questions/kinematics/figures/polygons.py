@@ -19,7 +19,7 @@ from mechdesign.report.figures.framing import LEFT, fit
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import fitting, legend_at_left
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import hull, link_points
+from mechdesign.report.figures.scene import hull
 from mechdesign.report.figures.shapes import link_colors
 
 MOST_POSES = 3
@@ -73,8 +73,8 @@ def polygons_figure(view: MotionView) -> Figure | None:
 def images(view: MotionView, special: SpecialPose, order: int) -> Mapping[str, dict[str, complex]]:
     """The rates of every link's points at a pose by link and point, where it has two or more; the ground's are zero."""
     links, rates = view.study.mechanism.description.links, rates_of(special, order)
-    still = dict.fromkeys(link_points(links[GROUND]), 0j)
-    own = {name: {point: complex((rates | still)[point]) for point in link_points(link)}
+    still = dict.fromkeys(links[GROUND].all_points, 0j)
+    own = {name: {point: complex((rates | still)[point]) for point in link.all_points}
            for name, link in links.items() if name != GROUND}  # fmt: skip
     return {name: points for name, points in own.items() if len(points) > 1}
 
