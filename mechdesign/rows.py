@@ -310,6 +310,8 @@ def _present(values: NDArray[Any], stated: object) -> str:
     """The values of a column in words: all of them, or of many numbers the smallest, the largest and the nearest."""
     number = values.dtype.kind in "fiub"
     present = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
+    if not number and (longer := [name for name in present if str(name).startswith(f"{stated}_")]):
+        return f"did you mean {' or '.join(map(repr, longer[:MOST_VALUES]))}?"
     if not number and (close := nearest(str(stated), present)):
         return f"did you mean {close!r}?"
     if number and len(present) > MOST_VALUES and isinstance(stated, (int, float)):

@@ -24,7 +24,7 @@ from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import FORMATS, owned, settle
 from mechdesign.progress import Progress
-from mechdesign.questions.look import LONG
+from mechdesign.questions.look import is_long
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.cases import best_of, telling_columns
 from mechdesign.report.figures.before import Before
@@ -150,9 +150,9 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         return kept
     elif merging:
         # A mistake in the study explains the missing shards.
-        requirements.foresee(study, [command] if command in LONG else [])
+        requirements.foresee(study, [command] if is_long(study, command) else [])
         raise shards.missing(directory)
-    if command in LONG:
+    if is_long(study, command):
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
     journal = _journal(study, command, directory, options) if command in RESUMED else None
@@ -200,7 +200,7 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
         return Outcome(study.label, command, directory, 0, 0, kept=True, shard=sentence)
-    if command in LONG:
+    if is_long(study, command):
         requirements.foresee(study, [command])
     taken = shards.Taken(shard)
     try:
@@ -293,7 +293,7 @@ def _judged_and_written(
     try:
         verdicts = requirements.requirements(study, result)
     except StudyError:
-        if result.command in LONG:
+        if is_long(study, result.command):
             # A requirement that names a missing row must not lose a long computation.
             writer.write(directory, study, result, (), output)
         raise

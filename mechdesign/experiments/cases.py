@@ -13,7 +13,7 @@ from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.numerics.arrays import Ints
-from mechdesign.questions.look import look
+from mechdesign.questions.look import look, with_fewer_rows
 from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
@@ -130,7 +130,7 @@ def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
                 except UnknownColumnError as error:
                     problems.append(study.problem(str(error), *number.keys))
         try:
-            requirements.requirements(study, result, whole=command != "optimize")
+            requirements.requirements(study, result, fewer=with_fewer_rows(result))
         except StudyError as error:
             problems += error.problems
     if problems:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from importlib import import_module
 
 from mechdesign.commands import COMMANDS
@@ -15,8 +16,8 @@ from mechdesign.work.chunks import here
 DESIGNS = 10
 SAMPLES = 2
 LOOSE = Precision.model_construct(relative=100.0, half_width=None)
-# Commands whose answer costs much more than a look at it.
-LONG = ("optimize", "reliability")
+# Part of the duration of a motion in time that a look at it takes.
+INSTANT = 1e-6
 
 
 def ask(study: Study, command: str) -> Result:
@@ -25,8 +26,21 @@ def ask(study: Study, command: str) -> Result:
     return result
 
 
+def is_long(study: Study, command: str) -> bool:
+    """Whether a command's answer costs much more than a look at it."""
+    in_time = study.dynamics is not None and study.dynamics.forward is not None
+    return command in ("optimize", "reliability") or (command == "dynamics" and in_time)
+
+
+def with_fewer_rows(result: Result) -> Collection[str]:
+    """Tables of which a look may have fewer rows than the full answer: those of designs, and of a motion in time."""
+    if result.command == "optimize":
+        return result.tables
+    return result.tables.keys() - {"extremes"} if "forward" in result.tables else ()
+
+
 def look(study: Study, command: str) -> Result:
-    """A command's answer with as few samples and designs as there may be.
+    """A command's answer with as few samples and designs as there may be, and of a motion in time an instant.
 
     Raises
     ------
@@ -40,5 +54,10 @@ def look(study: Study, command: str) -> Result:
     if optimize is not None:
         method = "search" if optimize.method == "grid" else optimize.method
         optimize = optimize.model_copy(update={"method": method, "evaluations": DESIGNS, "subject_to": ()})
+    dynamics = study.dynamics
+    if dynamics is not None and dynamics.forward is not None:
+        moment = {"duration": INSTANT * float(dynamics.forward.duration), "rows": 2}
+        dynamics = dynamics.model_copy(update={"forward": dynamics.forward.model_copy(update=moment)})
     with here():
-        return ask(dataclasses.replace(study, reliability=reliability, optimize=optimize), command)
+        few_study = dataclasses.replace(study, reliability=reliability, optimize=optimize, dynamics=dynamics)
+        return ask(few_study, command)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -117,7 +117,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     StudyError
         Every such mistake in one go, with its place.
     """
-    from mechdesign.questions.look import look
+    from mechdesign.questions.look import look, with_fewer_rows
 
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
@@ -133,8 +133,8 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
             judged.discard("optimize")
     for command in [name for name in commands if name in judged]:
         try:
-            # With so few designs rows may be missing that the full set has.
-            requirements(study, look(study, command), whole=command != "optimize")
+            glance = look(study, command)
+            requirements(study, glance, fewer=with_fewer_rows(glance))
         except AssemblyError:
             # Its own computation reports it.
             continue
@@ -145,7 +145,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
 
 
 @few_comparisons()
-def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
+def requirements(study: Study, result: Result, *, fewer: Collection[str] = ()) -> tuple[Verdict, ...]:
     """Verdicts on those requirements of a study that concern a result, in the order of the study; then on its warnings.
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; along a motion the worst place
@@ -159,8 +159,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
         With the requirements.
     result : Result
         Of one question.
-    whole : bool
-        Whether the result has all its rows; if not, rows that are missing are no mistake.
+    fewer : collection of str
+        Tables that have not all their rows: one that is missing there is no mistake.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
         if command_of(requirement) != result.command:
             continue
         try:
-            verdicts.append(judge(result, requirement, study.mechanism.mobility, whole=whole))
+            verdicts.append(judge(result, requirement, study.mechanism.mobility, fewer=fewer))
         except UnknownColumnError as error:
             problems.append(study.problem(str(error), "requirements", index))
     if problems:
@@ -196,7 +196,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     return (*verdicts, *on_warnings(study, result.warnings))
 
 
-def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: bool = True) -> Verdict:
+def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: Collection[str] = ()) -> Verdict:
     """The verdict on one requirement; `freedom` is how many numbers make a pose, see `requirements`.
 
     Raises
@@ -229,7 +229,7 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         # Between two rows.
         worst = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
         return _over_motion(worst, chosen, requirement)
-    if worst is None and whole and (missing := choose(result, path, requirement.where).missing):
+    if worst is None and table.name not in fewer and (missing := choose(result, path, requirement.where).missing):
         raise UnknownColumnError(missing)
     if worst is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")

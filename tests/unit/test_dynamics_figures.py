@@ -38,6 +38,25 @@ dynamics:
   loads: [{at: P, force: [0, -100]}, {link: rocker, moment: 500}, {between: [A, D], force: 7}]
 """
 
+# A belt along the arm drives the fore; a controller turns the hand against the arm.
+HELD = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    arm: {from: O, to: A, length: 210, mass: 2}
+    fore: [A, P, 130]
+    hand: [P, T, 40]
+    motor: [O, M, 20]
+  drives: {one: {angle: arm}, two: {angle: motor}}
+  couplings:
+    belt: {set: fore, of: motor, ratio: 1, phase: 60, wheels: belt, radius: 18}
+    hold: {set: hand, to: 0.5*arm.angle - fore.angle}
+  sketch: {A: [200, 60], P: [180, 190], T: [220, 190], M: [10, 15]}
+dynamics:
+  sweep: {one: {from: 0, to: 100, step: 10}, two: {from: 120, to: 140, step: 10}}
+  loads: [{at: T, force: [5, -20]}]
+"""
+
 
 @cache
 def answered(text: str) -> tuple[mechdesign.Study, mechdesign.Answer]:
@@ -57,7 +76,7 @@ def drawn(study: mechdesign.Study) -> dict[str, object]:
     return dict(gallery)
 
 
-@pytest.mark.parametrize("text", [SPRUNG, "flywheel_press", "excavator_lift", "twin_cylinder"])
+@pytest.mark.parametrize("text", [SPRUNG, HELD, "flywheel_press", "excavator_lift", "twin_cylinder"])
 def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
     study, result = answered(text)
     record = DrawnForces.of(result)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from helpers.studies import study_of
 
 from mechdesign.errors import MechdesignError
+from mechdesign.questions.dynamics import motion_in_time
 from mechdesign.questions.dynamics.analysis import dynamics
 
 ARM = """
@@ -39,7 +41,9 @@ def ask(forward: str = "", more: str = "", mass: str = ", mass: 1", limits: str 
         ({"more": "rates: {arm: 3}, "}, "'forward' and 'rates' are both given"),
         ({"more": "modes: true, "}, "'forward' and 'modes' are both given"),
         ({"mass": ""}, "no inertia"),
-        ({"limits": "limits: [{drive: arm, min: 10, max: 50}]", "forward": "start: {arm: 0}"}, "limit"),
+        ({"forward": "efforts: {arm: 'log(time)'}"}, "ended early: the effort of arm is not finite at 0 s"),
+        ({"limits": "limits: [{drive: arm, min: 10, max: 50}]", "forward": "start: {arm: 0}"},
+         "limit; arm is 0 deg, beyond limits.0"),
         (
             {"limits": "limits: [{drive: arm, min: -5, max: 50}]", "forward": "start: {arm_velocity: -300}"},
             "ended: limit limits.0 is reached at 0.016",
@@ -65,3 +69,13 @@ dynamics: {forward: {duration: 1, start: {s: 3}}}
 """
     with pytest.raises(MechdesignError, match="singular pose"):
         dynamics(study_of(text))
+
+
+def test_a_motion_that_ends_early_has_its_rows_up_to_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_in_time, "MAX_STEPS", 5)
+    text = ARM.format(forward="start: {arm_velocity: 300}", more="gravity: [0, -9.81], ", mass=", mass: 1", limits="")
+    result = dynamics(study_of(text.replace("duration: 0.1, rows: 3", "duration: 1e9, rows: 11")))
+    times = result.tables["forward"]["time"]
+    np.testing.assert_allclose(times, np.linspace(0.0, times[-1], 11))
+    assert 0 < times[-1] < 10
+    assert "ended early: 5 steps are not enough" in str(result.warnings[0])

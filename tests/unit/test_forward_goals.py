@@ -6,6 +6,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.errors import MechdesignError
+from mechdesign.report.requirements import foresee
 
 BLOCK = """
 units: {length: m, force: N}
@@ -30,3 +32,12 @@ optimize:
 def test_a_number_of_a_motion_in_time_is_a_goal(goal: str, best: float) -> None:
     kept = mechdesign.optimize(study_of(BLOCK, f"optimize.minimize=[{goal}]")).main
     assert kept[kept.names[2]][0] == pytest.approx(best, rel=1e-9, abs=1e-12)
+
+
+def test_a_row_that_extremes_never_have_is_said_before_the_motion_is_computed() -> None:
+    late = "{result: dynamics.forward.s_velocity, where: {time: {at_least: 1}}, at_most: 1}"
+    study = study_of(
+        BLOCK, f"requirements=[{{result: dynamics.extremes.peak, where: {{output: s}}, at_most: 1}}, {late}]"
+    )
+    with pytest.raises(MechdesignError, match="no row of extremes has output s; did you mean 's_effort' or 's_power'"):
+        foresee(study, ["dynamics"])

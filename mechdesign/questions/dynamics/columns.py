@@ -17,10 +17,11 @@ DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies 
     ("kinetic_energy", "energy of the motion", "moment", "sum of m v^2/2 + J omega^2/2"),
     ("potential_energy", "energy of weights, 0 at the origin, and of springs, 0 at their free lengths", "moment",
      "-sum of m g x + sum of k s^2/2 + preload s"), *EFFICIENCY, VALID)  # fmt: skip
-JOINT_FORCES = TableKind.of("joint_forces", "what the joints bear, a row a pose and joint",
-    TIMED, DRIVE, GIVEN, ("joint", "point or joint"),
+JOINT_FORCES = TableKind.of("joint_forces", "what joints and couplings without wheels bear, a row a pose and each",
+    TIMED, DRIVE, GIVEN, ("joint", "point, joint or coupling"),
     ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
-    ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies"),
+    ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies; of a "
+     "coupling without wheels, whose moment is that of a controller or a hidden gear, the coupling itself"),
     ("fx, fy", "force on the one by the other, axes of the world", "force"),
     ("moment", "moment likewise, about the joint's point; nan where equilibrium leaves it open", "moment"),
     ("magnitude", "size of the force", "force"), ("angle", "its direction from the world's x axis", "angle"),

@@ -12,6 +12,7 @@ from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.statics import PIN, Contact
+from mechdesign.mechanism.wheels import Mesh
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.motion import Motion
@@ -25,7 +26,8 @@ from mechdesign.study import Study
 class Acting:
     """A force (x + iy) at a place and a moment about it in n poses, on a link or on the pin of several ('').
 
-    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring`` or ``effort``, its `name` that of what acts.
+    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring``, ``effort`` or ``coupling``, its `name` that
+    of what acts.
     What a joint does to its second body is a `reaction` to what it does to its first.
     """
 
@@ -91,6 +93,9 @@ class _Poses:
         yield from self._loads()
         yield from self._springs()
         yield from self._efforts()
+        for coupling, body in self.question.turned:
+            moment = self.motion.arrays[f"{coupling}_moment_on_{body}.moment"][self.rows]
+            yield self._acting("coupling", coupling, _link(body), self._base(body), 0j, moment)
 
     def _acting(
         self, kind: str, name: str, link: str, place: Vector, force: Vector = 0j, moment: Vector = 0.0,
@@ -104,10 +109,17 @@ class _Poses:
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
             place, sides = contact.place(self.configuration), _sides(contact)
+            if contact.engaged is not None:
+                place = self.motion.arrays[f"{name}.x"][self.rows] + 1j * self.motion.arrays[f"{name}.y"][self.rows]
             if sides[0] != sides[1]:
-                for side, sign in zip(sides, (1, -1), strict=True):
+                for k, (side, sign) in enumerate(zip(sides, (1, -1), strict=True)):
                     force = sign * (x + 1j * y)
-                    yield self._acting("joint", contact.joint, side, place, force, sign * moment, reaction=sign < 0)
+                    pair, at = contact.engaged, place
+                    if isinstance(pair, Mesh) and pair.belt:
+                        # Where the belt leaves this wheel: nearest to its axis.
+                        way = force / np.where(force == 0, 1.0, np.abs(force))
+                        at = place + way * ((self.configuration.nodes[pair.nodes[k]] - place) * np.conj(way)).real
+                    yield self._acting("joint", contact.joint, side, at, force, sign * moment, reaction=sign < 0)
 
     def _masses(self) -> Iterator[Acting]:
         geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section, self.rows)

@@ -15,16 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, quiet
-from mechdesign.mechanism.charts import Atlas, Positions, regularity
+from mechdesign.mechanism.charts import Atlas, Chart, Positions, regularity
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Bound
@@ -36,18 +35,21 @@ from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.collocation import Piece, Solver
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.poses import radians
+from mechdesign.questions.poses import in_study_units, radians
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import VELOCITY
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
+# Friction has corners where what a joint bears changes its side: with it steps may err so many times more.
 RELATIVE, ABSOLUTE = 1e-11, 1e-12
-MAX_STEPS = 20_000
+ROUGHER = 100.0
+MAX_STEPS = 3000
 MAX_BOUNCES = 1000
 # Another chart takes over where its coordinates move so many times faster.
 FASTER = 3.0
@@ -57,7 +59,7 @@ MEETING = 0.02
 AROUND = 0.03 * np.array([-10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
 NEAREST = 8
 # Places within a step at which limits and crossings are looked at.
-LOOKED_AT = np.array([0.25, 0.5, 0.75, 1.0])
+LOOKED_AT = np.arange(1, 17) / 16
 # A velocity below this part of the usual one is rest.
 REST = 1e-6
 # Where friction is, members that move against each other less than this part of the usual velocity rest; those that
@@ -105,6 +107,16 @@ class Watch(NamedTuple):
     def stops(self) -> bool:
         """Whether it ends a step."""
         return self.limit is not None or self.contact is not None
+
+
+class Stretch(NamedTuple):
+    """The motion in a step up to an end, with the chart, the pose, and the signs of the contacts that it has there."""
+
+    piece: Piece
+    end: float
+    chart: Chart
+    last: Configuration
+    signs: Floats
 
 
 @dataclass
@@ -178,7 +190,8 @@ class EquationsOfMotion:
             speeds.append(float(radians(study, drive, given.get(f"{name}{VELOCITY}", 0.0))))
         pose = mechanism.forward.solve(values)
         if not pose.valid:
-            raise AssemblyError(f"the start of dynamics.forward: {Reason(int(pose.reason)).text}")
+            reason = Reason(int(pose.reason))
+            raise AssemblyError(f"the start of dynamics.forward: {reason.text}{self._beyond_limits(pose)}")
         linear = mechanism.linearize(pose)
         if regularity_of_drives(linear) < STALLED:
             raise AssemblyError(
@@ -186,6 +199,17 @@ class EquationsOfMotion:
                 "mechanism moves; start beside it"
             )
         return pose, linear, np.array(speeds)
+
+    def _beyond_limits(self, pose: Configuration) -> str:
+        """Limits that a pose is beyond, with the values there."""
+        study, mechanism, places = self.study, self.study.mechanism, self.study.mechanism.nominal
+        parts = []
+        for bound in mechanism.bounds:
+            labels = [label for label, margin in bound.margins(pose, places) if float(margin) < 0]
+            value = in_study_units(study, bound.coordinate, pose.value(bound.coordinate))
+            unit = f" {study.units.label(bound.coordinate.quantity)}".rstrip()
+            parts += [f"; {bound.coordinate.name} is {float(value):.6g}{unit}, beyond {label}" for label in labels]
+        return "".join(parts)
 
     @quiet
     def slopes(self, linear: Linearization) -> Floats:
@@ -196,27 +220,25 @@ class EquationsOfMotion:
     def rates(self, times: Floats, x: Floats, velocity: Floats) -> Rates:
         """Rates at poses near to `x`, shape (m, poses), with its and `velocity`'s independent parts."""
         rates, regular = self._rates(times, x, velocity)
-        for k in np.flatnonzero(~(regular >= MEETING)):
-            beside = self._between(times[k], x[:, k], velocity[:, k])
+        if len(meeting := np.flatnonzero(~(regular >= MEETING))):
+            beside = self._between(times[meeting], x[:, meeting], velocity[:, meeting])
             for part, values in zip(rates, beside, strict=True):
-                part[..., k] = values
+                part[..., meeting] = values
         return rates
 
-    def _between(self, time: float, x: Floats, velocity: Floats) -> list[Floats]:
-        """Rates at a pose where two assemblies meet, from poses before and behind."""
-        speed = np.max(np.abs(velocity) / self.positions.scales)
-        steps = AROUND / speed if speed > 0 else np.full(len(AROUND), np.nan)
-        around = x[:, None] + velocity[:, None] * steps
+    def _between(self, times: Floats, x: Floats, velocity: Floats) -> list[Floats]:
+        """Rates at poses where two assemblies meet, from poses before and behind each."""
+        speeds = np.max(np.abs(velocity) / self.positions.scales[:, None], axis=0)
+        steps = AROUND / np.where(speeds > 0, speeds, np.nan)[:, None]
+        around = x[..., None] + velocity[..., None] * steps
+        shape = steps.shape
         rates, regular = self._rates(
-            np.full(len(steps), time), around, np.repeat(velocity[:, None], len(steps), axis=1)
-        )
-        good = np.flatnonzero(regular >= MEETING / 2)
-        good = good[np.argsort(np.abs(AROUND[good]), kind="stable")[:NEAREST]]
-        if len(good) < NEAREST:
-            return [np.full(part.shape[:-1], np.nan) for part in rates]
-        places = AROUND[good]
-        weights = [np.prod([b / (b - a) for b in np.delete(places, k)]) for k, a in enumerate(places)]
-        return [part[..., good] @ np.array(weights) for part in rates]
+            np.repeat(times, len(AROUND)), around.reshape(len(x), -1),
+            np.repeat(velocity, len(AROUND), axis=1),
+        )  # fmt: skip
+        weights = np.array([_weights(row) for row in regular.reshape(shape) >= MEETING / 2])
+        return [np.sum(np.where(weights == 0, 0.0, part.reshape(*part.shape[:-1], *shape)) * weights, axis=-1)
+                for part in rates]  # fmt: skip
 
     @quiet
     def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[Rates, Floats]:
@@ -293,6 +315,17 @@ class EquationsOfMotion:
         return table[:, 1:] - table[:, :1], linear
 
 
+def _weights(regular: Flags) -> Floats:
+    """Weights of the poses `AROUND` one in what the polynomial through the nearest regular ones is there."""
+    good = np.flatnonzero(regular)
+    good = good[np.argsort(np.abs(AROUND[good]), kind="stable")[:NEAREST]]
+    if len(good) < NEAREST:
+        return np.full(len(AROUND), np.nan)
+    places, weights = AROUND[good], np.zeros(len(AROUND))
+    weights[good] = [np.prod([b / (b - a) for b in np.delete(places, k)]) for k, a in enumerate(places)]
+    return weights
+
+
 def _beyond(coordinate: Coordinate, value: Value, pose: Configuration, _: Floats) -> Value:
     """By how much a coordinate is beyond a value."""
     return pose.value(coordinate) - value
@@ -318,7 +351,8 @@ class Integration:
         equations.signs = np.sign(self._sliding(velocity))
         self.scales = self._scales(x, velocity, works)
         self.events: list[Event] = []
-        self._parts: list[tuple[Floats, Floats, Rates, Floats, Configuration]] = []
+        start = Piece(-1.0, 0.0, self.begin[:, None])
+        self._stretches = [self._stretch(start, 0.0)]
         self._ended = ""
 
     def _check_inertia(self, x: Floats) -> None:
@@ -355,73 +389,76 @@ class Integration:
         energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
         return np.concatenate([self.positions.scales, self.positions.scales * pace, np.full(works, energy)])
 
-    def _function(self, time: float, state: Any) -> Any:
-        """Derivative of the state: positions, velocities, work."""
-        x, velocity, _ = self._parts_of(state[:, None])
-        rates = self.equations.rates(np.array([time]), x, velocity)
-        return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
+    def _function(self, times: Floats, states: Floats) -> Floats:
+        """Derivatives of states: positions, velocities, work."""
+        x, velocity, _ = self._parts_of(states)
+        rates = self.equations.rates(times, x, velocity)
+        return np.concatenate([rates.velocity, rates.acceleration, rates.power])
 
     def _parts_of(self, states: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions, velocities and works."""
         return states[: self.count], states[self.count : 2 * self.count], states[2 * self.count :]
 
-    def _solver(self, time: float, state: Floats) -> DOP853:
-        tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
-        steps: dict[str, Any] = {}
+    def _solver(self, time: float, state: Floats) -> Solver:
+        first, longest = None, np.inf
         if not self.equations.signs.all() and time < self.end:
             # What begins to slide does so within the first step; a load that moves what rests is not stepped over.
-            steps = {"first_step": min(FIRST_STEP / self.pace, self.end - time), "max_step": LONGEST_REST * self.end}
-        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance, **steps)
+            first, longest = FIRST_STEP / self.pace, LONGEST_REST * self.end
+        part = ROUGHER if self.equations.contacts else 1.0
+        return Solver(
+            self._function, time, state, self.end, self.scales, part * RELATIVE, part * ABSOLUTE, first=first,
+            longest=longest,
+        )  # fmt: skip
 
     def run(self, progress: Progress = NULL) -> Course:
-        """Integrate; rows are evenly spread over the duration, and one more where the motion ends before."""
-        rows = np.linspace(0.0, self.end, self.section.rows)
-        progress.start(len(rows), "instants")
+        """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
+        count, seen = self.section.rows, 0
+        progress.start(count, "instants")
         with np.errstate(all="ignore"):
             solver = self._solver(0.0, self.begin)
-            self._keep(rows[:1], self.begin[:, None])
-            rows = rows[1:]
-            failed, steps, bounces = False, 0, 0
+            failed, steps, bounces, reached = False, 0, 0, 0.0
             watches = bool(self.equations.contacts or list(self._watched()))
-            while solver.status == "running":
-                begin, steps = solver.t, steps + 1
-                if not np.isfinite(solver.f).all() or solver.step() is not None or steps > MAX_STEPS:
+            while solver.running:
+                steps += 1
+                if steps > MAX_STEPS or not solver.step():
                     failed = True
-                    self._ended = f"{self._failure(steps)} at {begin:.6g}"
+                    self._ended = f"{self._failure(steps, solver)} at {reached:.6g}"
                     break
-                if not watches and (not len(rows) or rows[0] > solver.t):
-                    solver = self._switched(solver)
-                    continue
-                dense = solver.dense_output()
-                stop, until = self._stop(dense, begin, solver.t) if watches else (None, solver.t)
-                inside = rows[rows <= until]
-                if len(inside):
-                    self._keep(inside, dense(inside))
-                    rows = rows[len(inside) :]
-                    progress.update(len(inside))
+                piece = solver.piece
+                stop, reached = self._stop(piece) if watches else (None, piece.end)
+                self._stretches.append(self._stretch(piece, reached))
+                progress.update(int(count * reached / self.end) - seen)
+                seen = int(count * reached / self.end)
                 if stop is None:
-                    self._release(solver.y)
+                    self._release(solver.state)
                     solver = self._switched(solver)
                     continue
+                state = piece.at(np.array([reached]))[:, 0]
                 if stop.contact is not None:
-                    solver = self._solver(until, self._rested(stop.contact, until, dense(until)))
+                    solver = self._solver(reached, self._rested(stop.contact, reached, state))
                     continue
-                state = self._bounced(stop, until, dense(until))
+                after = self._bounced(stop, reached, state)
                 bounces += 1
-                if state is None or bounces > MAX_BOUNCES:
+                if after is None or bounces > MAX_BOUNCES:
                     self._ended = self._ended or f"after {MAX_BOUNCES} bounces"
-                    if not len(inside) or inside[-1] < until:
-                        self._keep(np.array([until]), dense(np.array([until])))
                     break
-                solver = self._solver(until, state)
-        return self._course(failed, steps)
+                solver = self._solver(reached, after)
+            return self._course(np.linspace(0.0, reached, count) if reached else np.zeros(1), failed, steps)
 
-    def _failure(self, steps: int) -> str:
+    def _stretch(self, piece: Piece, until: float) -> Stretch:
+        return Stretch(piece, until, self.equations.chart, self.equations.last, self.equations.signs)
+
+    def _failure(self, steps: int, solver: Solver) -> str:
         """Why the motion ends before its time."""
         if steps > MAX_STEPS:
             return f"{MAX_STEPS} steps are not enough"
         if self.equations.jams:
             return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
+        x, velocity, _ = self._parts_of(solver.state[:, None])
+        efforts = self.equations.rates(np.array([solver.time]), x, velocity).efforts[:, 0]
+        for drive, effort in zip(self.equations.drives, efforts, strict=True):
+            if not np.isfinite(effort):
+                return f"the effort of {drive.name} is not finite"
         return "the motion cannot go on"
 
     def _release(self, state: Floats) -> None:
@@ -441,40 +478,45 @@ class Integration:
         speeds = self._sliding(velocity)
         speeds[contact] = 0.0
         equations.signs = np.where(np.abs(speeds) > STILL * self.pace, np.sign(speeds), 0.0)
-        if not velocity.any():
-            rates = equations.rates(np.array([time]), exact[:, None], velocity[:, None])
-            if np.abs(rates.acceleration[:, 0] / self.positions.scales).max() <= STILL * self.pace**2:
-                self.events.append(Event(STANDSTILL, time, rises=False))
+        rates = equations.rates(np.array([time]), exact[:, None], velocity[:, None])
+        # What begins to slide at once does so on the way that it is accelerated.
+        begins = self._sliding(rates.acceleration[:, 0])
+        begins = np.where(np.abs(begins) > STILL * self.pace**2, np.sign(begins), 0.0)
+        equations.signs = np.where(equations.signs == 0, begins, equations.signs)
+        slow = np.abs(rates.acceleration[:, 0] / self.positions.scales).max() <= STILL * self.pace**2
+        if slow and not velocity.any():
+            self.events.append(Event(STANDSTILL, time, rises=False))
         return np.concatenate([exact, velocity, works])
 
-    def _keep(self, times: Floats, states: Floats) -> None:
-        """Keep the motion at some times of one chart."""
-        x, velocity, works = self._parts_of(states)
-        linear = self.equations.chart.solve(x, self.equations.last)
-        rates = self.equations.rates(times, x, velocity)
-        self._parts.append((times, x, rates, works, linear.configuration))
-
-    def _course(self, failed: bool, steps: int) -> Course:
-        times, x, work = (np.concatenate([part[k] for part in self._parts], axis=-1) for k in (0, 1, 3))
-        rates = Rates(
-            *(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in self._parts), strict=True))
-        )
+    def _course(self, times: Floats, failed: bool, steps: int) -> Course:
+        """The motion at some times."""
+        equations = self.equations
+        numbers = np.searchsorted([stretch.end for stretch in self._stretches], times)
+        parts = []
+        for number in np.unique(numbers):
+            piece, _, equations.chart, equations.last, equations.signs = self._stretches[number]
+            inside = times[numbers == number]
+            x, velocity, work = self._parts_of(piece.at(inside))
+            poses = equations.chart.solve(x, equations.last).configuration
+            parts.append((x, work, equations.rates(inside, x, velocity), poses))
+        x, work = (np.concatenate([part[k] for part in parts], axis=-1) for k in (0, 1))
+        rates = Rates(*(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in parts), strict=True)))
         vectors = self.mechanism.geometry.nominal
-        whole = joined([part[4] for part in self._parts], times.shape, vectors, {})
+        whole = joined([part[3] for part in parts], times.shape, vectors, {})
         near = self.positions.near(x)
         whole = replace(whole, near=near, counted=frozenset(near))
         events = sorted(self.events, key=lambda event: event.time)
         return Course(self.positions, times, x, rates, work, whole, events, self._ended, failed, steps)
 
-    def _switched(self, solver: DOP853) -> DOP853:
+    def _switched(self, solver: Solver) -> Solver:
         """The solver with another chart, where its coordinates move much faster than those of this one."""
         equations = self.equations
-        x, velocity, works = self._parts_of(solver.y)
+        x, velocity, works = self._parts_of(solver.state)
         linear = equations.chart.solve(x[:, None], equations.last)
         if not regularity(linear)[0] >= MEETING:
             return solver
         equations.last = linear.configuration.take(0)
-        if solver.status != "running":
+        if not solver.running:
             return solver
         slopes, rows = equations.slopes(linear), equations.chart.rows
         chart, volume = equations.atlas.best(slopes)
@@ -483,7 +525,7 @@ class Integration:
         exact = self.positions.of(linear.configuration)[:, 0]
         velocity = slopes @ velocity[rows]
         equations.chart = chart
-        return self._solver(solver.t, np.concatenate([exact, velocity, works]))
+        return self._solver(solver.time, np.concatenate([exact, velocity, works]))
 
     def _watched(self) -> Iterator[Watch]:
         """Crossings, limits, and contacts that slide."""
@@ -503,12 +545,11 @@ class Integration:
         speed: Floats = self.equations.signs[contact] * self._sliding(self._parts_of(states)[1])[contact]
         return speed
 
-    def _stop(
-        self, dense: Callable[[Floats], Floats], begin: float, end: float
-    ) -> tuple[Watch | None, float]:  # fmt: skip
+    def _stop(self, piece: Piece) -> tuple[Watch | None, float]:
         """What ends a step first, if anything, and when; crossings up to there are noted."""
-        times = begin + np.append(0.0, LOOKED_AT) * (end - begin)
-        states = dense(times)
+        end = piece.end
+        times = piece.begin + np.append(0.0, LOOKED_AT) * (end - piece.begin)
+        states = piece.at(times)
         poses = self._pose(states)
         stop, until, crossings = None, end, list[Event]()
         for watch in self._watched():
@@ -517,20 +558,20 @@ class Integration:
                 one, other = float(values[k]), float(values[k + 1])
                 if watch.stops and other < 0:
                     # A limit that was just left counts as inside.
-                    time = float(times[k]) if one <= 0 else self._root(dense, watch, times[k], times[k + 1])
+                    time = float(times[k]) if one <= 0 else self._root(piece, watch, times[k], times[k + 1])
                     if stop is None or time < until:
                         stop, until = watch, time
                     break
                 if not watch.stops and one * other <= 0 and one != 0:
-                    crossings.append(Event(watch.name, self._root(dense, watch, times[k], times[k + 1]), other > one))
+                    crossings.append(Event(watch.name, self._root(piece, watch, times[k], times[k + 1]), other > one))
         self.events += [event for event in crossings if event.time <= until]
         if stop is not None and stop.limit is not None:
             self.events.append(Event(stop.name, until, rises=False))
         return stop, until
 
-    def _root(self, dense: Callable[[Floats], Floats], watch: Watch, begin: float, end: float) -> float:
+    def _root(self, piece: Piece, watch: Watch, begin: float, end: float) -> float:
         def at(time: float) -> float:
-            states = dense(np.array([time]))
+            states = piece.at(np.array([time]))
             return float(np.ravel(watch.function(self._pose(states), states))[0])
 
         return float(brentq(at, begin, end, xtol=1e-14 * self.end, rtol=1e-14))

@@ -13,10 +13,12 @@ import numpy as np
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
+from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Mass, Term
-from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
@@ -123,6 +125,42 @@ class ForceQuestion:
                 )  # fmt: skip
             for name, reaction in zip(self.forces, borne, strict=True):
                 columns |= self._parts(name, reaction) if self.subset is None else {name: np.abs(reaction.force)}
+        if self.subset is None:
+            whole = held.balance if isinstance(held, Slipping) else held
+            columns |= self._turned(linear.configuration, whole)
+            for name, contact in zip(self.forces, self.joints.contacts, strict=True):
+                if contact.engaged is not None:
+                    place = np.asarray(whole.pressing[contact.joint].place)
+                    columns |= {f"{name}.x": place.real, f"{name}.y": place.imag}
+        return columns
+
+    @property
+    def borne_by(self) -> list[tuple[str, str, str, str]]:
+        """Rows of what is borne: name of the column, joint, on what, by what; joints, then couplings without wheels."""
+        contacts = [(name, c.joint, c.on, c.by) for name, c in zip(self.forces, self.joints.contacts, strict=True)]
+        turned = [(_moment_on(coupling, body), coupling, body, coupling) for coupling, body in self.turned]
+        return [*contacts, *turned]
+
+    @cached_property
+    def turned(self) -> list[tuple[str, str]]:
+        """Couplings that no wheels make, a controller or a hidden gear, with each link that they turn."""
+        drawn, couplings = self.study.mechanism.sketch_configuration, self._without_wheels
+        return [(name, body) for name, (_, gap) in couplings.items() for body in pulled(drawn, gap, 1.0).bodies
+                if body != GROUND]  # fmt: skip
+
+    @cached_property
+    def _without_wheels(self) -> dict[str, tuple[int, Coordinate]]:
+        """By such a coupling its number and its gap."""
+        wheels = {pair.coupling for pair in self.study.mechanism.engaged}
+        names = zip(self.study.mechanism.description.couplings, self.joints.couplings, strict=True)
+        return {name: (k, own.gap) for k, (name, own) in enumerate(names) if name not in wheels}
+
+    def _turned(self, configuration: Configuration, held: Balance) -> dict[str, Value]:
+        """Moments of these couplings, and no forces."""
+        columns: dict[str, Value] = {}
+        for name, (number, gap) in self._without_wheels.items():
+            for body, moment in pulled(configuration, gap, held.couplings[number]).bodies.items():
+                columns |= self._parts(_moment_on(name, body), Reaction(0.0, moment, np.nan))
         return columns
 
     def _held(
@@ -212,6 +250,11 @@ class ForceQuestion:
         values = (force.real, force.imag, reaction.moment, np.abs(force),
                   angle_of(force) / self.study.units.angle_factor, reaction.normal)  # fmt: skip
         return {f"{name}.{part}": value for part, value in zip(PARTS, values, strict=True)} | {name: np.abs(force)}
+
+
+def _moment_on(coupling: str, body: str) -> str:
+    """Name of the columns of what a coupling without wheels does to a link."""
+    return f"{coupling}_moment_on_{body}"
 
 
 def weighed_beams(study: Study) -> list[str]:

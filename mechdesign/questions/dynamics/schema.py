@@ -135,12 +135,12 @@ class DynamicsSection(MotionSection):
         if self.flywheel is not None and [*checker.mechanism.driven_kinds.values()] != ["angle"]:
             message = "a flywheel sits on the one drive of a mechanism, an angle; this one has others"
             checker.report((self.command, "flywheel"), message, at_key=True)
-        for key in ("flywheel", "modes") if self.forward is not None else ():
-            if getattr(self, key):
-                message = (
-                    f"'forward' and {key!r} are both given; {key} are those of poses: ask for them in another study"
-                )
-                checker.report((self.command, key), message, at_key=True)
+        for key, use in (
+            ("flywheel", "a flywheel is sized for a cycle of poses; ask for it in another study"),
+            ("modes", "natural frequencies are those of poses; ask for them in another study"),
+        ):
+            if self.forward is not None and getattr(self, key):
+                checker.report((self.command, key), f"'forward' and {key!r} are both given; {use}", at_key=True)
         section = self if self.moves else checker.parts.get("kinematics") or self
         timed, moving = section.motion is not None, section.rated
         if self.forward is not None:

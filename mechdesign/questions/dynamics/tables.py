@@ -44,16 +44,17 @@ def dynamics_table(motion: Motion) -> Table:
 def joint_table(motion: Motion) -> Table:
     """``joint_forces.csv``: what every joint bears, a row a pose and joint."""
     question = question_of(motion)
-    contacts = question.joints.contacts
-    count, joints = len(motion.reason), len(contacts)
+    rows = question.borne_by
+    count, joints = len(motion.reason), len(rows)
 
     def per_joint(values: NDArray[Any]) -> NDArray[Any]:
         return np.repeat(values, joints)
 
-    words = {part: np.array([[motion.arrays[f"{name}.{part}"]] for name in question.forces]) for part in PARTS}
+    words = {part: np.array([[motion.arrays[f"{name}.{part}"]] for name, *_ in rows]) for part in PARTS}
     table = {part: values.reshape(joints, count).T.ravel() for part, values in words.items()}
     names = {
-        key: np.tile(np.array([getattr(c, key) for c in contacts], dtype=str), count) for key in ("joint", "on", "by")
+        key: np.tile(np.array([row[k] for row in rows], dtype=str), count)
+        for k, key in enumerate(("joint", "on", "by"), 1)
     }
     pose_columns = [replace(column, values=per_joint(column.values)) for column in motion.pose_columns()]
     columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)

@@ -42,7 +42,8 @@ def efforts_figure(view: DynamicsView) -> Figure | None:
         return None
     names = [f"{drive}_{kind}" for kind in _CURVES for drive in view.study.mechanism.drives]
     names = [name for name in names if name in arrays and np.isfinite(view.column(name)).any()]
-    if not any(np.nanmax(np.abs(view.column(name))) > _rounding(view, name) for name in names):
+    names = [name for name in names if np.nanmax(np.abs(view.column(name))) > _rounding(view, name)]
+    if not names:
         return None
     names = names[:MAX_PANELS]
     tall = _LOW if len(names) > _FEW_PANELS else _TALL

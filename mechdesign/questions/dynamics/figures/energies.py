@@ -38,7 +38,8 @@ def energies_figure(view: DynamicsView) -> Figure | None:
     handles = []
     for kind, values in curves.items():
         color, dashes = looks[kind]
-        axes.plot(over.values, values, color=color, linestyle=dashes, linewidth=1.8)
+        line = view.broken(values) if "forward" in view.result.tables else (over.values, values)
+        axes.plot(*line, color=color, linestyle=dashes, linewidth=1.8)
         handles.append(Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=kind))
     axes.set_xlim(float(over.values.min()), float(over.values.max()))
     axes.set_ylabel(style.axis_label("energy", unit))

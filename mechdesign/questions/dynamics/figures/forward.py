@@ -30,7 +30,7 @@ def forward_figure(view: DynamicsView) -> Figure | None:
     figure, panels = stack(len(names), "Motion in time", over.label, note=note, tall=tall)
     for axes, name in zip(panels, names, strict=True):
         column = table.column(name)
-        axes.plot(table["time"], column.values, color=style.BLUE if name in drives else style.GREEN, linewidth=1.8)
+        axes.plot(*view.broken(column.values), color=style.BLUE if name in drives else style.GREEN, linewidth=1.8)
         for time in np.unique(times):
             axes.axvline(time, color=style.FAINT, linestyle=":", linewidth=1.0, zorder=1.5)
         axes.set_ylabel(style.axis_label(name if name in drives else "velocity", column.unit))

@@ -50,6 +50,7 @@ LOOKS = {
     "load": _Look("load", style.VERMILION),
     "spring": _Look("spring", shapes.SPRING_COLOR, (0, (4, 1, 1, 1))),
     "effort": _Look("drive", style.PURPLE),
+    "coupling": _Look("coupling", style.INK),
 }
 
 
@@ -89,12 +90,14 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     centers = mass_centers(view.study, drawn.shown.configuration, index)
     tile = _Tile(view, 72 * _LONGEST / largest, least, (wide, tall))
     outside = [action for action in acting if action.link != GROUND and _outside(action, acting)]
-    tile.draw(panels[0], "Mechanism", whole, [*scene.points.values()], outside, [*centers.values()])
+    tile.draw(panels[0], "Mechanism", whole, [*scene.points.values(), *scene.round], outside, [*centers.values()])
     for axes, name in zip(panels[1:], shown, strict=True):
         own = [scene.points[point] for point in scene.link_points(name)]
         mine = [action for action in acting if action.link == name]
         marked = [place for body, place in centers.items() if body.partition(":")[0] == name]
-        tile.draw(axes, name, _alone(scene, name, whole), [*own, *(action.place for action in mine)], mine, marked)
+        body = _alone(scene, name, whole)
+        outlines = [place for shape in body if isinstance(shape, Line) for place in shape.places]
+        tile.draw(axes, name, body, [*own, *outlines, *(action.place for action in mine)], mine, marked)
     _key(figure, acting, largest, unit)
     return figure
 
@@ -110,7 +113,7 @@ def _worst(view: DynamicsView) -> int | None:
 
 def _outside(action: Action, acting: Sequence[Action]) -> bool:
     """Whether it comes from outside of the moving links: not from a joint or spring between two of them."""
-    if action.kind not in ("joint", "spring", "effort"):
+    if action.kind not in ("joint", "spring", "effort", "coupling"):
         return True
     same = [other for other in acting if other.kind == action.kind and other.name == action.name]
     return any(other.link == GROUND and abs(other.force + action.force) <= LEAST * action.size

@@ -8,6 +8,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.analysis import DrawnForces
+from mechdesign.questions.dynamics.motion_in_time import STANDSTILL
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import STILL, question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
@@ -49,6 +50,14 @@ class DynamicsView(PosesView):
         values = self.column(name)
         finite = values[np.isfinite(values)]
         return len(finite) > 0 and float(np.ptp(finite)) > STILL * float(np.abs(finite).max())
+
+    def broken(self, values: Floats) -> tuple[Floats, Floats]:
+        """Times and values of a motion in time, with a gap where it bounces off a limit."""
+        times, events = self.result.tables["forward"]["time"], self.result.tables["events"]
+        others = [*self.question.section.forward.events, STANDSTILL] if self.question.section.forward else []
+        bounces = events["time"][np.isfinite(events["time"]) & ~np.isin(events["event"], others)]
+        places = np.searchsorted(times, bounces)
+        return np.insert(times, places, bounces), np.insert(values, places, np.nan)
 
     def force(self, name: str) -> Complexes:
         """A joint's force at every pose, by its name, or the shaking force."""
