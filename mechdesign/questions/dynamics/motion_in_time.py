@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from mechdesign.errors import AssemblyError, MechanismError
@@ -36,7 +37,6 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.collocation import Piece, Solver
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
@@ -49,7 +49,7 @@ from mechdesign.study.schema.loads import VELOCITY
 # Friction has corners where what a joint bears changes its side: with it steps may err so many times more.
 RELATIVE, ABSOLUTE = 1e-11, 1e-12
 ROUGHER = 100.0
-MAX_STEPS = 3000
+MAX_STEPS = 5000
 MAX_BOUNCES = 1000
 # Another chart takes over where its coordinates move so many times faster.
 FASTER = 3.0
@@ -59,7 +59,7 @@ MEETING = 0.02
 AROUND = 0.03 * np.array([-10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
 NEAREST = 8
 # Places within a step at which limits and crossings are looked at.
-LOOKED_AT = np.arange(1, 17) / 16
+LOOKED_AT = np.array([0.25, 0.5, 0.75, 1.0])
 # A velocity below this part of the usual one is rest.
 REST = 1e-6
 # Where friction is, members that move against each other less than this part of the usual velocity rest; those that
@@ -112,7 +112,7 @@ class Watch(NamedTuple):
 class Stretch(NamedTuple):
     """The motion in a step up to an end, with the chart, the pose, and the signs of the contacts that it has there."""
 
-    piece: Piece
+    states: Callable[[Floats], Floats]  # at times, shape (n, times)
     end: float
     chart: Chart
     last: Configuration
@@ -351,8 +351,7 @@ class Integration:
         equations.signs = np.sign(self._sliding(velocity))
         self.scales = self._scales(x, velocity, works)
         self.events: list[Event] = []
-        start = Piece(-1.0, 0.0, self.begin[:, None])
-        self._stretches = [self._stretch(start, 0.0)]
+        self._stretches = [self._stretch(lambda times: np.repeat(self.begin[:, None], len(times), axis=1), 0.0)]
         self._ended = ""
 
     def _check_inertia(self, x: Floats) -> None:
@@ -389,26 +388,24 @@ class Integration:
         energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
         return np.concatenate([self.positions.scales, self.positions.scales * pace, np.full(works, energy)])
 
-    def _function(self, times: Floats, states: Floats) -> Floats:
-        """Derivatives of states: positions, velocities, work."""
-        x, velocity, _ = self._parts_of(states)
-        rates = self.equations.rates(times, x, velocity)
-        return np.concatenate([rates.velocity, rates.acceleration, rates.power])
+    def _function(self, time: float, state: Any) -> Any:
+        """Derivative of the state: positions, velocities, work."""
+        x, velocity, _ = self._parts_of(state[:, None])
+        rates = self.equations.rates(np.array([time]), x, velocity)
+        return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
 
     def _parts_of(self, states: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions, velocities and works."""
         return states[: self.count], states[self.count : 2 * self.count], states[2 * self.count :]
 
-    def _solver(self, time: float, state: Floats) -> Solver:
-        first, longest = None, np.inf
+    def _solver(self, time: float, state: Floats) -> DOP853:
+        part = ROUGHER if self.equations.contacts else 1.0
+        tolerance: Any = part * ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
+        steps: dict[str, Any] = {}
         if not self.equations.signs.all() and time < self.end:
             # What begins to slide does so within the first step; a load that moves what rests is not stepped over.
-            first, longest = FIRST_STEP / self.pace, LONGEST_REST * self.end
-        part = ROUGHER if self.equations.contacts else 1.0
-        return Solver(
-            self._function, time, state, self.end, self.scales, part * RELATIVE, part * ABSOLUTE, first=first,
-            longest=longest,
-        )  # fmt: skip
+            steps = {"first_step": min(FIRST_STEP / self.pace, self.end - time), "max_step": LONGEST_REST * self.end}
+        return DOP853(self._function, time, state, self.end, rtol=part * RELATIVE, atol=tolerance, **steps)
 
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
@@ -418,22 +415,22 @@ class Integration:
             solver = self._solver(0.0, self.begin)
             failed, steps, bounces, reached = False, 0, 0, 0.0
             watches = bool(self.equations.contacts or list(self._watched()))
-            while solver.running:
-                steps += 1
-                if steps > MAX_STEPS or not solver.step():
+            while solver.status == "running":
+                begin, steps = solver.t, steps + 1
+                if steps > MAX_STEPS or not np.isfinite(solver.f).all() or solver.step() is not None:
                     failed = True
                     self._ended = f"{self._failure(steps, solver)} at {reached:.6g}"
                     break
-                piece = solver.piece
-                stop, reached = self._stop(piece) if watches else (None, piece.end)
-                self._stretches.append(self._stretch(piece, reached))
+                states = solver.dense_output()
+                stop, reached = self._stop(states, begin, solver.t) if watches else (None, solver.t)
+                self._stretches.append(self._stretch(states, reached))
                 progress.update(int(count * reached / self.end) - seen)
                 seen = int(count * reached / self.end)
                 if stop is None:
-                    self._release(solver.state)
+                    self._release(solver.y)
                     solver = self._switched(solver)
                     continue
-                state = piece.at(np.array([reached]))[:, 0]
+                state = states(reached)
                 if stop.contact is not None:
                     solver = self._solver(reached, self._rested(stop.contact, reached, state))
                     continue
@@ -445,17 +442,17 @@ class Integration:
                 solver = self._solver(reached, after)
             return self._course(np.linspace(0.0, reached, count) if reached else np.zeros(1), failed, steps)
 
-    def _stretch(self, piece: Piece, until: float) -> Stretch:
-        return Stretch(piece, until, self.equations.chart, self.equations.last, self.equations.signs)
+    def _stretch(self, states: Callable[[Floats], Floats], until: float) -> Stretch:
+        return Stretch(states, until, self.equations.chart, self.equations.last, self.equations.signs)
 
-    def _failure(self, steps: int, solver: Solver) -> str:
+    def _failure(self, steps: int, solver: DOP853) -> str:
         """Why the motion ends before its time."""
         if steps > MAX_STEPS:
             return f"{MAX_STEPS} steps are not enough"
         if self.equations.jams:
             return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
-        x, velocity, _ = self._parts_of(solver.state[:, None])
-        efforts = self.equations.rates(np.array([solver.time]), x, velocity).efforts[:, 0]
+        x, velocity, _ = self._parts_of(solver.y[:, None])
+        efforts = self.equations.rates(np.array([solver.t]), x, velocity).efforts[:, 0]
         for drive, effort in zip(self.equations.drives, efforts, strict=True):
             if not np.isfinite(effort):
                 return f"the effort of {drive.name} is not finite"
@@ -494,9 +491,9 @@ class Integration:
         numbers = np.searchsorted([stretch.end for stretch in self._stretches], times)
         parts = []
         for number in np.unique(numbers):
-            piece, _, equations.chart, equations.last, equations.signs = self._stretches[number]
+            states, _, equations.chart, equations.last, equations.signs = self._stretches[number]
             inside = times[numbers == number]
-            x, velocity, work = self._parts_of(piece.at(inside))
+            x, velocity, work = self._parts_of(states(inside))
             poses = equations.chart.solve(x, equations.last).configuration
             parts.append((x, work, equations.rates(inside, x, velocity), poses))
         x, work = (np.concatenate([part[k] for part in parts], axis=-1) for k in (0, 1))
@@ -508,15 +505,15 @@ class Integration:
         events = sorted(self.events, key=lambda event: event.time)
         return Course(self.positions, times, x, rates, work, whole, events, self._ended, failed, steps)
 
-    def _switched(self, solver: Solver) -> Solver:
+    def _switched(self, solver: DOP853) -> DOP853:
         """The solver with another chart, where its coordinates move much faster than those of this one."""
         equations = self.equations
-        x, velocity, works = self._parts_of(solver.state)
+        x, velocity, works = self._parts_of(solver.y)
         linear = equations.chart.solve(x[:, None], equations.last)
         if not regularity(linear)[0] >= MEETING:
             return solver
         equations.last = linear.configuration.take(0)
-        if not solver.running:
+        if solver.status != "running":
             return solver
         slopes, rows = equations.slopes(linear), equations.chart.rows
         chart, volume = equations.atlas.best(slopes)
@@ -525,7 +522,7 @@ class Integration:
         exact = self.positions.of(linear.configuration)[:, 0]
         velocity = slopes @ velocity[rows]
         equations.chart = chart
-        return self._solver(solver.time, np.concatenate([exact, velocity, works]))
+        return self._solver(solver.t, np.concatenate([exact, velocity, works]))
 
     def _watched(self) -> Iterator[Watch]:
         """Crossings, limits, and contacts that slide."""
@@ -545,11 +542,12 @@ class Integration:
         speed: Floats = self.equations.signs[contact] * self._sliding(self._parts_of(states)[1])[contact]
         return speed
 
-    def _stop(self, piece: Piece) -> tuple[Watch | None, float]:
+    def _stop(
+        self, dense: Callable[[Floats], Floats], begin: float, end: float
+    ) -> tuple[Watch | None, float]:  # fmt: skip
         """What ends a step first, if anything, and when; crossings up to there are noted."""
-        end = piece.end
-        times = piece.begin + np.append(0.0, LOOKED_AT) * (end - piece.begin)
-        states = piece.at(times)
+        times = begin + np.append(0.0, LOOKED_AT) * (end - begin)
+        states = dense(times)
         poses = self._pose(states)
         stop, until, crossings = None, end, list[Event]()
         for watch in self._watched():
@@ -558,20 +556,20 @@ class Integration:
                 one, other = float(values[k]), float(values[k + 1])
                 if watch.stops and other < 0:
                     # A limit that was just left counts as inside.
-                    time = float(times[k]) if one <= 0 else self._root(piece, watch, times[k], times[k + 1])
+                    time = float(times[k]) if one <= 0 else self._root(dense, watch, times[k], times[k + 1])
                     if stop is None or time < until:
                         stop, until = watch, time
                     break
                 if not watch.stops and one * other <= 0 and one != 0:
-                    crossings.append(Event(watch.name, self._root(piece, watch, times[k], times[k + 1]), other > one))
+                    crossings.append(Event(watch.name, self._root(dense, watch, times[k], times[k + 1]), other > one))
         self.events += [event for event in crossings if event.time <= until]
         if stop is not None and stop.limit is not None:
             self.events.append(Event(stop.name, until, rises=False))
         return stop, until
 
-    def _root(self, piece: Piece, watch: Watch, begin: float, end: float) -> float:
+    def _root(self, dense: Callable[[Floats], Floats], watch: Watch, begin: float, end: float) -> float:
         def at(time: float) -> float:
-            states = piece.at(np.array([time]))
+            states = dense(np.array([time]))
             return float(np.ravel(watch.function(self._pose(states), states))[0])
 
         return float(brentq(at, begin, end, xtol=1e-14 * self.end, rtol=1e-14))
