@@ -19,6 +19,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
+from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 
 # Layers that the search for a stack tries at most, one link at a time.
@@ -32,14 +33,21 @@ HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 @export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20, mark=b"item,kind,")
 def layers_csv(view: View) -> Content:
-    """A row for each plate and each pin: its layers, and where it begins and ends above the lowest layer."""
+    """A row for each plate, rod and pin: its layers, and where it begins and ends above the lowest layer.
+
+    The rod of a telescopic link lies in the layer of its body.
+    """
     stack = stack_of(view)
     thickness = view.millimetres * float(view.sizes.thickness)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
-    rows = [(link, "plate", layer, layer) for link, layer in stack.layers.items()]
-    for pin in pins_of(view.mechanism.description):
+    rows, description = list[tuple[str, str, int, int]](), view.mechanism.description
+    for link, layer in stack.layers.items():
+        rows.append((link, "plate", layer, layer))
+        if description.links[link].tip is not None:
+            rows.append((rod_of(link).replace(":", " "), "rod", layer, layer))
+    for pin in pins_of(description):
         layers = [stack.layers[link] for link in pin.links]
         rows.append((pin.name, "pin", min(layers), max(layers)))
     for item, kind, first, last in rows:

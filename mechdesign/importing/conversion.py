@@ -86,9 +86,8 @@ def convert(
     _choose(sketch, drives)
     draft = Draft(sketch)
     if len(draft.moving) > MOST_LINKS:
-        raise StudyError(
-            f"the mechanism has {len(draft.moving)} moving links, more than {MOST_LINKS}: take a part of it"
-        )
+        count = len(draft.moving)
+        raise StudyError(f"the mechanism has {count} moving links, more than {MOST_LINKS}: take a part of it")
     return _settled(draft, cut(origin.name))
 
 

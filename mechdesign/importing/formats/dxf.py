@@ -58,7 +58,7 @@ def read(source: Source) -> Sketch:
         If it is binary or broken, or has nothing that could be a link.
     """
     if source.text.startswith("AutoCAD Binary DXF"):
-        raise StudyError("a binary DXF: save it as ASCII")
+        raise StudyError("the drawing is a binary DXF: save it as DXF in ASCII, R12 to 2018")
     sketch = source.started(_TOOL)
     shapes, others, unit = _shapes(source.text)
     if unit is None:
