@@ -253,6 +253,11 @@ class Expression:
         """The value of a table at a variable; `text` is for messages."""
         return cls(text, (("name", name), ("call", table)), angle_unit)
 
+    @property
+    def table(self) -> Tabulated | None:
+        """The table that it calls; None where it calls none."""
+        return next((step for _, step in self.program if isinstance(step, Tabulated)), None)
+
     def is_linear(self) -> bool:
         """Whether the expression is linear in its variables, judged by its form."""
 

@@ -39,8 +39,10 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats
 UNMOVED = 1e-9
 # A profile is not divided more finely than into so many parts.
 MOST_PARTS = 100_000
-# The ends of a profile that closes meet within this part of its size.
+# The ends of a profile that closes meet within this part of its size, as do both sides of each place without a corner.
 CLOSED = 1e-6
+# Halvings by which a step over a smooth profile becomes shorter than half of itself, and those that find a corner.
+HALVINGS = (2, 30)
 
 
 class Touch(NamedTuple):
@@ -189,6 +191,43 @@ class Cam:
         outline = self.outlines[0]
         return bool(abs(outline[-1] - outline[0]) <= CLOSED * (np.ptp(outline.real) + np.ptp(outline.imag)))
 
+    @cached_property
+    @quiet
+    def corners(self) -> Floats:
+        """Values of the coordinate that is followed at which the law has a corner and the profile jumps.
+
+        There a step of the profile, of its place and its normal, stays as long as it is halved.
+        """
+        touch = self.touch(self._whole)
+        low, high = self.values[:-1], self.values[1:]
+        at = self._frame(self._whole, touch)
+        size = np.abs(at[0]).max(initial=0.0, where=np.isfinite(at[0]))
+        begin, end = at[:, :-1], at[:, 1:]
+
+        def length(one: Complexes, other: Complexes) -> Floats:
+            return np.asarray(np.abs(one[0] - other[0]) / size + np.abs(one[1] - other[1]))
+
+        whole = length(begin, end)
+        for halvings in range(HALVINGS[1]):
+            if halvings == HALVINGS[0]:
+                long = length(begin, end) > whole / 2
+                low, high, begin, end = low[long], high[long], begin[:, long], end[:, long]
+            if not len(low):
+                return low
+            middle = (low + high) / 2
+            configuration = self.along(middle)
+            at = self._frame(configuration, self.touch(configuration))
+            first_half = length(begin, at) > length(at, end)
+            low, high = np.where(first_half, low, middle), np.where(first_half, middle, high)
+            begin, end = np.where(first_half, begin, at), np.where(first_half, at, end)
+        return low[length(begin, end) > CLOSED]
+
+    def _frame(self, configuration: Configuration, touch: Touch) -> Complexes:
+        """Place and normal of the profile in the cam's frame."""
+        normal = touch.normal * np.conj(configuration.body_rotation(self.links[1]))
+        place = self.local(configuration, touch.place)
+        return np.stack(np.broadcast_arrays(place, normal)).astype(complex)
+
     @quiet
     def undercuts(self, radius: Value, roller: Value) -> Flags:
         """Where a profile of some radius of curvature loses what the roller, or a flat face, has touched before."""
@@ -262,6 +301,17 @@ class Cam:
         swept = pace * dot(self.local(configuration, center), turned)
         return Touch(place, normal, pressure, size, pitch, face, dot(own, normal), swept)
 
+    def _own(self, linear: Linearization, velocity: Rates, place: Vector) -> Vector:
+        """How a place of the follower moves for each unit of its coordinate while the cam is held.
+
+        That is by play between them, the drives moved back; `velocity` is that for each unit of what is followed.
+        """
+        parted = linear.sensitivity([model.play(self.coupling)])
+        back = first(linear.configuration, self.followed, parted)
+        own = self._against(parted, place, linear.configuration)
+        moved: Vector = np.atleast_1d(own - back * self._against(velocity, place, linear.configuration))[0]
+        return moved
+
     def _against(self, rates: Rates, place: Vector, configuration: Configuration) -> Vector:
         """Rate of a place of the follower against the cam."""
         frames = [configuration.graph.bodies[body][0] for body in self.links]
@@ -315,7 +365,7 @@ def cams(
             coupling.name, index, given, followed, coupling.follower, (follower, given.link), graph.nodes.index(point),
             base, turns_of(given.face), forward, whole,
         )  # fmt: skip
-        _check_alone(cam)
+        _check_follower(cam)
         listed.append(cam)
     return listed
 
@@ -333,26 +383,43 @@ def _plan_with(followed: Coordinate, drives: Sequence[str], plan: Callable[[Sequ
     raise MechanismError(message, f"mechanism.couplings.{name}.cam")
 
 
-def _check_alone(cam: Cam) -> None:
-    """The follower moves against the cam by the one coordinate alone."""
+def _check_follower(cam: Cam) -> None:
+    """The follower moves against the cam by the one coordinate alone, and the cam can push it."""
     core = cam.forward.core
-    drawn = core.sketch_configuration
+    drawn, size = core.sketch_configuration, core.size or 1.0
     linear = Linearization(cam.forward.structure, core.geometry, drawn)
     slopes = [float(first(drawn, cam.followed, rates)) for rates in linear.by_drives]
     largest = max(range(len(slopes)), key=lambda k: abs(slopes[k]))
+    if slopes[largest] == 0:
+        return
+    place, where = drawn.nodes[cam.node], f"mechanism.couplings.{cam.coupling}.cam"
     for k, slope in enumerate(slopes):
-        if k == largest or slopes[largest] == 0:
+        if k == largest:
             continue
         rates = [0.0] * len(slopes)
         rates[k], rates[largest] = 1.0, -slope / slopes[largest]
         velocity = linear.velocity(rates)
-        place = drawn.nodes[cam.node]
         turned = [velocity.angles[core.graph.bodies[body][0]] for body in cam.links]
-        moved = np.abs(cam._against(velocity, place, drawn)) / (core.size or 1.0)
+        moved = np.abs(cam._against(velocity, place, drawn)) / size
         if max(float(moved), abs(float(turned[0] - turned[1]))) > UNMOVED:
             drive = cam.forward.structure.given[k].name
             raise MechanismError(
                 f"drive '{drive}' moves the follower against the cam too, not '{cam.followed.name}' alone: the cam has "
                 "no one profile",
-                f"mechanism.couplings.{cam.coupling}.cam",
+                where,
             )
+    square = sum(slope * slope for slope in slopes)
+    velocity = linear.velocity([slope / square for slope in slopes])
+    point = core.graph.nodes[cam.node]
+    if cam.flat:
+        along = cam.along_face(drawn)
+        pushed = max(float(np.abs(dot(1j * along, cam._own(linear, velocity, place + s * along)))) for s in (0.0, size))
+        mistake = (
+            f"moves the flat face at '{point}' along itself or not at all, so that the cam cannot push it: give "
+            "another direction, or a point of the link that moves"
+        )
+    else:
+        pushed = float(np.abs(cam._own(linear, velocity, place)))
+        mistake = f"does not move the roller at '{point}' against the cam: give a point of the link that it moves"
+    if pushed <= UNMOVED * (size if cam.follower.quantity == "angle" else 1.0):
+        raise MechanismError(f"'{cam.follower.name}' {mistake}", where)

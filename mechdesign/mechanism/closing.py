@@ -44,7 +44,14 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
     unit, equations = core.description.angle_unit, core.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
     start = f"the sketch cannot be assembled at its own drive values{f' ({values})' if given else ''}"
-    x, gap = equations.solve(equations.from_sketch(core.sketch), given)
+    drawn_at = equations.from_sketch(core.sketch)
+    if lost := equations.without_value(drawn_at):
+        return MechanismError(
+            f"coupling '{lost[0]}' has no value at the sketch{f' ({values})' if given else ''}: draw a pose at which "
+            "it has one, or change it",
+            f"mechanism.couplings.{lost[0]}",
+        )
+    x, gap = equations.solve(drawn_at, given)
     if gap < CLOSED:
         reason = _closed_otherwise(core, plan, x, start)
         if reason is not None:

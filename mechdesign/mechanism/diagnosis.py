@@ -81,16 +81,23 @@ def wrong_count(
     words = joints_in_words(description, equations.graph)
     more = f"; and {len(words) - MAX_NAMED} more" if len(words) > MAX_NAMED else ""
     joints = f". Joints found: {'; '.join(words[:MAX_NAMED]) or 'none'}{more}"
+    if description.couplings:
+        joints += f". Couplings: {', '.join(description.couplings)}"
     # The fault is not in special dimensions. Random ones avoid motions that exist only to first order (dead centres).
     jacobian = equations.generic(drives)
     if given < count:
         mend = _too_free(equations, jacobian, [c.name for c in drives], count - given) + _loose_ends(equations.graph)
     elif count > 0:
-        doubles = [c.name for c, used in zip(drives, doubled(equations, jacobian)[1], strict=True) if used]
-        which = f" (one of {listed(doubles, 'or')}: each of them follows from the others)" if len(doubles) > 1 else ""
+        names = _named(equations, jacobian, drives)
+        doubles = [name for name in names if name in description.drives]
+        couplings = [name for name in names if name in description.couplings]
+        by = f" by {_parts(equations, couplings)}" if couplings else ""
+        which = (
+            f" (one of {listed(doubles, 'or')}: each of them follows from the others{by})" if len(doubles) > 1 else ""
+        )
         mend = f"remove {given - count} drive{'s' if given - count > 1 else ''}{which}"
     else:
-        mend = f"it is rigid, nothing can move. {_rigid(equations, count, given)}"
+        mend = f"it is rigid, nothing can move. {_rigid(equations, count, drives)}"
     return MechanismError(f"{start}: {mend}{joints}", DRIVES)
 
 
@@ -181,8 +188,7 @@ def over_constrained(
         if links:
             mend += " (points that other links need stay with those)"
     else:
-        edges, _ = doubled(equations, equations.jacobian(x))
-        parts = _parts(equations.graph, owners_of(equations.graph, edges))
+        parts = _parts(equations, _named(equations, equations.jacobian(x)))
         mend = f"{parts} hold each other more often than it takes"
     if given != real:
         mend += f"; then give {real} drive{'s' if real > 1 else ''} instead of {given}"
@@ -213,8 +219,6 @@ def undetermined(
 def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: bool) -> str:
     graph = equations.graph
     jacobian = equations.generic(given)
-    if not np.isfinite(jacobian).all():
-        return ""
     edges, used = doubled(equations, jacobian)
     conditions = [*equations.couplings, *given]
     names = [coordinate.name for coordinate, says in zip(conditions, used, strict=True) if says]
@@ -224,9 +228,9 @@ def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: b
             links.append(coordinate.body)
     parts = []
     if names:
-        parts.append(f"{listed(names)} fix{'es' if len(names) == 1 else ''} {_parts(graph, links)} twice over")
+        parts.append(f"{listed(names)} fix{'es' if len(names) == 1 else ''} {_parts(equations, links)} twice over")
     elif links:
-        parts.append(f"{_parts(graph, links)} hold each other more often than it takes")
+        parts.append(f"{_parts(equations, links)} hold each other more often than it takes")
     free = motions_in_words(equations, jacobian)
     if free:
         parts.append(f"with {'the drives' if driven else 'them' if len(given) > 1 else 'it'} held, {free}")
@@ -237,15 +241,25 @@ def _links(names: Sequence[str]) -> str:
     return f"link{'s' if len(names) > 1 else ''} {listed(names)}"
 
 
-def _parts(graph: Graph, names: Sequence[str]) -> str:
-    """Names of links and of joints as a phrase: ``links 'a' and 'b' and joint 'c'``."""
-    links, joints = ([name for name in names if (name in graph.bodies) == body] for body in (True, False))
-    named = [_links(links)] if links else []
-    named += [f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"] if joints else []
+def _named(equations: Equations, jacobian: Floats, held: Sequence[Coordinate] = ()) -> list[str]:
+    """Links, joints, couplings and held coordinates whose equations depend on each other."""
+    edges, used = doubled(equations, jacobian)
+    conditions = zip([*equations.couplings, *held], used, strict=True)
+    return [*owners_of(equations.graph, edges), *(condition.name for condition, says in conditions if says)]
+
+
+def _parts(equations: Equations, names: Sequence[str]) -> str:
+    """Names of links, joints and couplings as a phrase: ``links 'a' and 'b' and joint 'c'``."""
+    bodies, couplings = equations.graph.bodies, {coupling.name for coupling in equations.couplings}
+    kinds = {name: "link" if name in bodies else "coupling" if name in couplings else "joint" for name in names}
+    named = []
+    for noun in ("link", "joint", "coupling"):
+        own = [name for name in names if kinds[name] == noun]
+        named += [f"{noun}{'s' if len(own) > 1 else ''} {listed(own)}"] if own else []
     return " and ".join(named) or "the same part"
 
 
-def _rigid(equations: Equations, count: int, drives: int) -> str:
+def _rigid(equations: Equations, count: int, drives: Sequence[Coordinate]) -> str:
     """Which links hold each other in a mechanism that cannot move, and what to leave out."""
     graph = equations.graph
     if count == 0:
@@ -255,14 +269,17 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
             groups = ()
         for group in groups:
             if group.solved:
-                loop = _parts(graph, [GROUND, *owners_of(graph, group.edges)])
+                loop = _parts(equations, [GROUND, *owners_of(graph, group.edges)])
                 return f"A rigid loop: {loop}; leave one of them out, or divide one by a joint"
-    edges, _ = doubled(equations, equations.generic())
-    links = owners_of(graph, edges)
-    if links:
+    names = _named(equations, equations.generic())
+    if not names:
+        # Couplings that leave nothing to the drives.
+        couplings = {coupling.name for coupling in equations.couplings}
+        names = [name for name in _named(equations, equations.generic(drives), drives) if name in couplings]
+    if names:
         return (
-            f"What holds each other more often than it takes: {_parts(graph, links)}; leave out {drives - count} such "
-            "links, or free a joint"
+            f"What holds each other more often than it takes: {_parts(equations, names)}; leave out "
+            f"{len(drives) - count} of them, or free a joint"
         )
     return "Free a joint or a link"
 

@@ -51,6 +51,7 @@ class FourBar:
     # Of a slider-crank: distance of the slide's line from the pin of the body that carries the line, measured at the
     # pin of the body that slides; nan for a four-bar.
     offset: float
+    driven: bool = False  # whether the slide is driven, as that of a cylinder
 
     @cached_property
     def slide(self) -> int:
@@ -141,8 +142,11 @@ class FourBar:
         """Ends of the coupler's line of action (`end` None), or of the arm of the input (`end` 0) or the output (3).
 
         The coupler passes a force on from pin to pin, and an arm leads from the frame to where the coupler pushes. The
-        same joint twice is a slide: the line is across it.
+        same joint twice is a slide: the line is across it. A cylinder that drives pushes from its pin to that of its
+        rod, and no arm turns it.
         """
+        if self.driven and end != 3:
+            return (0, 2) if end is None else (1, 1)
         if end is None:
             return (self.slide, self.slide) if self.slide in (1, 2) else (1, 2)
         # The coupler pushes at the nearer of its joints, or at the farther where that is a slide.
@@ -176,7 +180,7 @@ class FourBar:
         """Transmission angle, the acute angle between coupler and output (radians, 0 to pi/2).
 
         Between the coupler's line of action and the output's arm; where the output slides, between the rod and the
-        normal of the guide.
+        normal of the guide; of a cylinder that drives, between the line of its pins and the arm.
         """
         sine, cosine = self.squareness(configuration, 3)
         return np.arctan2(np.abs(sine), np.abs(cosine))
@@ -252,9 +256,17 @@ class _Bodies:
         """Order a ring (joint k between links k and k + 1): frame, input, coupler, output."""
         k = self._frame(links)
         links, joints = [*links[k:], *links[:k]], [*joints[k:], *joints[:k]]
-        if self._placing_group(links[3], joints[3]) < self._placing_group(links[1], joints[0]):
+        cylinder = next((k for k in (1, 2) if joints[k].edge >= 0 and self._drives(joints[k])), 0)
+        input_is_last = self._placing_group(links[3], joints[3]) < self._placing_group(links[1], joints[0])
+        if cylinder == 2 or (cylinder == 0 and input_is_last):
             links, joints = [links[0], *links[:0:-1]], joints[::-1]
-        return FourBar(tuple(link.replace(":", " ") for link in links), tuple(joints), (math.nan,) * 4, math.nan)
+        names = tuple(link.replace(":", " ") for link in links)
+        return FourBar(names, tuple(joints), (math.nan,) * 4, math.nan, driven=cylinder > 0)
+
+    def _drives(self, joint: Joint) -> bool:
+        """Whether a slide is given by the drives."""
+        slide = self.mechanism.graph.edges[joint.edge].slide
+        return not any(slide in group.slides for group in self.mechanism.forward.structure.groups)
 
     def _frame(self, links: Sequence[str]) -> int:
         """Which link of a ring is fixed: the ground, else what a drive is measured from, else the first named."""

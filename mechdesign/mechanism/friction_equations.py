@@ -20,6 +20,8 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Residual of a solution, as a part of the sum of its terms.
 SOLVED = 1e-12
+# Part of the largest force that counts as borne by every contact, so that its rounding is a solution.
+ROUNDING = 1e-3
 # Most steps of Newton's method; where there is one solution, with steps of the contraction between them.
 STEPS = 200
 # Following a solution: steps of Newton's method, the longest and the shortest step of the coefficients' growth.
@@ -68,7 +70,9 @@ class Equations:
 
     @cached_property
     def _least(self) -> Floats:
-        return np.asarray(np.abs(self.strength) * (self.weights * np.abs(self.start)).max(axis=1))
+        # A contact that bears nothing has the rounding of the others' forces.
+        rounding = ROUNDING * self.weights[:, 0] * np.abs(self.start[:, 0]).max(axis=0)
+        return np.asarray(np.abs(self.strength) * np.maximum((self.weights * np.abs(self.start)).max(axis=1), rounding))
 
     def tolerance(self, friction: Floats) -> Floats:
         """Residual that is rounding."""

@@ -113,12 +113,14 @@ class Equations:
     def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
         """The Jacobian for random dimensions, free of special relations except between the directions of slides.
 
-        It is the one of largest rank of several draws, as chance can only lower the rank. It is not finite where no
-        draw is: a held expression may have no value for most dimensions.
+        It is the one of largest rank of several draws, as chance can only lower the rank. Where an expression has no
+        value in any draw its derivatives are random.
         """
         draws = [self.drawn(held, seed) for seed in range(ATTEMPTS)]
+        anything = np.random.default_rng(ATTEMPTS).uniform(-1, 1, draws[0].shape)
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
-        return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
+        finite = finite or [np.where(np.isfinite(jacobian), jacobian, anything) for jacobian in draws]
+        return min(finite, key=lambda jacobian: null_space(jacobian).shape[1])
 
     def drawn(self, held: Sequence[Coordinate], seed: int) -> Floats:
         """The Jacobian for dimensions drawn at random; the directions of slides stay."""
@@ -127,13 +129,19 @@ class Equations:
             loops.w[k] += np.conj(loops.rotations[edge.frame]) * (loops.chord(k) - loops.edge(k))
         return self._system(loops)[1]
 
+    def without_value(self, x: Floats) -> list[str]:
+        """Names of the couplings that have no value at given unknowns."""
+        values = self._system(self.at(x))[0][2 * len(self.graph.edges) :]
+        return [c.name for c, value in zip(self.couplings, values, strict=True) if not np.isfinite(value)]
+
     def solve(
         self, x: Floats, held: Sequence[tuple[Coordinate, float]] = (), step: Floats | None = None
     ) -> tuple[Floats, float]:
         """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap.
 
         With a `step` the solution must lie that far from `x` in the direction of the step. Otherwise the solver would
-        run back to `x` where two motions cross or one ends.
+        run back to `x` where two motions cross or one ends. The gap is infinite where a coupling has no value at the
+        begin.
         """
         from scipy.optimize import least_squares
 
@@ -155,6 +163,8 @@ class Equations:
         def slope(y: Floats) -> Floats:
             return np.vstack([system(y.tobytes())[1], ahead])
 
+        if not np.isfinite(residual(start)).all():
+            return start, np.inf
         result = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
         return result.x, float(np.abs(result.fun).max(initial=0.0))
 

@@ -222,6 +222,15 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
     return wheels
 
 
+def carrier_of(description: Description, graph: Graph, wheels: Sequence[str]) -> str | None:
+    """The link that carries the axes of two wheels, at two places; None where no one does."""
+    for carrier in description.links:
+        axes = [_axis(graph, wheel, carrier) for wheel in wheels]
+        if carrier not in wheels and min(axes) >= 0 and axes[0] != axes[1]:
+            return carrier
+    return None
+
+
 def pitch_radius(mechanism: Core, coupling: str, places: Mapping[str, Value]) -> Value | None:
     """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
 

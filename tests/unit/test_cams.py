@@ -64,6 +64,9 @@ def clearances(profile: Complexes, centers: Complexes) -> Floats:
         ("{link: disk, roller: F, radius: 3}", "there is no link 'disk'"),
         ("{link: disc, roller: F, radius: 3, range: [90, 0]}", "rises from its first value"),
         ("{link: disc, roller: F, radius: 3, range: [0 mm, 9 mm]}", "'0 mm' is a length"),
+        ("{link: disc, roller: F, radius: 3, steps: 2}", "must be at least 8, not 2"),
+        ("{link: disc, roller: O, radius: 3}", "'valve.slide' does not move the roller at 'O'"),
+        ("{link: disc, flat: F, direction: 0}", "moves the flat face at 'F' along itself"),
     ],
 )
 def test_mistakes_are_named(cam: str, message: str) -> None:
@@ -207,6 +210,20 @@ def test_what_is_wrong_with_a_cam_is_said() -> None:
     assert "the profile is undercut" in cut
     (opened,) = warnings_of(study_of(SLIDING % "to: 40 + cam/40, cam: {link: disc, roller: F, radius: 5}"))
     assert "does not close after a turn" in opened
+    broken, _ = warnings_of(study_of(SLIDING % "to: 40 + 2*abs(sin(cam)), cam: {link: disc, roller: F, radius: 5}"))
+    assert "the law of the follower has a corner (0, 180)" in broken
+
+
+def test_a_follower_at_rest_is_no_dead_centre_but_a_piston_is() -> None:
+    assert not kinematics(study_of(ROLLER)).warnings
+    engine = (
+        ROLLER.replace("T: [60, 0]}", "T: [60, 0]}\n    rod: [N, B, 120]\n    piston: {B: [0, 0]}")
+        .replace("point: F}", "point: F}, guide: {prismatic: [ground, piston], through: O, point: B}")
+        .replace("sketch: {", "sketch: {B: [160, 0], ")
+        .replace("[F.y]", "[B.x]")
+    )
+    (dead,) = kinematics(study_of(engine)).warnings
+    assert str(dead) == "3 poses are at a dead centre: B.x stands still there, and det_J is 0"
 
 
 LOADED = ROLLER + "dynamics: {sweep: {cam: {from: 0, to: 350, step: 10}}, loads: [{at: T, force: [0, -50]}]}\n"

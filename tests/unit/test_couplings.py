@@ -44,14 +44,29 @@ def five_bar(coupling: str) -> Mechanism:
         ("{set: g2, of: g1, table: [[0, 1], [0, 2]]}", "at least 4 rows, the first column rising"),
         ("{set: g2, of: g1, ratio: 2, wheels: chain}", "expected one of gears, belt, none"),
         ("{set: g2, of: g1, ratio: 2, phase: 20 mm}", "'20 mm' is a length, where an angle is expected"),
+        ("{set: g2, of: g1, ratio: 2 mm}", "'2 mm' is a length, where a pure number is expected"),
+        ("{set: g2, of: g1, ratio: 0}", "with a ratio of 0 'g2' would stand still"),
+        ("{set: g2, to: 2*g1 + g2}", "'g2' cannot follow itself"),
         ("{set: g2, of: g1, ratio: 2, pressure_angle: 95}", "between 0 and 90 degrees"),
         ("{set: g1, to: '40'}", "'mesh' and 'g1' fix link 'g1' twice over"),
+        ("{set: g2, to: sqrt(g1 - 20)}", "coupling 'mesh' has no value at the sketch (g1 = 0)"),
+        ("{set: g2, to: sqrt(-1 - g1**2)}", "coupling 'mesh' has no value at the sketch"),
+        ("{set: g2, of: g1, ratio: 2}, other: {set: g2, of: g1, ratio: 3}", "takes: couplings 'mesh' and 'other'"),
+        ("{set: g2, of: g1, ratio: 2}, other: {set: g1, of: g2, ratio: 0.5}", "couplings 'mesh' and 'other' hold each"),
+        ("{set: a, of: b, ratio: 2}, other: {set: b, of: a, ratio: 0.5}", "couplings 'mesh' and 'other' hold each"),
     ],
 )
 def test_mistakes_are_named(coupling: str, message: str) -> None:
     with pytest.raises(StudyError) as caught:
         five_bar(coupling)
     assert message in str(caught.value)
+
+
+def test_a_drive_that_follows_by_a_coupling_is_named() -> None:
+    with pytest.raises(
+        StudyError, match="one of 'g1' or 'g2': each of them follows from the others by coupling 'mesh'"
+    ):
+        study_of(FIVE_BAR.replace("[g1]", "[g1, g2]") % "{set: g2, of: g1, ratio: 2}")
 
 
 def test_a_phase_that_is_left_out_is_that_of_the_sketch() -> None:
@@ -214,6 +229,11 @@ def test_a_phase_that_is_left_out_follows_a_ratio_that_varies() -> None:
         assert range_of_design == pytest.approx(extremes["range"][list(extremes["output"]).index("B.y")])
 
 
+def test_a_link_stands_for_its_angle_in_an_expression() -> None:
+    by_name, by_angle = (five_bar(f"{{set: g2, to: 60 + 0.4*{name}}}").solve({"g1": 20}) for name in ("b", "b.angle"))
+    assert by_name["B.x"] == by_angle["B.x"]
+
+
 def test_turns_count() -> None:
     """Half as fast as the drive, a wheel is on the other side after a turn of the drive."""
     mechanism = five_bar("{set: g2, of: g1, ratio: 0.5, phase: 20}")
@@ -265,6 +285,22 @@ mechanism:
         pose.configuration, study.mechanism.coordinate("F.y"), velocity, velocity, linear.acceleration(velocity, [0.0])
     )
     assert bend == pytest.approx(spline(np.radians(at % 360), 2), rel=1e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "message"),
+    [
+        (
+            "of: g1, table: [[-90, 10], [0, 40], [60, 80], [120, 60]]",
+            "'g1' is outside of the table of coupling 'mesh', -90 to 120",
+        ),
+        ("to: 60 + sqrt(40 - g1)", "coupling 'mesh' has no value"),
+    ],
+)
+def test_poses_at_which_a_coupling_has_no_value_say_so(coupling: str, message: str) -> None:
+    sweep = "kinematics: {sweep: {g1: {from: 0, to: 150, step: 50}}, outputs: [B]}"
+    result = kinematics(study_of(FIVE_BAR % f"{{set: g2, {coupling}}}" + sweep))
+    assert message in str(result.warnings[0])
 
 
 def test_two_gears_press_their_bearings_apart() -> None:

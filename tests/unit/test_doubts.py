@@ -32,6 +32,24 @@ def test_a_study_without_a_slip_has_no_warning():
     assert doubts() == []
 
 
+ARMS = """
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, arm: [O, A, 210], fore: [A, P, 130], motor: [O, M, 20]}}
+  drives: [arm, motor]
+  couplings: {{belt: {{set: fore, {}}}}}
+  sketch: {{A: [200, 60], P: [180, 190], M: [10, 15]}}
+"""
+
+
+def test_a_belt_that_no_pulleys_make():
+    ((key, message),) = doubts(text=ARMS.format("of: motor, ratio: 0.5, phase: 100, wheels: belt, radius: 18"))
+    assert key == "mechanism.couplings.belt.wheels"
+    assert "link 'arm', which carries their axes, turns too; write {to: 0.5*motor + 0.5*arm + 100}" in message
+    assert not doubts(text=ARMS.format("to: 0.5*motor + 0.5*arm + 100, wheels: belt, radius: 18"))
+    ((key, message),) = doubts(text=ARMS.format("to: 30*sin(motor), pressure_angle: 18"))
+    assert "no wheels can make coupling 'belt', and their forces are left out: wheels turn about pins" in message
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("unit", "start", "end", "meant"),

@@ -349,3 +349,22 @@ def test_an_invariant_name_for_every_order_of_links() -> None:
     kept: dict[str, Any] = {"links": one.links, "type": one.type}
     assert kept == {"links": two.links, "type": two.type}
     assert one.lengths == pytest.approx(two.lengths)
+
+
+def test_transmission_angle_of_a_cylinder_that_drives_is_between_its_line_and_the_lever() -> None:
+    answer = result("""
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [300, 0]}
+    boom: [O, B, 250]
+    cylinder: {from: G, to: B, telescopic: true}
+  drives: [cylinder]
+  sketch: {B: [0, 250]}
+kinematics: {sweep: {cylinder: {from: 200, to: 500, step: 10}}}
+""")
+    # The law of cosines in the triangle O B G.
+    for end, length in (("max", 200), ("min", 500)):
+        cosine = (250**2 + length**2 - 300**2) / (2 * 250 * length)
+        angle = float(answer.tables["loops"][f"transmission_{end}"][0])
+        assert angle == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-9)
+    assert len(answer.tables["toggles"]) == 0

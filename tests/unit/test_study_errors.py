@@ -208,6 +208,7 @@ QUESTIONS = [
     ("workspace: {point: P, scan: {from: 5, to: 1}}", "1 is not beyond 'from', 5"),
     ("optimize: {maximize: [GII]}", "optimize.variables: is missing"),
     ("optimize: {variables: {r: {from: 1, to: 2, step: 1}}}", "say what to 'maximize' or 'minimize'"),
+    ("optimize: {variables: {r: {min: 1, max: 2}}}", "variables.r.min: unknown key; did you mean 'from'?"),
     ("optimize: {variables: {q: {from: 1, to: 2, step: 1}}, maximize: GII}", "no parameter or dimension 'q'"),
     ("optimize: {variables: {r: {from: 1, to: s, step: 1}}, maximize: GII}", "no parameter or variable 's'"),
     ("optimize: {variables: {r: {from: 1, to: r, step: 1}}, maximize: GII}", "variable 'r' above it"),

@@ -116,6 +116,7 @@ def test_cases_of_a_file(tmp_path: Path):
     ("matrix", "message"),
     [
         ({"vary": {"mechanism.parameters.rr": [1, 2]}}, "the study has no mechanism.parameters.rr; did you mean 'r'?"),
+        ({"vary": {"r": [1, 2]}}, "the study has no r; did you mean 'mechanism.parameters.r'?"),
         ({"vary": {"mechansim.parameters.r": [1]}}, "the study has no mechansim; did you mean 'mechanism'?"),
         ({"vary": {"kinematics.sweep.crank.stp": [1]}}, "no kinematics.sweep.crank.stp; did you mean 'step'?"),
         ({"vary": {"mechanism.branch": ["side", "folow"]}}, "did you mean 'follow'?"),

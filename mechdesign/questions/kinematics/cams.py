@@ -21,6 +21,8 @@ from mechdesign.study.poses import Poses
 
 # Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.
 SLIDING, TURNING = 30.0, 45.0
+# Corners of a law that a warning names.
+MOST_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +109,11 @@ def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Ca
                 "jam; a larger base circle or another offset helps"
             )
             yield from side.caution(study, design, "cam", steep, text)
+        rows = np.rint((cam.corners - cam.values[0]) / np.diff(cam.values[:2])).astype(int)
+        corner = np.isin(np.arange(cam.given.steps + 1), rows)
+        values = ", ".join(f"{value:.6g}" for value in side.coordinates[cam.followed.name][design][corner][:MOST_NAMED])
+        text = f"the profile is broken, as the law of the follower has a corner ({values})"
+        yield from side.caution(study, design, "cam", corner, text)
         if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN):
             end = np.arange(cam.given.steps + 1) == cam.given.steps
             yield from side.caution(study, design, "cam", end, "the profile does not close after a turn")

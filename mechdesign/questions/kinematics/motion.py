@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.model import play
 from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.mechanism.plates import CLEARANCE, Clearances
 from mechdesign.mechanism.statics import balance
@@ -31,6 +32,8 @@ from mechdesign.questions.poses import SolvedPoses, in_study_units, pose_columns
 from mechdesign.results import Column
 from mechdesign.study.poses import PoseGroup, Poses
 
+# Below this inverse condition the determinant and the rates solved with it have lost about half of their digits.
+SINGULAR = 1e-8
 # Poses with a conditioning below this have lost digits.
 NEAR_SINGULAR = 1e-3
 # Step of the interpolation at change points (radians, or parts of the mechanism's size): its error is about 1e-12, that
@@ -38,6 +41,8 @@ NEAR_SINGULAR = 1e-3
 CHANGE_POINT_STEP = 1e-2
 STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
 STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+# Whether an output stands still as a coupling has it: 1 or 0, by pose.
+RESTS = "rests"
 # An output that moves less than this part of its input (lengths in sizes of the mechanism) stands still: at a toggle.
 STANDS_STILL = 1e-12
 
@@ -146,6 +151,8 @@ class Motion:
                     put(entry(output, drive), value)
             put("det_J", jacobian.determinant)
             put("inverse_condition", jacobian.inverse_condition)
+            if len(drives) == 1 and study.mechanism.couplings:
+                put(RESTS, _rests(linear, listed[0], study.mechanism))
         for name, values in statics(self.question, linear, rows, moving).items():
             put(name, values)
 
@@ -229,6 +236,27 @@ def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving:
         columns[f"{cam.coupling}_pressure_angle"] = touch.pressure_angle / question.study.units.angle_factor
         columns[f"{cam.coupling}_curvature_radius"] = touch.radius
     return columns
+
+
+@quiet
+def _rests(linear: Linearization, output: Coordinate, mechanism: Mechanism) -> Value:
+    """Where a coupling holds its follower at rest while what it follows moves, so that an output rests with it."""
+    configuration, (velocity,), (drive,) = linear.configuration, linear.by_drives, linear.structure.given
+    size = {"length": mechanism.size}
+
+    def moves(coordinate: Coordinate, rates: Rates, unit: float) -> Flags:
+        rate = np.abs(first(configuration, coordinate, rates)) * unit / size.get(coordinate.quantity, 1.0)
+        return np.asarray(rate >= SINGULAR)
+
+    rests = np.zeros(configuration.shape, dtype=bool)
+    for coupling in mechanism.couplings:
+        parted = linear.sensitivity([play(coupling.name)])
+        unit = size.get(drive.quantity, 1.0)
+        followed = [moves(part, velocity, unit) for part in coupling.function.parts if part.kind != "parameter"]
+        held = ~moves(coupling.follower, velocity, unit) & np.any(np.broadcast_arrays(*followed, False), axis=0)
+        pushed = moves(output, parted, size.get(coupling.follower.quantity, 1.0))
+        rests |= held & np.atleast_1d(pushed)[0]
+    return rests
 
 
 def pole(question: MotionQuestion, linear: Linearization, column: str) -> Value:

@@ -12,15 +12,13 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.instant_centres import REST, TRANSLATION
-from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
 from mechdesign.study.motion_program import MotionProgram
 from mechdesign.study.poses import Poses
 
-# Below this inverse condition the determinant and the rates solved with it have lost about half of their digits.
-SINGULAR = 1e-8
 _TABLE = "motion"  # whose rows are the poses
 # Poses that warnings are about.
 _STALLED = "stalled"
@@ -119,7 +117,8 @@ def _near(motion: Motion) -> Flags:
     (output,), (drive,) = question.listed, question.drives
     size = {"length": question.study.mechanism.size}
     still = np.abs(arrays["det_J"]) * size.get(drive.quantity, 1.0) / size.get(output.quantity, 1.0)
-    return np.asarray(still < SINGULAR)
+    # What a coupling holds at rest, such as a valve on its cam, is meant to stand still.
+    return np.asarray((still < SINGULAR) & (arrays.get(RESTS, 0.0) != 1.0))
 
 
 def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:

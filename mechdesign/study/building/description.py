@@ -495,7 +495,7 @@ def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, func
     span, kind = given.range, section.coordinates[followed[0]]
     builder.reporter.kind((*ROOT, *path, "range"), kind)
     if span is None:
-        table = next((table for _, table in function.program if isinstance(table, Tabulated)), None)
+        table = function.table
         if table is None and kind != "angle":
             _refuse(builder, path, f"the profile needs the 'range' of {followed[0]!r}, [first, last]")
         span = (0.0, 2 * np.pi / builder.units.angle_factor) if table is None else (table.rows[0][0], table.rows[-1][0])
@@ -518,12 +518,14 @@ def _function(
     if given.to is not None:
         parameters = builder.parameter_values
         names = sorted(given.to.names)
-        listed = [*section.coordinates, *parameters]
+        listed = [*section.coordinates, *section.moving, *section.slides, *parameters]
         if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
             return None
         for item in given.to.names & parameters.keys():
             builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
-        return replace(given.to, angle_unit=unit)
+        coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
+        named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
+        return replace(given.to.substituted(named), angle_unit=unit)
     assert given.of is not None
     listed = [*section.coordinates, *section.moving, *section.slides]
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
@@ -534,6 +536,12 @@ def _function(
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
     assert given.ratio is not None
     ratio, phase = f"{name}.ratio", f"{name}.phase"
+    if float(given.ratio) == 0.0:
+        message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
+        builder.report((*path, "ratio"), message)
+    # Per radian a length is the radius of a pinion; per degree it is none.
+    if section.coordinates[of] == kind or unit != 1.0:
+        builder.reporter.kind((*ROOT, *path, "ratio"), "none")
     builder.reporter.kind((*ROOT, *path, "phase"), kind)
     builder.place(ratio, given.ratio, "none", in_coupling=True)
     builder.place(phase, 0.0 if given.phase is None else given.phase, kind, in_coupling=True)

@@ -335,7 +335,7 @@ class Cam(fields.Model):
     """First and last value of the coordinate that is followed, of the profile. Left out: the range of the ``table``, of
     an angle a turn from 0. Example: [0, 120]
     """
-    steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    steps: Annotated[int, fields.whole(8, 100_000)] = 360
     """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
 
     @model_validator(mode="after")
@@ -366,7 +366,9 @@ class Coupling(fields.Model):
     Example: planet.angle
     """
     to: fields.Bound | None = None
-    """Expression of coordinates and parameters, in the study's units. Example: -2.5*sun.angle + 3.5*arm.angle"""
+    """Expression of coordinates and parameters, in the study's units; the name of a link, joint or leg stands for its
+    coordinate. Example: -2.5*sun + 3.5*arm
+    """
     of: fields.CoordinateName | None = None
     """Coordinate that is followed, of a ``ratio`` or a ``table``. Example: sun.angle"""
     ratio: fields.AnyPlace | None = None

@@ -9,6 +9,7 @@ from typing import Any
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Link
+from mechdesign.mechanism.wheels import carrier_of
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection, PoseSection
@@ -32,6 +33,7 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
             _angles(checker, part)
     _lengths(checker, description)
     _pivots(checker, description.links[GROUND], description)
+    _wheels(checker)
     reliability = parts.get("reliability")
     if reliability is not None:
         _tolerances(checker, reliability)
@@ -100,6 +102,37 @@ def _pivots(checker: Checker, ground: Link, description: Description) -> None:
                 ("mechanism", "links", GROUND),
                 f"{one!r} and {other!r} are at one place; is it one pivot, or two? Of one, use one name",
             )
+
+
+def _wheels(checker: Checker) -> None:
+    """Warn of wheels that are described, and that cannot make what their coupling says."""
+    mechanism = checker.compiled
+    if mechanism is None:
+        return
+    for coupling in mechanism.couplings:
+        given = checker.mechanism.couplings[coupling.name]
+        described = [key for key in ("wheels", "radius", "pressure_angle") if key in given.model_fields_set]
+        made = {mesh.coupling for mesh in mechanism.meshes}
+        if not described or given.wheels == "none" or given.cam is not None or coupling.name in made:
+            continue
+        followed = [part.body for part in coupling.function.parts if part.kind == "angle"]
+        wheels = (coupling.follower.body, *followed)
+        carrier = None
+        if given.ratio is not None and len(wheels) == 2 and all(wheels):
+            carrier = carrier_of(mechanism.description, mechanism.graph, wheels)
+        reason = (
+            "wheels turn about pins of one link and make a ratio of two angles, or of a slide to an angle; write "
+            "wheels: none if something else makes it"
+        )
+        if carrier is not None and given.ratio is not None:
+            phase = "phase" if given.phase is None else f"{given.phase:g}"
+            reason = (
+                f"the ratio is that of angles from the world's x axis, and link {carrier!r}, which carries their axes, "
+                f"turns too; write {{to: {given.ratio:g}*{wheels[1]} + {1 - given.ratio:g}*{carrier} + {phase}}}"
+            )
+        noun = "pulleys" if given.wheels == "belt" else "wheels"
+        message = f"no {noun} can make coupling {coupling.name!r}, and their forces are left out: {reason}"
+        checker.doubt(("mechanism", "couplings", coupling.name, described[0]), message)
 
 
 def _points(link: Link, description: Description) -> dict[str, complex]:

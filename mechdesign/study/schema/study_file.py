@@ -21,7 +21,7 @@ from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, Mark, dotted, has, read
+from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, Mark, dotted, has, read, value_at
 from mechdesign.study.text.forms import Generator, name_forms
 from mechdesign.study.text.reporter import schema_fields
 
@@ -186,6 +186,9 @@ def entry(data: Any, name: str) -> KeyPath:
         if not has(here, key) and key not in keys:
             names = [*keys, *(here if isinstance(here, dict) else ())]
             hint = suggestion(str(key), names) or "; give it a value there first"
+            parameter: KeyPath = ("mechanism", "parameters", name)
+            if value_at(data, parameter) is not None:
+                hint = f"; did you mean {dotted(parameter)!r}?"
             raise StudyError(f"the study has no {dotted(path[: k + 1])}{hint}")
         here = (here[key] if has(here, key) else None) or {}
     return path

@@ -33,9 +33,15 @@ _EXPECTED = defaultdict(
 _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 
+# Keys that are written in place of others.
+_SYNONYMS = {"min": "from", "max": "to", "from": "min", "to": "max"}
+
+
 def unknown_key(name: str, names: Iterable[str]) -> str:
-    """Message of an unknown key, with the most similar key."""
-    return f"unknown key{suggestion(name, names)}"
+    """Message of an unknown key, with the key that is meant the same or is most similar."""
+    candidates = [*names]
+    meant = _SYNONYMS.get(name)
+    return f"unknown key{suggestion(meant if meant in candidates else name, candidates)}"
 
 
 class Remark(NamedTuple):
