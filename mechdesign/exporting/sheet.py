@@ -105,9 +105,9 @@ def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[s
         table = result.tables["extremes"]
         for row in table:
             if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
-                least = ROUNDING * scales.get(str(row["unit"]), 0.0)
-                values = (float(row[key]) for key in ("min", "max", "range"))
-                numbers = (f"{0.0 if abs(value) < least else value:.5g}" for value in values)
+                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
+                extremes = (float(row[key]) for key in ("min", "max", "range"))
+                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
                 rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
     if "loops" in result.tables:
         for row in result.tables["loops"]:
@@ -265,7 +265,8 @@ def _keep_inside(axes: Axes) -> None:
     """Move names that reach beyond the sides of the drawing's region back into it, as far as they have room."""
     for name in axes.texts:
         if isinstance(name, Annotation) and name.get_text():
-            name.update_positions(axes.figure.canvas.get_renderer())
+            # The first call places the name, and its box has the line that leads there too.
+            name.get_window_extent()
             box = Text.get_window_extent(name)
             beyond = max(box.x1 - axes.bbox.x1, 0.0) + min(box.x0 - axes.bbox.x0, 0.0)
             x, y = name.xyann

@@ -222,6 +222,7 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
         own = [entry for entry in lengths if entry[0] == name]
         if link.telescopic and link.ends:
             rows.append((name, " to ".join(link.ends), "variable", "", _section(study, name)))
+            described.add(name)
         for _, one, other, value, angle in own:
             place = f"{name}.length" if link.ends == (one, other) or link.ends == (other, one) else ""
             text = _tolerance(tolerances.pop(place), study.sizes[place]) if place in tolerances else ""
@@ -230,9 +231,9 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
             described.add(name)
         dimensioned = {*(link.ends or ()), *(point for _, one, other, *_ in own for point in (one, other))}
         for point in scene.link_points(name):
-            place = complex(study.mechanism.geometry.local(name, point, {}))
-            if point not in dimensioned and abs(place) > _NONE * scene.span:
-                rows.append(("" if name in described else name, f"{point} in its frame", _place(place, scene), "", ""))
+            local = complex(study.mechanism.geometry.local(name, point, {}))
+            if point not in dimensioned and abs(local) > _NONE * scene.span:
+                rows.append(("" if name in described else name, f"{point} in its frame", _place(local, scene), "", ""))
                 described.add(name)
     rows += _guides(scene)
     rows += [(name, "", _nominal(study, name), _tolerance(size, study.sizes.get(name, 0.0), _unit(study, name)), "")

@@ -420,7 +420,7 @@ def _check_holes(builder: Builder, plates: Plates) -> None:
         if len(links) < 2 or diameter is None:
             continue
         pin, kerf = builder.nominal(diameter), builder.nominal(plates.kerf)
-        path = ("plates", "pins", point) if point in plates.pins else ("plates", "pin")
+        path: KeyPath = ("plates", "pins", point) if point in plates.pins else ("plates", "pin")
         widths = {link: builder.nominal(plates.widths.get(link, plates.width)) for link in links}
         link = min(widths, key=lambda name: widths[name])
         head = f"the pin at {point!r} has a diameter of {pin:g}"
@@ -429,8 +429,8 @@ def _check_holes(builder: Builder, plates: Plates) -> None:
             faults.setdefault(path, message)
         if kerf >= pin:
             faults.setdefault(("plates", "kerf"), f"{head}, and the kerf is {kerf:g}: no hole would be left")
-    for path, message in faults.items():
-        builder.report(path, message, at_key=True)
+    for key, message in faults.items():
+        builder.report(key, message, at_key=True)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
