@@ -68,6 +68,8 @@ def convert(
     if (source is None) == (text is None):
         raise StudyError("give a source, or a text in its place")
     origin = Source.of(os.fspath(source)) if source is not None else Source.of_text(text or "")
+    if not origin.text.strip():
+        raise StudyError(f"{cut(origin.name)} is empty")
     for kind in FORMATS:
         if kind.recognises(origin):
             sketch = kind.read(origin)

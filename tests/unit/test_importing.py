@@ -547,7 +547,7 @@ HOSTILE = {
         TABLES.replace('"ground": true, "drive": true', '"trace": true').replace(', "slide": 0', ""),
         "is on the ground",
     ),
-    "nothing": ("", "format of"),
+    "nothing": ("", "a text is empty"),
     "something else": ("hello", "format of"),
     "an unknown unit": (TABLES.replace('"in"', '"furlong"'), "furlong"),
 }
