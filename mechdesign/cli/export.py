@@ -23,11 +23,13 @@ def export(path: Path | None, to: str, said: tuple[str | None, str | None, str |
     """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `View`."""
     declared = export_named(to)
     study = load_study(path, options)
-    content = declared.make(View(study, *said))
-    for warning in content.warnings:
+    view = View(study, *said)
+    content = declared.make(view)
+    warnings = content.warnings + declared.ignored(view)
+    for warning in warnings:
         terminal.say(f"{study.label}: export: warning: {warning} [{warning.kind}]", quiet=options.quiet)
-    annotate("warning", of_warnings(study, "export", content.warnings))
-    unmet = [verdict for verdict in on_warnings(study, content.warnings) if not verdict.met]
+    annotate("warning", of_warnings(study, "export", warnings))
+    unmet = [verdict for verdict in on_warnings(study, warnings) if not verdict.met]
     for verdict in unmet:
         terminal.say(f"{study.label}: requirement: {verdict}")
     data = content.data.encode() if isinstance(content.data, str) else content.data

@@ -30,6 +30,7 @@ def import_study(
         emit(text)
         return
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
         replace(out, [text.encode()])
     except OSError as error:
         raise OutputError(f"{out}: could not be written: {error.strerror or error}") from error

@@ -41,6 +41,8 @@ class Export:
         What every file of the kind contains: only such a file is written over.
     make : callable
         Makes the content from a study and a pose.
+    options : tuple of str
+        Those of `at`, `rate` and `paper` of the view that it takes.
     """
 
     name: str
@@ -48,18 +50,26 @@ class Export:
     order: int
     mark: bytes
     make: Callable[[View], Content]
+    options: tuple[str, ...] = ()
+
+    def ignored(self, view: View) -> tuple[Caution, ...]:
+        """A warning for each option that is given and that the file does not take."""
+        given = [name for name in ("at", "rate", "paper") if getattr(view, name) is not None]
+        return tuple(
+            Caution("ignored", f"--{name} has no effect on {self.name}") for name in given if name not in self.options
+        )
 
 
 def export(
-    name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign"
+    name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign", options: tuple[str, ...] = ()
 ) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
     """Declare that a function makes the file of this name from a view; see `Export` for the arguments."""
-    return lambda make: Export(name, meaning, order, mark, make)
+    return lambda make: Export(name, meaning, order, mark, make, options)
 
 
 def drawings(
     name: str, meaning: str, order: int, make: Callable[[View], Drawing],
-    cautions: Callable[[View], tuple[Caution, ...]] = lambda _: (),
+    cautions: Callable[[View], tuple[Caution, ...]] = lambda _: (), options: tuple[str, ...] = (),
 ) -> tuple[Export, Export]:  # fmt: skip
     """The exports of a drawing: as DXF, and behind it as SVG; `cautions` are warnings of its own."""
 
@@ -67,8 +77,8 @@ def drawings(
         return Content(to_text(make(view)), view.assumed + view.unmoved + cautions(view))
 
     return (
-        export(f"{name}.dxf", f"{meaning}, as DXF", order)(partial(written, to_dxf)),
-        export(f"{name}.svg", f"{meaning}, as SVG", order + 1)(partial(written, to_svg)),
+        export(f"{name}.dxf", f"{meaning}, as DXF", order, options=options)(partial(written, to_dxf)),
+        export(f"{name}.svg", f"{meaning}, as SVG", order + 1, options=options)(partial(written, to_svg)),
     )
 
 

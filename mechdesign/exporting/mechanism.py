@@ -57,5 +57,5 @@ def mechanism_drawing(view: View) -> Drawing:
 
 
 mechanism_dxf, mechanism_svg = drawings(
-    "mechanism", "the mechanism in a pose and the paths of its points", 30, mechanism_drawing
+    "mechanism", "the mechanism in a pose and the paths of its points", 30, mechanism_drawing, options=("at",)
 )

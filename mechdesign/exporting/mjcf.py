@@ -19,7 +19,9 @@ STEP, HELD = 5e-4, 1e-3
 IMPEDANCE = 0.9999
 
 
-@export("model.xml", "the mechanism for MuJoCo (MJCF): bodies, joints, masses, springs, drives", order=50)
+@export(
+    "model.xml", "the mechanism for MuJoCo (MJCF): bodies, joints, masses, springs, drives", order=50, options=("at",)
+)
 def model_xml(view: View) -> Content:
     """The mechanism as MJCF, and what MuJoCo does not get."""
     bodies = Bodies(view)

@@ -61,7 +61,7 @@ def curve_csv(view: View) -> Content:
     return Content(to_csv(Table("curve", tuple(columns))), view.unmoved)
 
 
-@export("motion.csv", "drives over time at the rate of a controller", order=61, mark=b"time,")
+@export("motion.csv", "drives over time at the rate of a controller", order=61, mark=b"time,", options=("rate",))
 def motion_csv(view: View) -> Content:
     """A row an instant: time, and position, velocity and acceleration of each drive."""
     step = step_of(view.rate or RATE, view.study.units)

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from mechdesign.cautions import Caution
 from mechdesign.exporting.discs import DEVIATION, Disc, cautions, discs_of, open_profiles, replace_plate
 from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, roomiest
 from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.plates import hull, joined
+from mechdesign.mechanism.plates import gap, hull, joined
 from mechdesign.questions.reliability.schema.section import in_words
 
 SHEET = 600.0  # width of the sheet where the study gives none
 SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
+MOST_NAMED = 3  # sentences of a warning at most
 ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
 
 
@@ -28,6 +30,9 @@ class Hole:
     point: str
     ends: tuple[complex, ...]
     radius: float
+
+    def __str__(self) -> str:
+        return f"{'hole' if len(self.ends) == 1 else 'slot'} {self.point}"
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,16 @@ class Part:
     marks: dict[str, complex]
     engraved: Sequence[Shape] = ()
     disc: Disc | None = None
+
+    def faults(self) -> Iterator[str]:
+        """What cannot be cut, in words: holes of different points that overlap, and one that leaves no rim."""
+        for one, other in combinations(self.holes, 2):
+            apart = float(gap(one.ends, other.ends)) - one.radius - other.radius
+            if apart <= 0 and one.ends != other.ends:
+                yield f"{one} and {other} of {self.name!r} overlap"
+        for hole in self.holes:
+            if hole.radius >= self.radius:
+                yield f"{hole} of {self.name!r} leaves no material beside it"
 
     @property
     def turn(self) -> complex:
@@ -190,4 +205,24 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
     return lines
 
 
-parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing, cautions)
+def parts_cautions(view: View) -> tuple[Caution, ...]:
+    """Warnings of parts that cannot be cut as they are, or do not fit on the sheet, and of cams."""
+    parts, sheet, kerf = parts_of(view), view.sizes.sheet, view.millimetres * float(view.sizes.kerf)
+    faults = [fault for part in parts for fault in part.faults()]
+    warnings = [Caution("infeasible", _several(faults))] if faults else []
+    if sheet is not None:
+        width = view.millimetres * float(sheet)
+        lengths = {part.name: (high - low).real for part in parts for low, high in [box(part.shapes(kerf))]}
+        wide = [f"{name!r} is {length:.6g} mm long" for name, length in lengths.items() if length > width]
+        if wide:
+            warnings.append(Caution("infeasible", f"the sheet is {width:.6g} mm wide: {_several(wide)}"))
+    return (*warnings, *cautions(view))
+
+
+def _several(sentences: Sequence[str]) -> str:
+    """The first of some sentences, and how many more there are."""
+    more = len(sentences) - MOST_NAMED
+    return "; ".join(sentences[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+
+
+parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing, parts_cautions)

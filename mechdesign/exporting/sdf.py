@@ -22,7 +22,7 @@ _FORCE = ("gz-sim-apply-joint-force-system", "gz::sim::systems::ApplyJointForce"
 _TYPES = {"hinge": "revolute", "slide": "prismatic", "fixed": "fixed"}
 
 
-@export("model.sdf", "the mechanism for Gazebo (SDF): links, joints, masses, drives", order=51)
+@export("model.sdf", "the mechanism for Gazebo (SDF): links, joints, masses, drives", order=51, options=("at",))
 def model_sdf(view: View) -> Content:
     """The mechanism as SDF, and what Gazebo does not get."""
     bodies = Bodies(view)

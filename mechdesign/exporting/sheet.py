@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.text import Annotation, Text
 from matplotlib.textpath import text_to_path
 
 from mechdesign import __version__
@@ -39,6 +40,8 @@ WIDTH, BLOCK = 180.0, (9.0, 15.0, 10.0)
 ROW, GAP, LEAST = 4.2, 3.5, 110.0
 # Room for each point of a mechanism below which a larger paper is taken (mm^2).
 CROWDED = 400.0
+# Part of the size of the mechanism, or of a turn, below which a number is rounding.
+ROUNDING = 1e-12
 # Around the mechanism, for dimension lines and names (mm).
 PAD = 22.0
 # Sizes of type, of labels, tables and values (points), and the least part to which a table's is reduced.
@@ -54,7 +57,12 @@ SCALES = [f * 10.0**k for k in range(4, -7, -1) for f in (5.0, 2.0, 1.0)]
 Rows = Sequence[Sequence[str]]
 
 
-@export("sheet.pdf", "a drawing sheet: dimensions at a standard scale, tables, a title block", order=40)
+@export(
+    "sheet.pdf",
+    "a drawing sheet: dimensions at a standard scale, tables, a title block",
+    order=40,
+    options=("at", "paper"),
+)
 def sheet_pdf(view: View) -> Content:
     """The sheet as a PDF, and a warning where numbers of the motion are not on it."""
     mechanism = view.mechanism
@@ -80,6 +88,7 @@ def _motion(view: View) -> tuple[Result | None, tuple[Caution, ...]]:
 def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[str, Rows]]:
     """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
     study, label = view.study, view.study.units.label
+    scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
     yield "links", table_rows(study, scene)
     yield "pins", _pins(view)
     if result is None:
@@ -96,7 +105,9 @@ def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[s
         table = result.tables["extremes"]
         for row in table:
             if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
-                numbers = (f"{row[key]:.5g}" for key in ("min", "max", "range"))
+                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
+                extremes = (float(row[key]) for key in ("min", "max", "range"))
+                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
                 rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
     if "loops" in result.tables:
         for row in result.tables["loops"]:
@@ -221,6 +232,7 @@ class Sheet:
         axes.set_xlim(middle.real - half.real, middle.real + half.real)
         axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
         draw_dimensions(axes, view.mechanism, view.pose, scene)
+        _keep_inside(axes)
         unit = view.study.units.label("length")
         words = f"Dimensions{f' in {unit}' if unit else ''}, at {view.posed}"
         words += "; lengths of guides are not to scale" * bool(scene.guides)
@@ -247,6 +259,18 @@ class Sheet:
                 size *= min(1.0, (width - 3) / max(_width(value, size), 1e-9))
                 page.text(x + 1.5, top + 0.38 * height, value, fontsize=size, va="center", color=style.INK)
                 x += width
+
+
+def _keep_inside(axes: Axes) -> None:
+    """Move names that reach beyond the sides of the drawing's region back into it, as far as they have room."""
+    for name in axes.texts:
+        if isinstance(name, Annotation) and name.get_text():
+            # The first call places the name, and its box has the line that leads there too.
+            name.get_window_extent()
+            box = Text.get_window_extent(name)
+            beyond = max(box.x1 - axes.bbox.x1, 0.0) + min(box.x0 - axes.bbox.x0, 0.0)
+            x, y = name.xyann
+            name.xyann = (x - beyond * 72 / axes.figure.dpi, y)
 
 
 def _box(page: Axes, left: float, low: float, width: float, height: float, line: float) -> None:

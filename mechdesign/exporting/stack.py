@@ -1,8 +1,9 @@
 """The layer in which each link lies, so that no plate and no pin meets another over the motion.
 
-A plate fills its layer. A pin passes the layers between those of the links that it joins. What meets in the plane at
-some pose must not share a layer; links that a pin joins always meet. A search with back-tracking finds the fewest
-layers, and among stacks of as many those with the shortest pins.
+A plate fills its layer. A pin passes the layers between those of the links that it joins, and for another pin those of
+the links too. What meets in the plane at some pose must not share a layer; links that a pin joins always meet, and two
+pins of one link always share its layer. A search with back-tracking finds the fewest layers, and among stacks of as
+many those with the shortest pins.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
+from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 
 # Layers that the search for a stack tries at most, one link at a time.
@@ -31,14 +33,21 @@ HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 @export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20, mark=b"item,kind,")
 def layers_csv(view: View) -> Content:
-    """A row for each plate and each pin: its layers, and where it begins and ends above the lowest layer."""
+    """A row for each plate, rod and pin: its layers, and where it begins and ends above the lowest layer.
+
+    The rod of a telescopic link lies in the layer of its body.
+    """
     stack = stack_of(view)
     thickness = view.millimetres * float(view.sizes.thickness)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
-    rows = [(link, "plate", layer, layer) for link, layer in stack.layers.items()]
-    for pin in pins_of(view.mechanism.description):
+    rows, description = list[tuple[str, str, int, int]](), view.mechanism.description
+    for link, layer in stack.layers.items():
+        rows.append((link, "plate", layer, layer))
+        if description.links[link].tip is not None:
+            rows.append((rod_of(link).replace(":", " "), "rod", layer, layer))
+    for pin in pins_of(description):
         layers = [stack.layers[link] for link in pin.links]
         rows.append((pin.name, "pin", min(layers), max(layers)))
     for item, kind, first, last in rows:
@@ -61,20 +70,29 @@ class Meeting:
 
     def broken(self, layers: Mapping[str, int]) -> bool:
         """Whether both share a layer, among the links that are placed."""
-        (begin, end), (first, last) = _span(self.one, layers), _span(self.other, layers)
+        pins = self.one.pin and self.other.pin
+        (begin, end), (first, last) = _span(self.one, layers, whole=pins), _span(self.other, layers, whole=pins)
         return max(begin, first) < min(end, last)
+
+    @property
+    def certain(self) -> bool:
+        """Whether both share a layer in any stack: two pins of one link."""
+        return self.one.pin and self.other.pin and not {*self.one.links}.isdisjoint(self.other.links)
 
     def __str__(self) -> str:
         return f"{self.one} and {self.other} ({self.pose})"
 
 
-def _span(item: Item, layers: Mapping[str, int]) -> tuple[float, float]:
-    """Where an item begins and ends, in layers; nothing of one whose links have none."""
+def _span(item: Item, layers: Mapping[str, int], *, whole: bool) -> tuple[float, float]:
+    """Where an item begins and ends, in layers; nothing of one whose links have none.
+
+    A `whole` pin counts in the plates that it joins and between them, else between them alone.
+    """
     placed = [layers[link] for link in item.links if link in layers]
     if not placed:
         return 0.0, 0.0
-    # A plate is one layer thick; its pin counts between the plates that it joins.
-    return (min(placed) + 0.5, max(placed) - 0.5) if item.pin else (placed[0] - 0.5, placed[0] + 0.5)
+    inside = 0.5 if item.pin and not whole else -0.5
+    return min(placed) + inside, max(placed) - inside
 
 
 @dataclass(frozen=True)
@@ -93,7 +111,7 @@ class Stack:
         named = "; ".join(map(str, self.meetings[:MOST_NAMED]))
         more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
         head = "no stack was found in which nothing meets"
-        if self.complete:
+        if self.complete or all(meeting.certain for meeting in self.meetings):
             head = "in whatever layers, something meets"
         return (Caution("infeasible", f"{head}; here {named}{more}"),)
 
@@ -109,30 +127,35 @@ def meetings_of(view: View) -> list[Meeting]:
 
     Between two poses a distance changes by no more than the fastest corners move: what could meet there counts.
     """
-    description, track = view.mechanism.description, view.track
+    description = view.mechanism.description
     corners = {link: tuple(view.outline(link)) for link in description.links}
-    clearances = Clearances(view.mechanism, view.plates, track.configuration, corners)
+    clearances = Clearances(view.mechanism, view.plates, view.track.configuration, corners)
     plates, pins = [plate_of(link) for link in description.links], pins_of(description)
     shared = {frozenset(pair): pin.name for pin in pins for pair in combinations(pin.links, 2)}
     meetings = []
     for one, other in combinations([*plates, *pins], 2):
-        common = set(one.links) & set(other.links)
-        if one.pin or other.pin:
-            # A pin and a plate that it joins, or two pins of one plate.
-            pose = "" if common else _first(view, clearances, one, other)
+        common = [link for link in one.links if link in other.links]
+        point = shared.get(frozenset((one.name, other.name)))
+        if point and not (one.pin or other.pin):
+            pose = f"joined at {point}"
+        elif common and not (one.pin and other.pin):
+            # A pin and a plate that it joins.
+            pose = ""
         else:
-            point = shared.get(frozenset((one.name, other.name)))
-            pose = f"joined at {point}" if point else _first(view, clearances, one, other)
+            pose = _first(view, clearances, one, other, common[0] if common else None)
         if pose:
             meetings.append(Meeting(one, other, pose))
     return meetings
 
 
-def _first(view: View, clearances: Clearances, one: Item, other: Item) -> str:
-    """The first pose of the motion at which two items meet, in words; empty if they never do."""
+def _first(view: View, clearances: Clearances, one: Item, other: Item, link: str | None) -> str:
+    """The first pose of the motion at which two items meet, in words; empty if they never do.
+
+    How far they move is counted in the frame of a `link`, where one is given.
+    """
     count = len(view.track.places)
     gap = np.broadcast_to(clearances.of(one, other), count)
-    moved = clearances.moved(one) + clearances.moved(other)
+    moved = clearances.moved(one, link) + clearances.moved(other, link)
     between = np.where(view.track.follows, (gap[1:] + gap[:-1] - moved) / 2, np.inf)
     least = np.minimum(gap, np.minimum(np.append(between, np.inf), np.append(np.inf, between)))
     row = np.flatnonzero(least < 0)
@@ -143,14 +166,15 @@ def stacked(
     links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
 ) -> Stack:  # fmt: skip
     """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
-    search, most = _Search(links, pins, meetings, given), max([len(links), *given.values()])
+    avoidable = [meeting for meeting in meetings if not meeting.certain]
+    search, most = _Search(links, pins, avoidable, given), max([len(links), *given.values()])
     for count in range(max([1, *given.values()]), most + 1):
         layers = search.best(count)
         if layers is not None:
-            return Stack(layers, complete=not search.spent)
+            return Stack(layers, [meeting for meeting in meetings if meeting.certain], not search.spent)
         if search.spent:
             break
-    layers = _Search(links, pins, meetings, given, strict=False).best(most)
+    layers = _Search(links, pins, avoidable, given, strict=False).best(most)
     assert layers is not None
     return Stack(layers, [meeting for meeting in meetings if meeting.broken(layers)], not search.spent)
 

@@ -217,6 +217,8 @@ class View:
             name, equals, value = (piece.strip() for piece in part.partition("="))
             if not equals:
                 raise StudyError(f"--at is a pose such as {self.mechanism.drives[0]}=60, not {part.strip()!r}")
+            if name in values:
+                raise StudyError(f"--at gives {name} twice")
             kind = self.mechanism.quantity(name)
             try:
                 values[name] = float(read_number(value, context, kind))

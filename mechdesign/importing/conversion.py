@@ -17,6 +17,9 @@ from mechdesign.importing.source import Source
 from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
 
+# Most links that move against each other.
+MOST_LINKS = 200
+
 
 def convert(
     source: str | os.PathLike[str] | None = None,
@@ -65,13 +68,15 @@ def convert(
     if (source is None) == (text is None):
         raise StudyError("give a source, or a text in its place")
     origin = Source.of(os.fspath(source)) if source is not None else Source.of_text(text or "")
+    if not origin.text.strip():
+        raise StudyError(f"{cut(origin.name)} is empty")
     for kind in FORMATS:
         if kind.recognises(origin):
             sketch = kind.read(origin)
             break
     else:
         names = "; ".join(kind.name for kind in FORMATS)
-        raise StudyError(f"{cut(origin.name)} is of no format that is read: {names}")
+        raise StudyError(f"the format of {cut(origin.name)} is not known; what can be imported: {names}")
     if not sketch.links:
         raise StudyError(f"{cut(origin.name)} has no links")
     if not sketch.fixed:
@@ -81,7 +86,11 @@ def convert(
     if unit is not None:
         sketch.units["length"] = unit
     _choose(sketch, drives)
-    return _settled(Draft(sketch), cut(origin.name))
+    draft = Draft(sketch)
+    if len(draft.moving) > MOST_LINKS:
+        count = len(draft.moving)
+        raise StudyError(f"the mechanism has {count} moving links, more than {MOST_LINKS}: take a part of it")
+    return _settled(draft, cut(origin.name))
 
 
 def _scale(sketch: Sketch, factor: float) -> None:
@@ -109,11 +118,14 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
         sketch.drives = [_named(sketch, name) for name in chosen]
         return
     if not sketch.drives:
-        pins = [name for name in sketch.fixed if sketch.moving_at(name)]
-        listed = ", ".join(map(repr, pins[:12]))
-        raise StudyError(
-            f"the file says of no joint that it is driven: choose with --drive; pins of the ground: {listed}"
-        )
+        choices = {
+            "pins of the ground": [name for name in sketch.fixed if len(sketch.turned_at(name)) == 2],
+            "slides": [*sketch.slides],
+        }
+        if not any(choices.values()):
+            choices = {"links": [*sketch.links]}
+        named = "; ".join(f"{noun}: {', '.join(map(repr, names[:12]))}" for noun, names in choices.items() if names)
+        raise StudyError(f"the file says of no joint that it is driven: choose with --drive; {named}")
     kept: dict[tuple[str, str], Drive] = {}
     for drive in sketch.drives:
         kept.setdefault((drive.kind, drive.of), drive)

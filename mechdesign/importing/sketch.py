@@ -243,6 +243,19 @@ def mapping(raw: Any, noun: str) -> dict[str, Any]:
     return raw
 
 
+def listed(raw: Any, meaning: str) -> list[Any]:
+    """A list of a file.
+
+    Raises
+    ------
+    StudyError
+        If it is none.
+    """
+    if not isinstance(raw, list):
+        raise StudyError(f"{cut(meaning)} is {cut(repr(raw))}, not a list")
+    return raw
+
+
 def number(raw: Any, meaning: str) -> float:
     """A finite number of a file.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 from dataclasses import dataclass, field
@@ -42,6 +43,9 @@ class Source:
         if path.name.lower() in (JOINTS, LINKS):
             path = path.parent
         if path.is_dir():
+            missing = [name for name in (JOINTS, LINKS) if not (path / name).exists()]
+            if missing:
+                raise StudyError(f"the folder {cut(str(path))!r} has no {' and no '.join(missing)}")
             tables = {name: _read(path / name) for name in (JOINTS, LINKS)}
             return cls(path.resolve().name, tables[JOINTS], tables)
         return cls(path.name, _read(path))
@@ -72,7 +76,13 @@ class Source:
 
 
 def _read(path: Path) -> str:
-    return _bounded(Folder(path.parent, anywhere=True).text(path.name), str(path))
+    """The text of a file in UTF-8 or UTF-16, else in the code page of Windows, as older drawings are."""
+    content = Folder(anywhere=True).content(path)
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        return _bounded(content.decode("utf-16" if wide else "utf-8-sig"), str(path))
+    except UnicodeDecodeError:
+        return _bounded(content.decode("cp1252", errors="replace"), str(path))
 
 
 def _bounded(text: str, name: str) -> str:

@@ -165,9 +165,13 @@ class Clearances:
         tip = [self._node(link.tip)] if link.tip is not None else []
         return [*(origin + along * corner for corner in self.corners[item.name]), *tip]
 
-    def moved(self, item: Item) -> Value:
-        """The longest way of a place of an item from each pose to the next, shape (n - 1,)."""
-        ways = [np.abs(np.diff(corner)) for corner in self.around(item) if np.ndim(corner)]
+    def moved(self, item: Item, link: str | None = None) -> Value:
+        """The longest way of a place of an item from each pose to the next, shape (n - 1,); in a link's frame."""
+        places = self.around(item)
+        if link is not None:
+            origin, along = self.mechanism.frame(link, self.configuration)
+            places = [(place - origin) * np.conj(along) for place in places]
+        ways = [np.abs(np.diff(place)) for place in places if np.ndim(place)]
         return np.maximum.reduce(ways) if ways else 0.0
 
     def _radius(self, item: Item) -> Value:

@@ -26,6 +26,12 @@ def test_wrong_poses_and_names_are_told(folder, invoke):
         (("--to", "part.dxf"), 2, "there is no 'part.dxf' to export; did you mean 'parts.dxf'?"),
         (("--to", "mechanism.svg", "--at", "60"), 2, "--at is a pose such as theta=60, not '60'"),
         (("--to", "mechanism.svg", "--at", "theta=60 mm"), 2, "'60 mm' is a length, where an angle is expected"),
+        (("--to", "mechanism.svg", "--at", "theta=30, theta=40"), 2, "--at gives theta twice"),
+        (
+            ("--to", "parts.svg", "--at", "theta=60", "--rate", "1 kHz"),
+            0,
+            "--rate has no effect on parts.svg",
+        ),
         (("--to", "mechanism.svg", "--at", "B.x=500"), 3, "cannot be assembled"),
         (("--to", "parts.dxf", "--strict"), 1, "requirement: "),
     ):

@@ -27,8 +27,9 @@ def test_what_cannot_be_imported_is_a_message(tmp_path, monkeypatch, invoke):
         (["arm.json"], "choose with --drive"),
         (["arm.json", "--drive", "Q"], "--drive Q"),
         (["none.dxf"], "cannot be read"),
-        (["arm.json", "--drive", "O", "--out", "no/arm.yaml"], "could not be written"),
+        (["arm.json", "--drive", "O", "--out", "arm.json/arm.yaml"], "could not be written"),
     ):
         done = invoke("import", *arguments)
-        assert done.exit_code == (4 if "no/arm.yaml" in arguments else 2)
+        assert done.exit_code == (4 if "arm.json/arm.yaml" in arguments else 2)
         assert message in done.stderr
+    assert invoke("import", "arm.json", "--drive", "O", "--out", "new/arm.yaml").exit_code == 0

@@ -127,6 +127,12 @@ def test_wrong_pairs_are_refused(pairs, words):
         mechdesign.load(text=FOUR_BAR, overrides={"kinematics.collisions": pairs})
 
 
+def test_all_pairs_of_which_none_is_left_are_refused():
+    arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, A, 9]}, drives: [arm], plates: {width: 2}, "
+    with pytest.raises(StudyError, match="nothing is left to compare"):
+        mechdesign.load(text=arm + "sketch: {A: [9, 0]}}", overrides={"kinematics.collisions": True})
+
+
 def test_clearances_need_plates():
     with pytest.raises(StudyError, match=r"give mechanism.plates, such as {width: 20}"):
         mechdesign.load(text=FOUR_BAR.replace("  plates: {width: w, pin: 4}\n", ""))

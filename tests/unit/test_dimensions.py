@@ -48,6 +48,12 @@ def test_numbers_of_a_four_bar_are_its_lengths_and_stand_apart(look):
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
+def test_a_point_inside_its_link_has_its_place_in_the_table():
+    study = study_of(FOUR_BAR.replace("{C: [e, 60]}", "{C: [e, 60], I: [40, 10]}"))
+    rows = table_rows(study, pose(study.mechanism, study.mechanism.sketch_configuration))
+    assert ("", "I in its frame", "(40, 10)", "", "") in rows
+
+
 def test_the_table_tells_tolerances_and_sections():
     study = study_of(FOUR_BAR)
     rows = table_rows(study, pose(study.mechanism, study.mechanism.sketch_configuration))

@@ -287,9 +287,42 @@ def test_what_meets_in_any_layers_is_named_with_the_pose():
     assert str(warning) == "in whatever layers, something meets; here coupler and rocker (joined at B)"
 
 
-def test_a_hole_as_wide_as_its_link_is_refused():
-    with pytest.raises(StudyError, match="the pin 'A' has 8, and link 'coupler' is only 8 wide: its hole would cut"):
-        view(FOUR_BAR, overrides={"mechanism.links.coupler.width": 8})
+def test_pins_that_pass_each_other_are_named_where_they_share_a_link():
+    """The ram's pin slides in the frame, on the line of the crank's shaft: over it, or past it."""
+    over = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 20], ram: {C: [0, 0], T: [40, 0]}}
+  joints: {guide: {prismatic: [ground, ram], through: O, point: C}}
+  drives: {theta: {angle: crank}}
+  couplings: {push: {set: guide, to: 30*sin(theta)}}
+  sketch: {A: [20, 0], C: [0, 0], T: [40, 0]}
+  plates: {width: 14, pin: 5}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 5}}}
+"""
+    assert "in whatever layers, something meets; here pin O and pin C (" in str(stack_of(view(over)).cautions[0])
+    assert not stack_of(view(over.replace("30*sin", "40 + 30*sin"))).meetings
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("links.coupler.width", 8, "the pin at 'A' has a diameter of 8, and link 'coupler' is 8 wide: its hole would"),
+        ("plates.kerf", 6, "the pin at 'O' has a diameter of 6, and the kerf is 6: no hole would be left"),
+    ],
+)
+def test_a_hole_as_wide_as_its_link_or_as_the_kerf_is_refused(key, value, words):
+    with pytest.raises(StudyError, match=words):
+        view(FOUR_BAR, overrides={f"mechanism.{key}": value})
+
+
+def test_holes_that_overlap_and_a_narrow_sheet_are_warnings():
+    crowded = FOUR_BAR.replace("width: 16, pin: 6, pins: {A: 8}", "width: 40, pin: 32, sheet: 130").replace(
+        "P: [", "X: ["
+    )
+    crowded = crowded.replace(", width: 12", "").replace("outputs: [P]", "outputs: [X]").partition("reliability")[0]
+    overlap, wide = export_named("parts.dxf").make(view(crowded)).warnings
+    assert str(overlap) == "hole O and hole A of 'crank' overlap"
+    assert str(wide) == "the sheet is 130 mm wide: 'ground' is 140.2 mm long; 'coupler' is 130.2 mm long"
 
 
 def test_the_least_width_of_a_link_is_that_of_links_without_one():

@@ -425,6 +425,22 @@ def test_a_drawing_of_lines_and_circles_is_a_four_bar(tmp_path, plate):
     assert "1 of the kind TEXT" in study.text.decode()
 
 
+def test_circles_seen_from_behind_are_mirrored_and_those_on_no_link_are_listed(tmp_path):
+    pins = [(kind, layer, (-x, y)) for kind, layer, (x, y) in (*PINS, ("CIRCLE", "0", (60, 7)))]
+    behind = drawing(*pins).replace("40\n3", "40\n3\n210\n0\n220\n0\n230\n-1").partition("ENTITIES\n")[2]
+    text = drawing(*BARS, *PLATES["R12"]).replace("0\nENDSEC\n0\nEOF\n", behind)
+    (tmp_path / "behind.dxf").write_text(text, encoding="utf-16")
+    study = study_of(tmp_path / "behind.dxf")
+    (drive,) = study.mechanism.drives
+    assert study.mechanism.nominal[f"{drive}.length"] == pytest.approx(30)
+    assert "circles that lie on no link: P5 at (60, 7)" in study.text.decode()
+
+
+def test_attributes_without_a_space_between_are_read():
+    text = (DATA / "four_gears.linkage2").read_text()
+    assert mechdesign.convert(text=text.replace('" ', '"')) == mechdesign.convert(text=text)
+
+
 def test_a_drawing_with_a_guide_is_a_slider_crank():
     bars = [("LINE", "link", (0, 0), (3, 4)), ("LINE", "link", (3, 4), (15, 1)), ("LINE", "notes", (9, 9), (8, 8))]
     pins = [PINS[0], ("CIRCLE", "0", (3, 4)), ("CIRCLE", "0", (15, 1))]
@@ -496,6 +512,9 @@ TABLES_OF_FOUR = """{{"joints": [{{"name": "{O}", "x": 0, "y": 0, "ground": "yes
  {{"name": "{rod}", "joints": ["{A}", "{B}", "{P}"]}}, {{"name": "{rocker}", "joints": ["{D}", "{B}"]}}]}}"""
 
 
+CHAIN = "".join(f'<connector id="{k}" x="{k}" y="{k % 3}" anchor="{str(not k).lower()}"/>' for k in range(203))
+CHAIN += "".join(f'<Link id="{k}"><connector id="{k}"/><connector id="{k + 1}"/></Link>' for k in range(202))
+CHAIN = f"<linkage2>{CHAIN}</linkage2>".replace('anchor="true"', 'anchor="true" input="true"')
 LAUGHS = "<!DOCTYPE linkage2 [<!ENTITY a 'aaaa'><!ENTITY b '&a;&a;&a;'>]><linkage2><connector id='&b;'/></linkage2>"
 HOSTILE = {
     "entities": (LAUGHS, "document type or entities"),
@@ -504,8 +523,12 @@ HOSTILE = {
     "broken XML": ("<linkage2><connector id=</linkage2>", "no XML"),
     "huge number": ('<linkage2><connector id="0" x="1e400" y="0"/></linkage2>', "x of connector 0 is '1e400'"),
     "no number": (TABLES.replace("15", "NaN"), "x of joint 'B' is nan"),
-    "huge whole number": (TABLES.replace("15", "9" * 5000), "not a number|of no format"),
-    "deep JSON": ("[" * 100_000, "of no format"),
+    "huge whole number": (TABLES.replace("15", "9" * 5000), "not a number|format of"),
+    "deep JSON": ("[" * 100_000, "format of"),
+    "a number of links": ('{"joints": [], "links": 5}', "links is 5, not a list"),
+    "a text of joints": ('{"joints": "O A", "links": []}', "joints is 'O A', not a list"),
+    "a plane askew": (drawing(*BARS, PINS[0]).replace("40\n3", "40\n3\n210\n0.7\n230\n0.7"), "inclined plane"),
+    "a long chain": (CHAIN, "202 moving links, more than 200"),
     "wrong kinds": ('{"joints": [3], "links": []}', "a joint is 3"),
     "lists for names": ('{"joints": [{"type": "revolute", "id": [1]}], "links": []}', "the name"),
     "two of a name": (TABLES.replace('"A", "x"', '"O", "x"'), "two joints have the name 'O'"),
@@ -524,8 +547,8 @@ HOSTILE = {
         TABLES.replace('"ground": true, "drive": true', '"trace": true').replace(', "slide": 0', ""),
         "is on the ground",
     ),
-    "nothing": ("", "of no format"),
-    "something else": ("hello", "of no format"),
+    "nothing": ("", "a text is empty"),
+    "something else": ("hello", "format of"),
     "an unknown unit": (TABLES.replace('"in"', '"furlong"'), "furlong"),
 }
 
@@ -540,5 +563,7 @@ def test_what_is_no_mechanism_is_a_message(case):
 def test_a_file_that_is_not_there_or_too_large_is_a_message(tmp_path):
     with pytest.raises(mechdesign.StudyError, match="cannot be read"):
         mechdesign.convert(tmp_path / "none.linkage2")
+    with pytest.raises(mechdesign.StudyError, match=r"the folder .* has no joints.csv and no links.csv"):
+        mechdesign.convert(tmp_path)
     with pytest.raises(mechdesign.StudyError, match="larger than 5 million characters"):
         mechdesign.convert(text="0" * 5_000_001)

@@ -26,6 +26,8 @@ _CLOSE = 1e-6
 # Units of length by their number in the header.
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
 _WORDS = ("ground", "drive", "trace", "slide")
+# Shapes with coordinates in a plane of their own; those of the others are of the drawing.
+_OWN_PLANE = ("LWPOLYLINE", "POLYLINE", "CIRCLE")
 _READ = ("LINE", "LWPOLYLINE", "POLYLINE", "VERTEX", "SEQEND", "CIRCLE", "POINT")
 
 
@@ -35,6 +37,7 @@ class _Shape:
     layer: str
     places: list[complex] = field(default_factory=list)
     closed: bool = False
+    mirrored: bool = False
 
     def on(self, word: str) -> bool:
         return word in self.layer
@@ -55,7 +58,7 @@ def read(source: Source) -> Sketch:
         If it is binary or broken, or has nothing that could be a link.
     """
     if source.text.startswith("AutoCAD Binary DXF"):
-        raise StudyError("a binary DXF: save it as ASCII")
+        raise StudyError("the drawing is a binary DXF: save it as DXF in ASCII, R12 to 2018")
     sketch = source.started(_TOOL)
     shapes, others, unit = _shapes(source.text)
     if unit is None:
@@ -106,19 +109,36 @@ def _add_shape(shapes: list[_Shape], kind: str, groups: list[tuple[int, str]]) -
     layer = next((value for code, value in groups if code == 8), "").lower()
     xs = [number(value, f"x of a {kind}") for code, value in groups if code in (10, 11)]
     ys = [number(value, f"y of a {kind}") for code, value in groups if code in (20, 21)]
-    places = [complex(x, y) for x, y in zip(xs, ys, strict=False)]
+    outer = shapes[-1] if kind == "VERTEX" and shapes and shapes[-1].kind == "POLYLINE" else None
+    mirrored = kind in _OWN_PLANE and _mirrored(kind, groups) if outer is None else outer.mirrored
+    places = [complex(-x if mirrored else x, y) for x, y in zip(xs, ys, strict=False)]
     closed = any(code == 70 and value.isdigit() and int(value[:9]) & 1 for code, value in groups)
     if kind == "VERTEX":
-        if shapes and shapes[-1].kind == "POLYLINE":
-            shapes[-1].places += places
+        if outer is not None:
+            outer.places += places
     elif kind == "POLYLINE":
-        shapes.append(_Shape(kind, layer, closed=closed))
+        shapes.append(_Shape(kind, layer, closed=closed, mirrored=mirrored))
     elif kind != "SEQEND" and places:
         shapes.append(_Shape(kind, layer, places, closed and kind == "LWPOLYLINE"))
     if len(shapes) > MOST or sum(len(shape.places) for shape in shapes[-1:]) > MOST:
         raise StudyError(
             f"the drawing has more than {MOST} lines and circles, or corners of a polyline; take a part of it"
         )
+
+
+def _mirrored(kind: str, groups: list[tuple[int, str]]) -> bool:
+    """Whether the plane of a shape, given by its normal, is seen from behind: its x points to the left.
+
+    Raises
+    ------
+    StudyError
+        If the plane is inclined.
+    """
+    given = {code: number(value, f"the plane of a {kind}") for code, value in groups if code in (210, 220, 230)}
+    x, y, z = (given.get(code, default) for code, default in ((210, 0.0), (220, 0.0), (230, 1.0)))
+    if max(abs(x), abs(y)) > _CLOSE * abs(z):
+        raise StudyError(f"a {kind} of the drawing lies in an inclined plane: draw it in the x-y plane")
+    return z < 0
 
 
 class _Drawing:
@@ -152,6 +172,9 @@ class _Drawing:
         pinned = {self._at(circle.places[0]) for circle in pins}
         for count, group in enumerate(self._links(pinned), 1):
             self.sketch.add_link(f"link_{count}", group)
+        loose = [name for name in self.sketch.points if name in pinned and not self.sketch.links_with(name)]
+        if loose:
+            self.sketch.omitted.append(f"circles that lie on no link: {', '.join(map(self._written, loose))}")
         self._add_slides()
         for circle in self.circles:
             if circle.on("drive"):
@@ -160,6 +183,10 @@ class _Drawing:
             self.sketch.choices.append("circles are pins; lines that touch without one are one rigid link")
         else:
             self.sketch.choices.append("the drawing has no circles: common ends of lines are pins")
+
+    def _written(self, name: str) -> str:
+        place = self.sketch.points[name]
+        return f"{name} at ({place.real:.6g}, {place.imag:.6g})"
 
     def _at(self, place: complex) -> str | None:
         return next((name for name, other in self.sketch.points.items() if abs(other - place) <= self.close), None)

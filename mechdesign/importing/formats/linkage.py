@@ -8,6 +8,7 @@ program shows [rectorsquid/Linkage, LinkageDoc.cpp, Simulator.cpp].
 from __future__ import annotations
 
 import math
+import re
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from mechdesign.errors import StudyError
@@ -21,6 +22,8 @@ _ROOT = "linkage2"
 # Deepest nesting of elements, and most of them.
 _DEEPEST = 10
 _MOST_ELEMENTS = 50_000
+# The value of an attribute and the letter behind it: some files have no space before the next attribute.
+_ATTRIBUTE = re.compile(r"""(=\s*"[^"<]*")([A-Za-z_]?)""")
 # What the program shows of a unit of the file; its millimetres are 24.5 to the inch.
 _UNITS = {"Millimeters": ("mm", 24.5 / 96), "Inches": ("in", 1 / 96)}
 # The layer of what is drawn only.
@@ -72,6 +75,7 @@ class _Builder(TreeBuilder):
 
 def _parsed(text: str) -> Element:
     parser = XMLParser(target=_Builder())
+    text = _ATTRIBUTE.sub(lambda match: f"{match[1]} {match[2]}" if match[2] else match[1], text)
     try:
         parser.feed(text.encode(errors="surrogatepass"))
         root: Element = parser.close()

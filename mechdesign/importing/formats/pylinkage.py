@@ -13,7 +13,7 @@ from typing import Any
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Sketch, mapping, number
+from mechdesign.importing.sketch import Drive, Sketch, listed, mapping, number
 from mechdesign.importing.source import Source
 
 NAME = "pylinkage (JSON)"
@@ -47,14 +47,8 @@ def read(source: Source) -> Sketch:
     if any(joint.get("type") in _OLD for joint in joints):
         _read_linkage(sketch, joints)
     else:
-        _read_mechanism(sketch, joints, [mapping(link, "link") for link in _list(data.get("links", []), "links")])
+        _read_mechanism(sketch, joints, [mapping(link, "link") for link in listed(data.get("links", []), "links")])
     return sketch
-
-
-def _list(raw: Any, key: str) -> list[Any]:
-    if not isinstance(raw, list):
-        raise StudyError(f"{key} is {cut(repr(raw))}, not a list")
-    return raw
 
 
 def _name(raw: Any, noun: str) -> str:
@@ -94,7 +88,7 @@ def _read_mechanism(sketch: Sketch, joints: list[dict[str, Any]], links: list[di
 
 def _add_link(sketch: Sketch, link: dict[str, Any]) -> None:
     name, kind = _name(link.get("id"), "link"), link.get("type", "link")
-    points = [_name(joint, "joint") for joint in _list(link.get("joints", []), f"the joints of {name!r}")]
+    points = [_name(joint, "joint") for joint in listed(link.get("joints", []), f"the joints of {name!r}")]
     motor = link.get("motor_joint")
     if kind == "ground":
         sketch.fix(points)

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import Sketch, mapping, number
+from mechdesign.importing.sketch import Sketch, listed, mapping, number
 from mechdesign.importing.source import JOINTS, LINKS, Source
 
 NAME = "joints.csv and links.csv, or both as JSON"
@@ -43,7 +43,7 @@ def read(source: Source) -> Sketch:
     if source.tables:
         joints, links = (list(_rows(source.tables[name], name)) for name in (JOINTS, LINKS))
     else:
-        joints, links = source.data["joints"], source.data["links"]
+        joints, links = (listed(source.data[key], key) for key in ("joints", "links"))
         sketch.units = {"length": str(source.data.get("units", "mm"))}
     driven = [drive for joint in joints for drive in _add_joint(sketch, mapping(joint, "joint"))]
     for link in (mapping(raw, "link") for raw in links):

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 
 from mechdesign.errors import counted
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.plates import CLEARANCE, pins_of
+from mechdesign.mechanism.plates import CLEARANCE, pairs_of, pins_of
 from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.loads import Load, check_friction, check_loads
@@ -113,6 +113,10 @@ class KinematicsSection(MotionSection):
             checker.report(path, message, at_key=True)
         self._check_pairs(checker, "collisions", "a clearance")
         pins = [] if checker.compiled is None else pins_of(checker.compiled.description)
+        compared = checker.compiled is None or bool(self.collisions or pairs_of(checker.compiled.description))
+        if checker.mechanism.plates is not None and not compared:
+            message = "nothing is left to compare: any two links are joined, or lie in different layers; leave it out"
+            checker.report(path, message, at_key=True)
         for index, pair in enumerate(self.collisions):
             at = next((pin.name for pin in pins if {*pair} <= {*pin.links}), None)
             if pair[0] != pair[1] and at is not None:

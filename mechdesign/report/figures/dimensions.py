@@ -210,6 +210,8 @@ def _over(box: Floats, other: Floats) -> bool:
 def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
     """Link, its points, length, tolerance and section; then what else varies. Without columns that hold nothing.
 
+    Points without a length have a row with their place in the frame of the link, unless they are its origin.
+
     No rows at all of a mechanism without dimensions.
     """
     tolerances = dict(study.reliability.dimensions) if study.reliability is not None else {}
@@ -220,12 +222,19 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
         own = [entry for entry in lengths if entry[0] == name]
         if link.telescopic and link.ends:
             rows.append((name, " to ".join(link.ends), "variable", "", _section(study, name)))
+            described.add(name)
         for _, one, other, value, angle in own:
             place = f"{name}.length" if link.ends == (one, other) or link.ends == (other, one) else ""
             text = _tolerance(tolerances.pop(place), study.sizes[place]) if place in tolerances else ""
             section = "" if name in described else _section(study, name)
             rows.append(("" if name in described else name, f"{one} to {other}", _number(value, angle), text, section))
             described.add(name)
+        dimensioned = {*(link.ends or ()), *(point for _, one, other, *_ in own for point in (one, other))}
+        for point in scene.link_points(name):
+            local = complex(study.mechanism.geometry.local(name, point, {}))
+            if point not in dimensioned and abs(local) > _NONE * scene.span:
+                rows.append(("" if name in described else name, f"{point} in its frame", _place(local, scene), "", ""))
+                described.add(name)
     rows += _guides(scene)
     rows += [(name, "", _nominal(study, name), _tolerance(size, study.sizes.get(name, 0.0), _unit(study, name)), "")
              for name, size in tolerances.items()]  # fmt: skip
@@ -241,6 +250,11 @@ def _guides(scene: Scene) -> Iterator[tuple[str, ...]]:
             angle = math.degrees(math.atan2(guide.along.imag, guide.along.real))
             offset = _number(0.0 if far < _NONE * scene.span else far, angle)
             yield guide.joint, f"{pivots[0]} to its line", offset, "", ""
+
+
+def _place(place: complex, scene: Scene) -> str:
+    x, y = (0.0 if abs(value) < _NONE * scene.span else value for value in (place.real, place.imag))
+    return f"({x:.5g}, {y:.5g})"
 
 
 def _nominal(study: Study, name: str) -> str:

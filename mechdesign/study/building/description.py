@@ -413,17 +413,24 @@ def _plates(builder: Builder) -> Plates | None:
 
 
 def _check_holes(builder: Builder, plates: Plates) -> None:
-    """Check that no hole of a given diameter is as wide as its link."""
+    """Check that the holes of every given diameter are narrower than their links and wider than the kerf."""
+    faults: dict[KeyPath, str] = {}
     for point, links in builder.section.owners.items():
         diameter = plates.pins.get(point, plates.pin)
         if len(links) < 2 or diameter is None:
             continue
-        for link in links:
-            pin, width = builder.nominal(diameter), builder.nominal(plates.widths.get(link, plates.width))
-            if pin >= width:
-                message = f"the pin {point!r} has {pin:g}, and link {link!r} is only {width:g} wide"
-                path: KeyPath = ("plates",) if builder.section.plates is not None else ("links", link)
-                builder.report(path, f"{message}: its hole would cut the link through", at_key=True)
+        pin, kerf = builder.nominal(diameter), builder.nominal(plates.kerf)
+        path: KeyPath = ("plates", "pins", point) if point in plates.pins else ("plates", "pin")
+        widths = {link: builder.nominal(plates.widths.get(link, plates.width)) for link in links}
+        link = min(widths, key=lambda name: widths[name])
+        head = f"the pin at {point!r} has a diameter of {pin:g}"
+        if pin >= widths[link]:
+            message = f"{head}, and link {link!r} is {widths[link]:g} wide: its hole would cut the link through"
+            faults.setdefault(path, message)
+        if kerf >= pin:
+            faults.setdefault(("plates", "kerf"), f"{head}, and the kerf is {kerf:g}: no hole would be left")
+    for key, message in faults.items():
+        builder.report(key, message, at_key=True)
 
 
 def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:

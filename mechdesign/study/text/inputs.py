@@ -43,6 +43,19 @@ class Folder:
 
     def _text(self, file: Path) -> str:
         try:
+            return self.content(file).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise StudyError(f"{file} cannot be read: not a text file; save the table as CSV in UTF-8") from None
+
+    def content(self, file: Path) -> bytes:
+        """The bytes of a file.
+
+        Raises
+        ------
+        StudyError
+            Where it lies elsewhere, cannot be read, or is too large.
+        """
+        try:
             if not self.anywhere and not file.resolve().is_relative_to(self.path.resolve()):
                 raise StudyError(f"{file} is not in the folder of the study; --allow-files reads it all the same")
             # Opened without waiting, as a pipe may never be written to.
@@ -52,9 +65,7 @@ class Folder:
                 content = stream.read(MAX_FILE_BYTES + 1)
             if len(content) > MAX_FILE_BYTES:
                 raise StudyError(f"{file} cannot be read: larger than {MAX_FILE_BYTES // 1_000_000} MB")
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise StudyError(f"{file} cannot be read: not a text file; save the table as CSV in UTF-8") from None
+            return content
         except (OSError, ValueError, RuntimeError) as error:
             # The name may be impossible, or links may form a circle.
             raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'no such name'}") from None
