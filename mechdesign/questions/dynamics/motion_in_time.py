@@ -46,9 +46,7 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import VELOCITY
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
-# Friction has corners where what a joint bears changes its side: with it steps may err so many times more.
 RELATIVE, ABSOLUTE = 1e-11, 1e-12
-ROUGHER = 100.0
 MAX_STEPS = 5000
 MAX_BOUNCES = 1000
 # Another chart takes over where its coordinates move so many times faster.
@@ -399,13 +397,12 @@ class Integration:
         return states[: self.count], states[self.count : 2 * self.count], states[2 * self.count :]
 
     def _solver(self, time: float, state: Floats) -> DOP853:
-        part = ROUGHER if self.equations.contacts else 1.0
-        tolerance: Any = part * ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
+        tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
         steps: dict[str, Any] = {}
         if not self.equations.signs.all() and time < self.end:
             # What begins to slide does so within the first step; a load that moves what rests is not stepped over.
             steps = {"first_step": min(FIRST_STEP / self.pace, self.end - time), "max_step": LONGEST_REST * self.end}
-        return DOP853(self._function, time, state, self.end, rtol=part * RELATIVE, atol=tolerance, **steps)
+        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance, **steps)
 
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
