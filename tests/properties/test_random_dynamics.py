@@ -76,7 +76,8 @@ class Row:
 def rows_of(case: Loaded) -> list[Row]:
     table = case.result.tables["joint_forces"]
     count = len(table) // case.bodies.poses
-    return [Row(case, k, count) for k in range(count)]
+    # Moments of couplings are those of the bodies' multipliers, see `judge_equilibrium`.
+    return [Row(case, k, count) for k in range(count) if table["joint"][k] not in case.layout.couplings]
 
 
 def holder_of_pin(layout: Layout, point: str, rows: Sequence[Row]) -> str:

@@ -446,10 +446,10 @@ class Integration:
         """Why the motion ends before its time."""
         if steps > MAX_STEPS:
             return f"{MAX_STEPS} steps are not enough"
-        if self.equations.jams:
-            return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
         x, velocity, _ = self._parts_of(solver.y[:, None])
         efforts = self.equations.rates(np.array([solver.t]), x, velocity).efforts[:, 0]
+        if self.equations.jams:
+            return f"friction in {self.equations.jams} jams the mechanism, no acceleration agrees with it,"
         for drive, effort in zip(self.equations.drives, efforts, strict=True):
             if not np.isfinite(effort):
                 return f"the effort of {drive.name} is not finite"
