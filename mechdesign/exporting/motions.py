@@ -50,9 +50,9 @@ def curve_csv(view: View) -> Content:
         along = view.question.poses.along(np.zeros(len(parts), dtype=np.intp), track.places)
         assert along.times is not None
         columns.append(TIMED.column(along.times, study.units.label("time")))
-    asked = study.kinematics.outputs if study.kinematics is not None else None
+    chosen = study.kinematics.outputs if study.kinematics is not None else None
     points = [point for point, rank in ranks(study).items() if rank == 2]
-    outputs = expand_outputs(study, (*(asked or default_outputs(mechanism)), *points))
+    outputs = expand_outputs(study, (*(chosen or default_outputs(mechanism)), *points))
     names = dict.fromkeys([*given, *(output.name for output in outputs)])
     for coordinate in map(mechanism.coordinate, names):
         values = np.broadcast_to(in_study_units(study, coordinate, track.configuration.value(coordinate)), parts.shape)
@@ -208,8 +208,8 @@ def _forward(study: Study, step: float) -> Table:
     times = _instants(section.forward.duration, step)
     if not 2 <= len(times) <= MAX_ROWS:
         raise StudyError(f"{len(times)} instants; from 2 to {MAX_ROWS} are possible: ask for another --rate")
-    asked = section.forward.model_copy(update={"rows": len(times), "duration": float(times[-1])})
-    moving = replace(study, dynamics=section.model_copy(update={"forward": asked}))
+    sampled = section.forward.model_copy(update={"rows": len(times), "duration": float(times[-1])})
+    moving = replace(study, dynamics=section.model_copy(update={"forward": sampled}))
     table = forward(moving, NULL)[0].tables["forward"]
     names = [(drive, *(f"{drive}_{word}" for word in ORDERS)) for drive in study.mechanism.drives]
     return Table("motion", tuple(table.column(name) for name in ("time", *sum(names, ()))))

@@ -6,7 +6,7 @@ Limits of motion that a study states are margins: positive inside, zero at the l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -124,6 +124,23 @@ class Core:
     def pressing(self) -> list[Mesh]:
         """Those whose forces are known."""
         return [mesh for mesh in self.meshes if mesh.presses]
+
+    def pitch_radius(self, coupling: str, places: Mapping[str, Value]) -> Value | None:
+        """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
+
+        None where the coupling has no pitch circle.
+        """
+        mesh = next((mesh for mesh in self.pressing if mesh.coupling == coupling), None)
+        if mesh is None:
+            return None
+        # Where the carrier's frame is the world, its axes are where its points are.
+        nodes = list(self.sketch_configuration.nodes)
+        for axis in mesh.axes:
+            if (mesh.carrier, self.graph.nodes[axis]) in self.graph.points:
+                nodes[axis] = self.geometry.place(mesh.carrier, self.graph.nodes[axis], places)
+        vectors = self.geometry.vectors(places)
+        radii = mesh.radii(replace(self.sketch_configuration, vectors=vectors, nodes=nodes))
+        return dict(zip(mesh.links, radii, strict=True)).get(self.couplings[mesh.index].follower.body)
 
     @cached_property
     def size(self) -> float:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Prismatic
 from mechdesign.mechanism.outputs import pulled
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.core import Core
 
 # Links of a mesh, its carrier, the nodes of its axes, and of a rack a slide and its sense.
 Axes = tuple[tuple[str, str], str, tuple[int, int], int, float]
@@ -229,25 +226,6 @@ def carrier_of(description: Description, graph: Graph, wheels: Sequence[str]) ->
         if carrier not in wheels and min(axes) >= 0 and axes[0] != axes[1]:
             return carrier
     return None
-
-
-def pitch_radius(mechanism: Core, coupling: str, places: Mapping[str, Value]) -> Value | None:
-    """Radius of the pitch circle of the wheel that follows by a coupling, at dimensions that are not all nominal.
-
-    None where it is not known.
-    """
-    mesh = next((mesh for mesh in mechanism.pressing if mesh.coupling == coupling), None)
-    if mesh is None:
-        return None
-    # Where the carrier's frame is the world, its axes are where its points are.
-    graph, nodes = mechanism.graph, list(mechanism.sketch_configuration.nodes)
-    for axis in mesh.axes:
-        if (mesh.carrier, graph.nodes[axis]) in graph.points:
-            nodes[axis] = mechanism.geometry.place(mesh.carrier, graph.nodes[axis], places)
-    vectors = mechanism.geometry.vectors(places)
-    radii = mesh.radii(replace(mechanism.sketch_configuration, vectors=vectors, nodes=nodes))
-    follower = mechanism.couplings[mesh.index].follower.body
-    return dict(zip(mesh.links, radii, strict=True)).get(follower)
 
 
 def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:

@@ -129,10 +129,10 @@ class MotionQuestion:
     @cached_property
     def pairs(self) -> dict[str, Pair]:
         """Plates and pins whose clearances are asked, by the column of each."""
-        asked, every = self.section.collisions, pairs_of(self.study.mechanism.description)
-        if asked is None:
+        chosen, every = self.section.collisions, pairs_of(self.study.mechanism.description)
+        if chosen is None:
             return {}
-        pairs = [Pair(plate_of(one), plate_of(other)) for one, other in asked] or every
+        pairs = [Pair(plate_of(one), plate_of(other)) for one, other in chosen] or every
         return {pair.name: pair for pair in pairs}
 
     @property

@@ -14,7 +14,6 @@ from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic, play
-from mechdesign.mechanism.wheels import pitch_radius
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law
@@ -180,7 +179,7 @@ def _backlash(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pi
     slope: Number = 1.0
     quantity: Literal["length", "angle"] = "angle" if moved.quantity == "angle" else "length"
     if quantity == "angle" and kind_of(section.clearances[name].backlash) == "length":
-        radius = pitch_radius(mechanism, name, poses.places)
+        radius = mechanism.pitch_radius(name, poses.places)
         assert radius is not None
         quantity, slope = "length", np.asarray(1.0 / radius, dtype=float)
     factor = study.units.angle_factor if quantity == "angle" else 1.0

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import model_validator
 
 from mechdesign.mechanism.model import play
-from mechdesign.mechanism.wheels import pitch_radius
 from mechdesign.questions.reliability.laws import FITS, LAWS
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
 from mechdesign.questions.reliability.schema.methods import METHODS
@@ -225,7 +224,7 @@ def _check_backlash(checker: Checker, coupling: str, clearance: Clearance, path:
     if kind == "angle" and kind_of(clearance.backlash) == "length":
         kind = "length"
         mechanism = checker.compiled
-        if mechanism is not None and pitch_radius(mechanism, coupling, {}) is None:
+        if mechanism is not None and mechanism.pitch_radius(coupling, {}) is None:
             message = (
                 f"is a length along a pitch circle, and that of {coupling!r} is not known: its axes are on no common "
                 "link, or a belt has no 'radius'; give an angle"
