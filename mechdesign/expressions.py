@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -334,6 +334,22 @@ class Expression:
         program = self._run(_constant_step, lambda variable: (("name", variable),), call)
         return replace(self, program=program), arctangents
 
+    def corners(self) -> list[Corner]:
+        """Where the expression is not smooth, the inner corners before the outer ones, which are smooth between them.
+
+        Beside the corners it bends at stand the places where it jumps, is infinite, or has a value on one side alone.
+        """
+        corners: list[tuple[tuple[Step, ...], Corner]] = []
+
+        def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
+            for program, levels, period in _corners(function, inner, self.angle_unit):
+                if any(kind == "name" for kind, _ in program):
+                    corners.append((program, Corner(replace(self, program=program), levels, period)))
+            return _call_steps(function, inner)
+
+        self._run(_constant_step, lambda name: (("name", name),), call)
+        return list({(program, corner.levels): corner for program, corner in corners}.values())
+
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[Any, list[Any]], Any]
     ) -> Any:
@@ -390,6 +406,46 @@ class Expression:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Places at which an expression is not smooth: where its `argument` takes one of some levels.
+
+    With a `period` (0 for none) these are repeated.
+    """
+
+    argument: Expression
+    levels: tuple[float, ...] = (0.0,)
+    period: float = 0.0
+
+
+def _corners(
+    function: Called, inner: list[tuple[Step, ...]], angle_unit: float
+) -> Iterator[tuple[tuple[Step, ...], tuple[float, ...], float]]:
+    """Programs, levels and periods of the corners of a call; see `Corner`."""
+    if isinstance(function, Tabulated):
+        yield inner[0], tuple(place for place, _ in function.rows), function.period
+    elif function in ("min", "max"):
+        yield _call_steps("-", inner), (0.0,), 0.0
+    elif function in ("abs", "sqrt", "log"):
+        yield inner[0], (0.0,), 0.0
+    elif function in ("asin", "acos"):
+        yield inner[0], (-1.0, 1.0), 0.0
+    elif function == "tan":
+        yield inner[0], (math.pi / 2 / angle_unit,), math.pi / angle_unit
+    elif function == "atan2":
+        # It jumps from half a turn to minus half a turn where y is zero, at the x below zero.
+        yield inner[0], (0.0,), 0.0
+    elif function == "hypot":
+        # It bends where both are zero.
+        yield from ((part, (0.0,), 0.0) for part in inner)
+    elif function == "/":
+        yield inner[1], (0.0,), 0.0
+    elif function == "**":
+        exponent = inner[1][0][1] if len(inner[1]) == 1 else None
+        if not (isinstance(exponent, float) and exponent >= 0 and exponent.is_integer()):
+            yield inner[0], (0.0,), 0.0
 
 
 def _function(called: Called) -> _Function | Tabulated:

@@ -156,3 +156,39 @@ def test_python_is_refused_and_not_executed(text, tmp_path, monkeypatch):
 )  # fmt: skip
 def test_sums_of_multiples_are_linear(text: str, linear: bool) -> None:
     assert Expression.parse(text).is_linear() is linear
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("max(0, 1 - abs(x - 40)/0.2)", [39.8, 40, 40.2]),
+        ("min(x, 3, 7 - x)", [3, 4]),
+        ("abs(max(x, 10) - 12)", [10, 12]),
+        ("1/(x - 2) + sqrt(x - 5) + (x - 6)**2 + (x - 7)**0.5", [2, 5, 7]),
+        ("asin(x/4)", [-4, 4]),
+        ("tan(x)", [-90, 90, 270]),
+        ("atan2(x - 3, -1)", [3]),
+        ("x**2 + sin(x) + exp(x)/3", []),
+    ],
+)
+def test_an_expression_knows_where_it_is_not_smooth(text, places):
+    """Each corner, jump, pole and end is where an argument takes a level; smooth texts have none."""
+    corners = Expression.parse(text, DEGREE).corners()
+    x = np.linspace(-100, 300, 400_001)
+    crossed = []
+    for corner in corners:
+        argument = corner.argument.evaluate({"x": x})
+        levels = np.array(corner.levels)
+        if corner.period:
+            levels = (levels + corner.period * np.arange(-2, 3)[:, None]).ravel()
+        for level in levels:
+            above = np.sign(argument - level)
+            crossed += x[1:][(above[1:] != above[:-1]) & np.isfinite(argument[1:])].tolist()
+    assert all(min(abs(np.array(crossed) - place)) < 2e-3 for place in places)
+    assert bool(corners) == bool(places)
+
+
+def test_corners_within_others_come_first():
+    """Between inner corners the arguments of the outer ones are smooth."""
+    corners = Expression.parse("max(0, 1 - abs(x))").corners()
+    assert [corner.argument.evaluate({"x": 0.25}) for corner in corners] == [0.25, -0.75]
