@@ -30,6 +30,10 @@ BESIDE_ROW = 1e-4
 BESIDE_REST = 0.1
 # A value of the function counts if it is within this part of the function's size from the series.
 TRUE = 1e-7
+# A function within this part of its size from a level touches it.
+TOUCHED = 1e-14
+# Values of a function that differ by less than this part of its size are equal.
+ROUNDED = 1e-13
 # Sides of `searchsorted`: to the first of equal values, and behind the last.
 _SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 # A function without a divisor is infinite if it reaches this multiple of its median on the smallest pieces.
@@ -147,6 +151,7 @@ class Functions(Series):
         rows, lines = self._rows(names), self.curve.lines
         table = np.full((2, 2 * len(rows) * lines), np.nan)
         if len(self.pieces.line) and len(rows):
+            still = np.where(self._poled[rows, None], still, np.maximum(still, ROUNDED * self._scale[rows]))
             rows, sign = np.tile(rows, 2), np.repeat([-1.0, 1.0], len(rows))
             still = np.tile(still, (2, 1))
             tops, poles = self._tops(rows, sign, still), self._poles(rows, sign)
@@ -307,6 +312,37 @@ class Functions(Series):
             poles.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
         lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
         return lane, piece, x, np.full(len(x), np.inf)
+
+    def crossings(self, name: str, levels: Sequence[float], period: float) -> tuple[Ints, Floats]:
+        """Places at which a function crosses or touches some levels, repeated with a `period` if it is not 0.
+
+        Lines and places in rows, each of shape (n,). A function that rests at a level does not cross it.
+        """
+        table, every = self._table[self.names[name]], np.array(levels)
+        finite = table[np.isfinite(table)]
+        if period and len(finite):
+            first, last = (
+                np.floor((finite.min() - every.max()) / period),
+                np.ceil((finite.max() - every.min()) / period),
+            )
+            every = (every + period * np.arange(first, last + 1)[:, None]).ravel()
+        series = chebyshev.series(table)
+        table = chebyshev.at_places(series)
+        with np.errstate(invalid="ignore"):
+            least, most = table.min(axis=1), table.max(axis=1)
+            slack = TOUCHED * np.maximum(np.abs(least), np.abs(most))
+            moves = most - least > 2 * slack
+            met = (every >= (least - slack)[:, None]) & (every <= (most + slack)[:, None])
+        piece, level = np.nonzero(met & moves[:, None])
+        shifted = series[piece]
+        shifted[:, 0] -= every[level]
+        turned, place, extreme = turning = chebyshev.turning_points(shifted)
+        which, x = chebyshev.zeros(shifted, turning)
+        touched = np.abs(extreme) <= slack[piece[turned]]
+        rim, side = np.nonzero(np.abs(chebyshev.at_places(shifted)[:, [0, -1]]) <= slack[piece, None])
+        which = piece[np.concatenate([which, turned[touched], rim])]
+        places = self.pieces.take(which).places(np.concatenate([x, place[touched], 2.0 * side - 1.0]))
+        return self.pieces.line[which], places
 
     def zeros(self, names: Sequence[str], touching: float) -> Zeros:
         """Places at which functions cross zero, or turn back or end nearer to zero than `touching`."""

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.curve.pieces import Pieces, Search
+from mechdesign.expressions import Corner
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
 from mechdesign.mechanism.configuration import joined
@@ -58,6 +59,8 @@ class Curve:
         Angles whose turns are counted along the motion, as no pose gives them.
     turning : bool
         Whether limits count the turns of given and followed angles; else an angle and the same with a turn are alike.
+    marks : pair of ndarray, shape (n,)
+        Lines and places, in rows, at which pieces end besides.
 
     Attributes
     ----------
@@ -65,10 +68,15 @@ class Curve:
         Intervals of the lines, in order, on which the mechanism assembles and lies within its limits.
     spent : bool array, shape (lines,)
         Lines with too many turns to be followed; they have no pieces.
+    corners : set of Corner
+        Corners of expressions at which the pieces end; see `mechdesign.curve.corners`.
     """
 
+    corners: frozenset[Corner] = frozenset()
+
     def __init__(
-        self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True
+        self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True,
+        marks: tuple[Ints, Floats] | None = None,
     ) -> None:  # fmt: skip
         self.study, self.poses, self.angles, self._turning = study, poses, tuple(angles), turning
         self.mechanism: Mechanism = study.mechanism
@@ -79,6 +87,9 @@ class Curve:
         self.spent = np.zeros(self.lines, dtype=bool)
         self.margins = Margins(self.mechanism, self.plan)
         first = self._begin()
+        if marks is not None:
+            piece = self.piece_at(*marks, first)
+            first = first.divided(piece, first.take(piece).within(marks[1]))
         closed = len(self.margins.causes) - self.margins.limited
         crossing = self.plan.change_points is None
         search = Search(self._look, self._fold, self.margins.causes[:closed], BUDGET, crossing, self.spent)

@@ -22,6 +22,8 @@ UNRESOLVED = 2 * chebyshev.COUNT * RESOLVED
 ROUNDING = 1e-13
 # A zero this near to an end of a piece is at the end: at an ordinary end, and at a dead centre.
 AT_END, AT_FOLD = 1e-12, 1e-6
+# Distance, in a piece, within which two marks are one.
+SAME_MARK = 1e-9
 # Largest distance from a dead centre, in a piece, of zeros that only the error of a series makes.
 NEAR_FOLD = 1e-2
 # Largest distance, in a piece, of zeros that rounding makes from the place where a margin touches zero.
@@ -88,6 +90,13 @@ class Pieces(Lanes):
 
     def divided(self, owner: Ints, marks: Floats) -> Pieces:
         """The pieces in order, divided at marks, shape (n,): the number of the piece, and the place in it."""
+        order = np.lexsort((marks, owner))
+        owner, marks = owner[order], marks[order]
+        # Marks that only rounding parts from an end, or from each other, are one.
+        apart = (np.abs(marks) < 1.0 - SAME_MARK) & ~np.append(
+            False, (owner[1:] == owner[:-1]) & (np.diff(marks) < SAME_MARK)
+        )[: len(marks)]
+        owner, marks = owner[apart], marks[apart]
         of, low, high = between_marks(owner, marks, np.arange(len(self.line)))
         nowhere = np.zeros(len(of), dtype=bool)
         parts = _parts(self.take(of), low, high, nowhere, nowhere)

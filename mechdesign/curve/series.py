@@ -43,6 +43,8 @@ class Series:
         For each function with poles: the functions that are zero there, and the order of the poles.
     extremes, means, zeros : sequence of str
         Functions of which extremes, means and zeros are needed; the others are only evaluated.
+    everywhere : sequence of str
+        Functions whose series are needed on every piece.
     ends : mapping of str to int
         Which extreme of a function is needed: 1 for the largest value, -1 for the smallest, 0 for both.
     """
@@ -51,7 +53,7 @@ class Series:
         self, curve: Curve, names: Sequence[str], evaluate: Evaluate, sizes: Sequence[float],
         divisors: Mapping[str, Sequence[tuple[str, int]]] | None = None, *,
         extremes: Sequence[str] = (), means: Sequence[str] = (), zeros: Sequence[str] = (),
-        ends: Mapping[str, int] = MappingProxyType({}),
+        everywhere: Sequence[str] = (), ends: Mapping[str, int] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self.curve, self.names, self._evaluate = curve, {name: k for k, name in enumerate(names)}, evaluate
         self._sizes = np.array(sizes, dtype=float)
@@ -60,7 +62,9 @@ class Series:
             for name, by_what in (divisors or {}).items()
         }
         self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
-        self._means, self._zeros = (np.array([name in group for name in names], dtype=bool) for group in (means, zeros))
+        self._means, self._zeros, self._everywhere = (
+            np.array([name in group for name in names], dtype=bool) for group in (means, zeros, everywhere)
+        )
         # Whether the largest and the smallest value of each function are needed.
         self._extremes = np.array(
             [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
@@ -143,6 +147,7 @@ class Series:
                 | above[1]
                 | mean
                 | (self._zeros[:, None] & (self._poled[:, None] | crossed))
+                | self._everywhere[:, None]
             )
             halve = (rough & matters).any(axis=0) & (pending.depth < MOST_HALVINGS)
             self.unresolved |= np.bincount(pending.line[halve], minlength=lines).astype(bool) & (spent > BUDGET)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.curve.motion import Curve
+from mechdesign.curve.corners import curve_of
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
@@ -136,7 +136,7 @@ class Timed:
             )
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         plan = mechanism.plan(poses.groups[0].names)
-        curve = Curve(study, poses, followed_angles(mechanism, plan, drives))
+        curve = curve_of(study, poses, followed_angles(mechanism, plan, drives))
         times = _instants(self._end(poses), step)
         line, places = np.zeros(len(times), dtype=np.intp), self._places(poses, times)
         along, configuration = curve.solve(line, places)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mechdesign.errors import MechanismError, suggestion
-from mechdesign.expressions import Expression
+from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity, play
@@ -122,6 +122,26 @@ def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
             angles[coordinate.name] = coordinate
         angles |= angles_of(coordinate.parts)
     return angles
+
+
+def expressions_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
+    """The expressions among coordinates and in their parts by name, inner ones first."""
+    expressions: dict[str, Coordinate] = {}
+    for coordinate in coordinates:
+        expressions |= expressions_of(coordinate.parts)
+        if coordinate.kind == "expression":
+            expressions[coordinate.name] = coordinate
+    return expressions
+
+
+def corners_of(coordinates: Iterable[Coordinate]) -> list[Corner]:
+    """The corners of all expressions among coordinates and in their parts, inner ones first."""
+    return [
+        corner
+        for coordinate in expressions_of(coordinates).values()
+        if coordinate.expression is not None
+        for corner in coordinate.expression.corners()
+    ]
 
 
 def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:

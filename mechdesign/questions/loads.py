@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
@@ -53,21 +54,27 @@ class Loading:
     def value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
         """A number of a load or an effort; nan where an expression has no value."""
         if isinstance(quantity, Expression):
-            value = quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
+            value = quantity.evaluate({
+                name: variable(self.study, name, self.poses, self.rows, forces.configuration, moving)
+                for name in quantity.names
+            })  # fmt: skip
             # Beyond what a study takes as a number it has no value.
             return np.where(np.abs(value) <= MAX_NUMBER, value, np.nan)
         return quantity
 
-    def _variable(self, name: str, forces: Forces, moving: Moving) -> Number:
-        study, configuration = self.study, forces.configuration
-        if name in study.parameters.nominal:
-            return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
-        if name == TIME:
-            assert self.poses.times is not None
-            return self.poses.times[self.rows]
-        coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
-        if coordinate.name == name:
-            return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)
-        assert moving.velocity is not None
-        rate = first(configuration, coordinate, moving.velocity)
-        return np.asarray(in_study_units(study, coordinate, rate), dtype=np.float64)
+
+def variable(
+    study: Study, name: str, poses: Poses, rows: Ints | slice, configuration: Configuration, moving: Moving
+) -> Number:
+    """Value of a variable of a load at some rows of poses: a parameter, the time, a coordinate or its velocity."""
+    if name in study.parameters.nominal:
+        return poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), rows)
+    if name == TIME:
+        assert poses.times is not None
+        return poses.times[rows]
+    coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
+    if coordinate.name == name:
+        return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)
+    assert moving.velocity is not None
+    rate = first(configuration, coordinate, moving.velocity)
+    return np.asarray(in_study_units(study, coordinate, rate), dtype=np.float64)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.curve.corners import curve_of
 from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
@@ -138,7 +139,7 @@ def _solve_group(
     pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
     angles = [] if poses.listed else followed_angles(mechanism, plan, coordinates)
     if angles and curve is None:
-        curve = Curve(study, poses, angles)
+        curve = curve_of(study, poses, angles)
 
     def at(piece: slice) -> Configuration:
         """Poses of some rows, not yet judged by the limits."""

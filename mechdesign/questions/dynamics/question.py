@@ -31,6 +31,7 @@ from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.loads import Load
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.poses import MotionSection
 
@@ -66,6 +67,11 @@ class ForceQuestion:
     def forces(self) -> list[str]:
         """Names of the contacts' forces."""
         return self.joints.names
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads of the study's dynamics."""
+        return self.section.loads
 
     @cached_property
     def statics(self) -> list[Static]:

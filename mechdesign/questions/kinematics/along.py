@@ -20,7 +20,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.columns import GIVEN
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import APART
-from mechdesign.questions.kinematics import targets
+from mechdesign.questions.kinematics import corners, targets
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.motion import Motion, pole
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -64,7 +64,7 @@ class Along:
         loops: Sequence[FourBar] = (), *, also: Collection[str] = (), requests: Collection[Request] = (),
         toggles: bool = False, passages: bool = False,
     ) -> None:  # fmt: skip
-        self.question, self.curve = question, curve
+        self.question = question
         self._loops, self._toggles = loops, toggles
         mechanism, sizes = question.study.mechanism, question.sizes
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
@@ -99,6 +99,7 @@ class Along:
         divisors = self._divisors()
         # The part of the question that the columns need.
         self._lean = question.lean({*columns, *(name for request in requests for name in request.columns)})
+        self.curve = curve = corners.divided(self._lean, curve, errors=self._errors)
         angles = {angle.name for angle in curve.angles}
         self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
         below = {name for powers in divisors.values() for name, _ in powers}

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from mechdesign.curve.corners import curve_of
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import counted
 from mechdesign.mechanism.algebra import Value
@@ -30,7 +31,7 @@ from mechdesign.questions.poses import followed_angles
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS
-from mechdesign.study.schema.loads import joints_of
+from mechdesign.study.schema.loads import Load, joints_of
 
 # Columns of a cam behind the name of its coupling, and their kinds of quantity.
 CAM_COLUMNS: Mapping[str, Quantity] = {"pressure_angle": "angle", "curvature_radius": "length"}
@@ -61,6 +62,11 @@ class Borne(Protocol):
     @property
     def statics(self) -> list[Static]:
         """The columns."""
+        ...
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads that it bears."""
         ...
 
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
@@ -162,6 +168,11 @@ class MotionQuestion:
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
 
     @property
+    def loads(self) -> tuple[Load, ...]:
+        """Loads of the drives' efforts, and of what else is computed of the forces."""
+        return (*self.section.loads, *(self.borne.loads if self.borne is not None else ()))
+
+    @property
     def poled(self) -> list[str]:
         """Columns that go to infinity where nothing is singular."""
         advantages = [f"{name}_advantage" for name in self.section.mechanical_advantage]
@@ -224,7 +235,7 @@ class MotionQuestion:
             return None
         mechanism = self.study.mechanism
         plan = mechanism.plan(self.poses.groups[0].names)
-        return Curve(self.study, self.poses, followed_angles(mechanism, plan, self.watched))
+        return curve_of(self.study, self.poses, followed_angles(mechanism, plan, self.watched))
 
     def lean(self, names: Collection[str]) -> MotionQuestion:
         """The question with nothing but what some columns, and the targets of errors among them, need."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -58,6 +59,16 @@ def followed(study: Study, poses: Poses) -> Iterator[tuple[str, Quantity]]:
             yield f"{name}_error", study.mechanism.quantity(name)
         if len(target.coordinates) == 2:
             yield f"{target.owner}_error", "length"
+
+
+def knots(study: Study, target: Target, poses: Poses) -> list[Corner]:
+    """Where a target by a table of a drive's values bends: at the values of its rows, and where the table ends."""
+    drive = timing(study.mechanism.drives, poses) if target.timed else None
+    if drive is None:
+        return []
+    turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 0.0
+    values = Expression(drive, (("name", drive),))
+    return [Corner(values, tuple(np.unique(table[:, 0]).tolist()), turn) for table in _tables(target, poses)]
 
 
 def _a_value_each(target: Target, poses: Poses) -> bool:

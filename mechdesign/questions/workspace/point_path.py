@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.curve.corners import curve_of
 from mechdesign.curve.ends import Ends
 from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
@@ -65,7 +66,7 @@ _SPEED = "speed"
 def _curve(study: Study, drive: str, low: float, high: float) -> Curve:
     """The motion of a drive between two values; the whole path is wanted, however many turns its limits leave it."""
     ends = np.array([low, high]) / (study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 1.0)
-    return Curve(study, Poses.single({drive: ends}), turning=False)
+    return curve_of(study, Poses.single({drive: ends}), turning=False)
 
 
 def point_path(study: Study) -> Result:

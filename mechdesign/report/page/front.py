@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.curve.motion import Curve
+from mechdesign.curve.corners import curve_of
 from mechdesign.errors import MechdesignError
 from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.questions.kinematics.figures.paths import path_looks
@@ -153,7 +153,7 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     """Designs of one mechanism in their poses; along a motion these are near enough to draw its paths."""
     if not poses.motion:
         return []
-    curve = Curve(study, poses)
+    curve = curve_of(study, poses)
     places = evenly(poses.line, MAX_POSES).astype(float)
     if not curve.spent.any():
         places = near_the_paths(curve, partial(paths_of, curve, study.mechanism.points), places, MAX_POSES)

@@ -1,0 +1,72 @@
+"""Corners of expressions along motions: there a curve is divided, so that on its pieces everything is smooth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mechdesign.curve.functions import Functions
+from mechdesign.curve.motion import Curve
+from mechdesign.expressions import Corner
+from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Values of variables of expressions at places of lines, by name.
+Variables = Callable[[frozenset[str], Ints, Floats], Mapping[str, ArrayLike]]
+
+_ARGUMENT = "argument"
+
+
+def curve_of(study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True) -> Curve:
+    """The motions of some poses, divided at the corners of couplings and of what limits bound; see `Curve`."""
+    curve = Curve(study, poses, angles, turning=turning)
+    mechanism = curve.mechanism
+    bounded = [*(c.function for c in mechanism.couplings), *(bound.coordinate for bound in mechanism.bounds)]
+    corners, expressions = corners_of(bounded), expressions_of(bounded)
+    if not corners:
+        return curve
+
+    def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
+        configuration = curve.solve(line, s, judged=False)[1]
+        return {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
+
+    divided, line, place = divide(curve, corners, variables)
+    if not len(line):
+        return curve
+    # Limits and dead centres are sought again, on pieces that hold no corner.
+    whole = Curve(study, poses, angles, turning=turning, marks=(line, place))
+    whole.corners = divided.corners
+    return whole
+
+
+def divide(curve: Curve, corners: Sequence[Corner], variables: Variables) -> tuple[Curve, Ints, Floats]:
+    """The curve with pieces that end at corners, inner ones first, and these places: their lines and rows."""
+    lines, places = [np.empty(0, dtype=np.intp)], [np.empty(0)]
+    for corner in corners:
+        if corner in curve.corners:
+            continue
+        curve, before = copy(curve), curve
+        curve.corners = curve.corners | {corner}
+        argument = Functions(
+            before, ["argument"], partial(_argument, corner, variables), [0.0], everywhere=["argument"]
+        )
+        line, place = argument.crossings("argument", corner.levels, corner.period)
+        if len(line):
+            piece = before.piece_at(line, place)
+            curve.pieces = before.pieces.divided(piece, before.pieces.take(piece).within(place))
+            lines.append(line)
+            places.append(place)
+    return curve, np.concatenate(lines), np.concatenate(places)
+
+
+def _argument(corner: Corner, variables: Variables, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+    names = corner.argument.names
+    given = variables(names, line, s)
+    values = corner.argument.evaluate({name: np.asarray(given[name]) for name in names})
+    return np.broadcast_to(np.asarray(values, dtype=float), (1, len(s))), np.ones(len(s))

@@ -1,0 +1,48 @@
+"""Corners of the expressions of a question along its motions: of measures, loads and targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mechdesign.curve.corners import divide
+from mechdesign.curve.motion import Curve
+from mechdesign.expressions import Expression
+from mechdesign.mechanism.coordinates import corners_of, expressions_of
+from mechdesign.mechanism.forces import Moving
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.rates import moving_at
+from mechdesign.questions.kinematics.targets import knots
+from mechdesign.questions.loads import coordinates_in, variable
+from mechdesign.questions.poses import SolvedPoses
+from mechdesign.study.schema.loads import VELOCITY
+
+
+def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
+    """The curve of a question with pieces on which its measures, its loads and, for errors, its targets are smooth."""
+    study, loads = question.study, question.loads
+    targets = study.targets.values() if errors else ()
+    expressions = expressions_of([*question.watched, *coordinates_in(study, loads)])
+    corners = corners_of(expressions.values())
+    written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
+    written += [target.expression for target in targets if target.expression is not None]
+    corners += [corner for expression in written for corner in expression.corners()]
+    corners += [corner for target in targets for corner in knots(study, target, question.poses)]
+
+    def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
+        poses, configuration = curve.solve(line, s, judged=False)
+        moving = Moving()
+        if any(name.endswith(VELOCITY) for name in names):
+            linear = study.mechanism.linearize(configuration)
+            solved = SolvedPoses(np.arange(len(s)), question.poses.groups[0].names, configuration)
+            moving = moving_at(study, question.section, poses, solved, linear)
+        parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
+        return {
+            name: parts[name] if name in parts else variable(study, name, poses, slice(None), configuration, moving)
+            for name in names
+        }
+
+    return divide(curve, corners, variables)[0]
