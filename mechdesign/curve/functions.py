@@ -44,11 +44,13 @@ ENDLESS = 1e4
 class Extremes:
     """The smallest and the largest values of functions on each line, arrays of shape (2, functions, lines).
 
-    nan where a function has no values. The places are along the line, in rows.
+    nan where a function has no values. The places are along the line, in rows. Values within `still`, of shape
+    (functions, lines), are equal.
     """
 
     value: Floats
     place: Floats
+    still: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +127,16 @@ class Functions(Series):
 
     def interpolated(self, name: str, line: Ints, s: Floats) -> Floats:
         """Values of a function at places of lines, shape (n,), by its series; nan where a line has no piece."""
+        return self._by_series(np.full(len(s), self.names[name]), line, s)
+
+    def _by_series(self, rows: Ints, line: Ints, s: Floats) -> Floats:
         piece = self.curve.piece_at(line, s, self.pieces)
-        series = chebyshev.series(self._table[self.names[name]])
-        values = chebyshev.value(series[piece], self.pieces.take(piece).within(s))
-        return np.where(self.pieces.line[piece] == line, values, np.nan)
+        x = self.pieces.take(piece).within(s)
+        above, below = (
+            chebyshev.value(chebyshev.series(table[rows, piece]), x) for table in (self._table, self._divisor)
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.pieces.line[piece] == line, above / below, np.nan)
 
     def integral(self, name: str, line: Ints, s: Floats) -> tuple[Floats, float]:
         """Integrals of a function from the begin of lines to places of them, shape (n,), and the error of the whole."""
@@ -149,25 +157,26 @@ class Functions(Series):
             Values are equal within this difference.
         """
         rows, lines = self._rows(names), self.curve.lines
+        rounding = np.where(self._poled[rows, None], self._noise[rows], ROUNDED * self._scale[rows])
+        still = np.maximum(still, rounding)
         table = np.full((2, 2 * len(rows) * lines), np.nan)
         if len(self.pieces.line) and len(rows):
-            still = np.where(self._poled[rows, None], still, np.maximum(still, ROUNDED * self._scale[rows]))
             rows, sign = np.tile(rows, 2), np.repeat([-1.0, 1.0], len(rows))
-            still = np.tile(still, (2, 1))
-            tops, poles = self._tops(rows, sign, still), self._poles(rows, sign)
+            twice = np.tile(still, (2, 1))
+            tops, poles = self._tops(rows, sign, twice), self._poles(rows, sign)
             lane, piece, x, value = (np.concatenate(pair) for pair in zip(tops, poles, strict=True))
             line, place = self.pieces.line[piece], self.pieces.take(piece).places(x)
             lane = lane * lines + line
             best = np.full(len(rows) * lines, -np.inf)
             np.maximum.at(best, lane, value)
-            tie = np.flatnonzero(value >= (best - still.ravel())[lane])
+            tie = np.flatnonzero(value >= (best - twice.ravel())[lane])
             tie = tie[np.lexsort((place[tie], lane[tie]))]
             lanes, first = np.unique(lane[tie], return_index=True)
             chosen = tie[first]
-            own, sign, still = rows[lanes // lines], sign[lanes // lines], still.ravel()[lanes]
-            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
+            own, sign, equal = rows[lanes // lines], sign[lanes // lines], twice.ravel()[lanes]
+            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], equal)
         value, place = table.reshape(2, 2, len(names), lines)
-        return Extremes(value, place)
+        return Extremes(value, place, still)
 
     def _settled(
         self, rows: Ints, sign: Floats, line: Ints, place: Floats, value: Floats, still: Floats
@@ -181,11 +190,12 @@ class Functions(Series):
         own = np.concatenate([rows, rows[beside]])
         table = self.at(np.concatenate([line, line[beside]]), np.concatenate([place, row[beside]]))
         table = table[own, np.arange(len(own))]
-        at_row = table[len(rows) :]
         exact = self._true(rows, line, table[: len(rows)], sign * value)
+        rows, line, row = rows[beside], line[beside], row[beside]
+        at_row = self._true(rows, line, table[len(own) - len(beside) :], self._by_series(rows, line, row))
         with np.errstate(invalid="ignore"):
             good = np.isfinite(exact[beside]) & (sign[beside] * (at_row - exact[beside]) >= -still[beside])
-        exact[beside[good]], place[beside[good]] = at_row[good], row[beside[good]]
+        exact[beside[good]], place[beside[good]] = at_row[good], row[good]
         return exact, place
 
     def _true(self, rows: Ints, line: Ints, values: Floats, series: Floats) -> Floats:

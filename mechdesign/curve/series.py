@@ -25,6 +25,8 @@ ROUNDING = 1e-11
 MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
 MOST_LOST = 4
+# Rounding of a quotient at a node, as a part of its value, with which the node says nothing of it.
+NOISE = 1e-9
 
 # Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
@@ -62,6 +64,8 @@ class Series:
             for name, by_what in (divisors or {}).items()
         }
         self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
+        orders = [sum(power for _, power in self._divisors.get(k, ())) for k in range(len(names))]
+        self._orders = np.array(orders, dtype=float)[:, None]
         self._means, self._zeros, self._everywhere = (
             np.array([name in group for name in names], dtype=bool) for group in (means, zeros, everywhere)
         )
@@ -70,6 +74,8 @@ class Series:
             [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
         )
         self.unresolved = np.zeros(curve.lines, dtype=bool)
+        # Largest rounding of each function with poles where it is followed on its own.
+        self._noise = np.zeros((len(names), curve.lines))
         self._follow()
 
     def at(self, line: Ints, s: Floats) -> Floats:
@@ -80,10 +86,12 @@ class Series:
         parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]
         return np.concatenate([part[0] for part in parts], axis=1), np.concatenate([part[1] for part in parts])
 
-    def _sampled(self, pieces: Pieces) -> tuple[Floats, Floats, Floats]:
-        """At the nodes of pieces: functions (those with poles times their divisors), divisors, and exactness.
+    def _sampled(self, pieces: Pieces) -> tuple[Floats, Floats, Floats, Flags]:
+        """Functions at the nodes of pieces (with poles: times their divisors), divisors, exactness, and which are own.
 
-        Of shapes (functions, pieces, nodes), twice, and (pieces,).
+        Of shapes (functions, pieces, nodes), twice, (pieces,) and (functions, pieces). A function with poles is
+        followed on its own where it is smooth: far from them, and where a motion goes smoothly through a singular pose,
+        at which numerator and divisor are both zero.
         """
         s = pieces.nodes
         values, conditioning = self._values(np.repeat(pieces.line, s.shape[1]), s.ravel())
@@ -95,18 +103,31 @@ class Series:
         with np.errstate(invalid="ignore", over="ignore"):
             products = np.where(self._poled[:, None, None], values * divisors, values)
         # At a pole a quotient has no value: its numerator is interpolated from the other nodes.
-        lost = ~np.isfinite(products) & self._poled[:, None, None]
-        number = np.count_nonzero(lost, axis=2)
-        for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
-            products[k, piece] = chebyshev.filled(products[k, piece], ~lost[k, piece])
-        least = np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape).min(axis=1, initial=1.0)
-        return products, divisors, EXACT / np.clip(least, 1e-6, 1.0)
+        _fill(products, ~np.isfinite(products) & self._poled[:, None, None])
+        known = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
+        own = np.zeros((len(self.names), len(pieces.line)), dtype=bool)
+        if self._poled.any():
+            noise = EXACT / known ** self._orders[self._poled, :, None]
+            table = values[self._poled]
+            lost = ~np.isfinite(table) | (noise > NOISE)
+            _fill(table, lost)
+            left = np.where(lost, 0.0, noise).max(axis=2)
+            with np.errstate(invalid="ignore"):
+                size = np.maximum(np.abs(table).max(axis=2), self._sizes[self._poled, None])
+                some = chebyshev.remainder(chebyshev.series(table)) <= left * size
+            own[self._poled] = some
+            rounding = np.zeros(own.shape)
+            rounding[self._poled] = np.where(some, left * size, 0.0)
+            largest(self._noise, pieces.line, rounding)
+            products[self._poled] = np.where(some[..., None], table, products[self._poled])
+            divisors[own] = 1.0
+        return products, divisors, EXACT / known.min(axis=1, initial=1.0), own
 
     def _follow(self) -> None:
         """Halve pieces until every series is exact where extremes, means or zeros depend on it."""
         lines, spent = self.curve.lines, np.zeros(self.curve.lines)
         pieces = pending = self.curve.pieces
-        values, divisors, exact = self._sampled(pieces)
+        values, divisors, exact, own = self._sampled(pieces)
         done: list[tuple[Pieces, Floats, Floats, Floats, Flags]] = []
         self._scale = np.zeros((len(self.names), lines))
         self._divisor_scale = np.zeros((len(self.names), lines))
@@ -125,7 +146,7 @@ class Series:
                 largest(top, pending.line, end)
             scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
             rest = chebyshev.remainder(chebyshev.series(values))
-            rough = ~(rest <= exact * scale) & finite.any(axis=2)
+            rough = ~(rest <= exact * scale) & finite.any(axis=2) & ~own
             if before is not None:
                 rounding = np.minimum(*np.split(rest, 2, axis=1)) > before / 4
                 rough &= ~(np.tile(rounding, 2) & (rest <= ROUNDING * scale))
@@ -155,7 +176,7 @@ class Series:
             done.append((pending.take(~halve), values[:, ~halve], divisors[:, ~halve], exact[~halve], rough[:, ~halve]))
             pending, before = pending.take(halve).halves(), rest[:, halve]
             if len(pending.line):
-                values, divisors, exact = self._sampled(pending)
+                values, divisors, exact, own = self._sampled(pending)
         parts = list(zip(*done, strict=True)) if done else None
         if parts is None:
             self.pieces = pieces
@@ -167,3 +188,10 @@ class Series:
         self.pieces = joined.take(order)
         self._table, self._divisor = (np.concatenate(part, axis=1)[:, order] for part in parts[1:3])
         self._rough = np.concatenate(parts[4], axis=1)[:, order]
+
+
+def _fill(table: Floats, lost: Flags) -> None:
+    """Put values of the polynomials through the other nodes where few nodes of a piece are lost."""
+    number = np.count_nonzero(lost, axis=2)
+    for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
+        table[k, piece] = chebyshev.filled(table[k, piece], ~lost[k, piece])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.motion import Motion
@@ -51,6 +51,11 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     finite = np.where(counted & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
     size = np.array([scale for scale, _ in curves.values()])[:, None]
     still = STILL * np.maximum(finite, size)
+    followed = [k for k, name in enumerate(curves) if along is not None and name in along.columns]
+    peaks = None
+    if along is not None:
+        peaks = along.functions.extremes([list(curves)[k] for k in followed], still[followed])
+        still[followed] = peaks.still
     with np.errstate(invalid="ignore"):
         moving = high - low > still
     # A curve that stands still has both extremes at its first pose.
@@ -58,9 +63,14 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     values = np.stack([np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row])
     ends = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
     ends = np.where(counted.any(axis=2), ends, np.nan)
-    if along is not None:
-        mine = [k for k, name in enumerate(curves) if name in along.columns]
-        _between(along, [list(curves)[k] for k in mine], mine, ends, still, moving)
+    if along is not None and peaks is not None:
+        line = np.broadcast_to(np.arange(poses.designs), (len(followed), poses.designs))
+        with np.errstate(invalid="ignore"):
+            moves = peaks.value[1] - peaks.value[0] > peaks.still
+        moving[followed] |= moves
+        shown = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
+        for part, new in enumerate((peaks.value, shown)):
+            ends[:, part, followed] = np.where(np.isfinite(peaks.place) & moves, new, ends[:, part, followed])
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
@@ -75,24 +85,6 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
         range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
     ), **over(along, list(curves)))  # fmt: skip
-
-
-def _between(
-    along: Along, names: Sequence[str], rows: Sequence[int], ends: Floats, still: Floats, moving: Flags
-) -> None:
-    """Put the extremes of motions between their poses into `ends`, shape (2, 2, curves, designs): value and place.
-
-    `moving`, shape (curves, designs), says which curves do not stand still.
-    """
-    line = np.broadcast_to(np.arange(ends.shape[3]), (len(names), ends.shape[3]))
-    peaks = along.functions.extremes(names, still[rows])
-    with np.errstate(invalid="ignore"):
-        moves = peaks.value[1] - peaks.value[0] > still[rows]
-    moving[rows] |= moves
-    places = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
-    valid = np.isfinite(peaks.place) & moves
-    for part, new in enumerate((peaks.value, places)):
-        ends[:, part, rows] = np.where(valid, new, ends[:, part, rows])
 
 
 def targets_table(motion: Motion, along: Along | None) -> Table:
