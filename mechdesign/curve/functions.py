@@ -16,7 +16,7 @@ from mechdesign.curve.motion import INSET
 from mechdesign.curve.pieces import MOST_HALVINGS, between_marks, largest
 from mechdesign.curve.series import EXACT, Series
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Floats, Ints, Lanes
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 
 # A quotient is infinite where its divisor is zero and its numerator is more than this part of its largest value.
 POLE = 1e-9
@@ -36,8 +36,15 @@ TOUCHED = 1e-14
 ROUNDED = 1e-13
 # Sides of `searchsorted`: to the first of equal values, and behind the last.
 _SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
-# A function without a divisor is infinite if it reaches this multiple of its median on the smallest pieces.
-ENDLESS = 1e4
+# A function without a divisor is infinite if it still rises by more than this part of itself from node to node of a
+# piece that cannot be halved.
+RISES = 1e-2
+# A function that rises to the end of a piece as this power of one over the distance, or more, has no integral there.
+ENDLESS_POWER = 0.9
+# It does so only where its series is no closer than this part of its size.
+UNRESOLVED = 1e-3
+# Logarithms of the ratios of the distances of the outermost nodes from the end of a piece.
+_NEARER = np.diff(np.log(1.0 - chebyshev.NODES[:-4:-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +94,7 @@ class Functions(Series):
                 np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
                 for table in (self._table, self._divisor)
             )
-            limits = above / below
+            limits = above / below ** self._orders[rows, None]
         places = self.curve.inside(line[lanes], place[lanes])
         shape = len(rows), len(lanes)
         own, which = (part.ravel() for part in np.broadcast_arrays(rows[:, None], line[lanes]))
@@ -103,7 +110,8 @@ class Functions(Series):
     ) -> Floats:  # fmt: skip
         """Mean of a power of a function (or of its absolute value) over each line, weighted by another.
 
-        Of shape (lines,); nan without values.
+        Of shape (lines,); nan without values. Where the integral does not exist it is infinite if no value is negative,
+        and else nan.
         """
         values = self._table[self.names[name]] ** power
         pace = 1.0 if measure is None else self._table[self.names[measure]]
@@ -113,7 +121,27 @@ class Functions(Series):
             parts = self._sizes_of(values, pace, np.abs(parts))
         total, sums = (np.bincount(self.pieces.line, part, self.curve.lines) for part in (weights.sum(axis=1), parts))
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(sums / np.where(total > 0, total, np.nan))
+            mean = np.asarray(sums / np.where(total > 0, total, np.nan))
+        mean[self.pieces.line[self._endless(values * pace * self.pieces.stretch)]] = (
+            np.inf if absolute or power % 2 == 0 else np.nan
+        )
+        return mean
+
+    def _endless(self, flow: Floats) -> Flags:
+        """Pieces over which a function has no integral: it rises too steeply to an end, or through a pole inside."""
+        sizes = np.where(np.isfinite(flow), np.abs(flow), 0.0)
+        rough = np.flatnonzero(chebyshev.remainder(chebyshev.series(sizes)) > UNRESOLVED * sizes.max(axis=1))
+        endless = np.zeros(len(flow), dtype=bool)
+        for k in rough.tolist():
+            top = int(sizes[k].argmax())
+            inwards = sizes[k, top:] if top < chebyshev.COUNT // 2 else sizes[k, top::-1]
+            if top in (0, chebyshev.COUNT - 1):
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    powers = -np.diff(np.log(inwards[:3])) / _NEARER
+                endless[k] = (powers >= ENDLESS_POWER).all()
+            else:
+                endless[k] = self.pieces.depth[k] >= MOST_HALVINGS - 1 and _rises(inwards)
+        return endless
 
     def _sizes_of(self, values: Floats, pace: Floats | float, sizes: Floats) -> Floats:
         """Integrals of absolute values over each piece; `sizes` are those of pieces without a change of sign."""
@@ -136,7 +164,7 @@ class Functions(Series):
             chebyshev.value(chebyshev.series(table[rows, piece]), x) for table in (self._table, self._divisor)
         )
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.pieces.line[piece] == line, above / below, np.nan)
+            return np.where(self.pieces.line[piece] == line, above / below ** self._orders[rows], np.nan)
 
     def integral(self, name: str, line: Ints, s: Floats) -> tuple[Floats, float]:
         """Integrals of a function from the begin of lines to places of them, shape (n,), and the error of the whole."""
@@ -229,7 +257,7 @@ class Functions(Series):
             table = chebyshev.at_places(chebyshev.series(self._table[rows[lane], piece]))
             below = self._divisor[rows[lane[quotient]], piece[quotient]]
             product, divisor = table[quotient], chebyshev.at_places(chebyshev.series(below))
-            table[quotient] /= divisor
+            table[quotient] /= divisor ** self._orders[rows[lane[quotient]], None]
             # Where both are zero the quotient has no meaning, and at a pole it has no sign.
             lost = np.where(quotient[:, None], ~np.isfinite(table), np.isnan(table))
             sizes = (scale[rows[lane], owner][quotient, None] for scale in (self._scale, self._divisor_scale))
@@ -257,7 +285,8 @@ class Functions(Series):
 
     def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
         """Places in pieces, and values, of local maxima of functions times a sign near to `chebyshev.PLACES[m]`."""
-        c, d = (chebyshev.series(table[rows, piece]) for table in (self._table, self._divisor))
+        powers = self._divisor[rows, piece] ** self._orders[rows, None]
+        c, d = chebyshev.series(self._table[rows, piece]), chebyshev.series(powers)
         slope, divisor_slope = chebyshev.slope_series(c), chebyshev.slope_series(d)
         bends, divisor_bends = chebyshev.slope_series(slope), chebyshev.slope_series(divisor_slope)
 
@@ -293,8 +322,7 @@ class Functions(Series):
         k = nodes.argmax(axis=1)
         tops = nodes[np.arange(len(k)), k]
         for j in np.flatnonzero((self.pieces.depth[piece] >= MOST_HALVINGS - 1) & (tops > 0)).tolist():
-            whole = self._table[rows[j], self.pieces.line == self.pieces.line[piece[j]]]
-            if tops[j] > ENDLESS * np.abs(np.nanmedian(whole)):
+            if _rises(nodes[j, k[j] :]) or _rises(nodes[j, k[j] :: -1]):
                 tops[j] = np.inf
         return chebyshev.NODES[k], tops
 
@@ -318,6 +346,7 @@ class Functions(Series):
             # From either side the divisor has its sign a little before the place.
             beside = np.stack([x - 1e-4, x + 1e-4])
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
+            by = by ** self._orders[rows[k]]
             up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
             poles.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
         lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
@@ -387,3 +416,9 @@ class Functions(Series):
             one, two = values.reshape(2, -1)
             places[lanes] = np.where(one <= two + EXACT, row[lanes], places[lanes])
         return Zeros(function, self.pieces.line[piece], places)
+
+
+def _rises(inwards: Floats) -> bool:
+    """Whether values still rise to the first of them, as to a pole; at a corner or a jump they do not."""
+    first, second, third = inwards[:3].tolist() if len(inwards) > 2 else (0.0, 0.0, 0.0)
+    return first - second > RISES * abs(first) and second - third > RISES * abs(second)

@@ -41,8 +41,8 @@ class Series:
         The functions that `evaluate` gives, in its order.
     sizes : sequence of float
         Least size of each function, by which its rounding is judged.
-    divisors : mapping of str to sequence of (str, int)
-        For each function with poles: the functions that are zero there, and the order of the poles.
+    divisors : mapping of str to (str, int)
+        For each function with poles: the function that is zero there, and the order of the poles.
     extremes, means, zeros : sequence of str
         Functions of which extremes, means and zeros are needed; the others are only evaluated.
     everywhere : sequence of str
@@ -53,19 +53,16 @@ class Series:
 
     def __init__(
         self, curve: Curve, names: Sequence[str], evaluate: Evaluate, sizes: Sequence[float],
-        divisors: Mapping[str, Sequence[tuple[str, int]]] | None = None, *,
+        divisors: Mapping[str, tuple[str, int]] | None = None, *,
         extremes: Sequence[str] = (), means: Sequence[str] = (), zeros: Sequence[str] = (),
         everywhere: Sequence[str] = (), ends: Mapping[str, int] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self.curve, self.names, self._evaluate = curve, {name: k for k, name in enumerate(names)}, evaluate
         self._sizes = np.array(sizes, dtype=float)
-        self._divisors = {
-            self.names[name]: [(self.names[by], power) for by, power in by_what]
-            for name, by_what in (divisors or {}).items()
-        }
-        self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
-        orders = [sum(power for _, power in self._divisors.get(k, ())) for k in range(len(names))]
-        self._orders = np.array(orders, dtype=float)[:, None]
+        divisors = divisors or {}
+        self._divisors = {self.names[name]: self.names[by] for name, (by, _) in divisors.items()}
+        self._orders = np.array([divisors[name][1] if name in divisors else 1 for name in names], dtype=float)
+        self._poled = np.array([name in divisors for name in names], dtype=bool)
         self._means, self._zeros, self._everywhere = (
             np.array([name in group for name in names], dtype=bool) for group in (means, zeros, everywhere)
         )
@@ -97,17 +94,16 @@ class Series:
         values, conditioning = self._values(np.repeat(pieces.line, s.shape[1]), s.ravel())
         values = values.reshape(len(self.names), *s.shape)
         divisors = np.ones_like(values)
-        for k, by_what in self._divisors.items():
-            for by, power in by_what:
-                divisors[k] *= values[by] ** power
+        divisors[[*self._divisors]] = values[[*self._divisors.values()]]
+        orders = self._orders[:, None, None]
         with np.errstate(invalid="ignore", over="ignore"):
-            products = np.where(self._poled[:, None, None], values * divisors, values)
+            products = np.where(self._poled[:, None, None], values * divisors**orders, values)
         # At a pole a quotient has no value: its numerator is interpolated from the other nodes.
         _fill(products, ~np.isfinite(products) & self._poled[:, None, None])
         known = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
         own = np.zeros((len(self.names), len(pieces.line)), dtype=bool)
         if self._poled.any():
-            noise = EXACT / known ** self._orders[self._poled, :, None]
+            noise = EXACT / known ** orders[self._poled]
             table = values[self._poled]
             lost = ~np.isfinite(table) | (noise > NOISE)
             _fill(table, lost)

@@ -102,7 +102,7 @@ class Along:
         self.curve = curve = corners.divided(self._lean, curve, errors=self._errors)
         angles = {angle.name for angle in curve.angles}
         self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
-        below = {name for powers in divisors.values() for name, _ in powers}
+        below = {name for name, _ in divisors.values()}
         integrals = {request.column for request in whole if request.integral}
         functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
         functions |= {_PACE: 0.0} if self._errors or integrals else {}
@@ -133,19 +133,19 @@ class Along:
         """The functions, followed where they matter."""
         return self._follow()
 
-    def _divisors(self) -> dict[str, list[tuple[str, int]]]:
+    def _divisors(self) -> dict[str, tuple[str, int]]:
         """What functions with poles are divided by, and how often."""
         question = self.question
         rates = INVERSE if question.inverse else FORWARD
-        divisors = {static.name: [(FORWARD, 1)] for static in question.statics}
-        divisors |= {name: [(f"rate of {name}", 1)] for name in self._poles}
+        divisors = {static.name: (FORWARD, 1) for static in question.statics}
+        divisors |= {name: (f"rate of {name}", 1) for name in self._poles}
         for name in self._others:
             output, _, order = name.rpartition("_")
             if output in question.study.mechanism.drives and not question.inverse:
                 continue  # of their own rates, which have no poles
             if order in (powers := {"velocity": 1, "acceleration": 3}):
-                divisors[name] = [(rates if question.inverse else self._chain(output), powers[order])]
-        divisors |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
+                divisors[name] = (rates if question.inverse else self._chain(output), powers[order])
+        divisors |= {name: (FORWARD, 1) for name in self._others if name == "det_J" or "_by_" in name}
         return {name: divisor for name, divisor in divisors.items() if name in self.columns}
 
     def _chain(self, output: str) -> str:
@@ -305,10 +305,6 @@ class Along:
     def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
         """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""
         return self.functions.means(self._means.get(name, name), power, _PACE, absolute=absolute)
-
-    def poled(self, name: str) -> bool:
-        """Whether a column whose means are asked may go to infinity."""
-        return self._means[name] != name
 
     def knows(self, names: Collection[str]) -> bool:
         """Whether some columns have values along the motions."""

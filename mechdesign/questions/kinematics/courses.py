@@ -85,19 +85,13 @@ class Followed:
         return self.largest[sign][self._designs]
 
     def mean(self, power: int) -> Floats:
-        """Mean of a power of the values; with a pole in it one of an even power is infinite, and another is nan."""
-        return self._mean(np.inf if power % 2 == 0 else np.nan, power)
+        """Mean of a power of the values; where it has no integral an even one is infinite, and another nan."""
+        return self.along.mean(self.name, power)[self._designs]
 
     def size(self) -> Floats:
-        """Mean of the absolute values."""
-        return self._mean(np.inf, 1, absolute=True)
+        """Mean of the absolute values; infinite where they have no integral."""
+        return self.along.mean(self.name, absolute=True)[self._designs]
 
     def of(self, design: int) -> Followed | None:
         """The column over the motion of one of the designs; None where it is not followed."""
         return replace(self, design=(self.design or 0) + design) if self.followed[design] else None
-
-    def _mean(self, at_pole: float, power: int, *, absolute: bool = False) -> Floats:
-        mean = self.along.mean(self.name, power, absolute=absolute)[self._designs]
-        if not self.along.poled(self.name):
-            return mean
-        return np.where(np.isinf(self.end(1)) | np.isinf(self.end(-1)), at_pole, mean)

@@ -6,7 +6,6 @@ from collections.abc import Collection
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.motion import Motion
