@@ -197,12 +197,13 @@ class Functions(Series):
             lane = lane * lines + line
             best = np.full(len(rows) * lines, -np.inf)
             np.maximum.at(best, lane, value)
-            tie = np.flatnonzero(value >= (best - twice.ravel())[lane])
+            equal = np.maximum(twice.ravel(), np.where(np.isfinite(best), ROUNDED * np.abs(best), 0.0))
+            tie = np.flatnonzero(value >= (best - equal)[lane])
             tie = tie[np.lexsort((place[tie], lane[tie]))]
             lanes, first = np.unique(lane[tie], return_index=True)
             chosen = tie[first]
-            own, sign, equal = rows[lanes // lines], sign[lanes // lines], twice.ravel()[lanes]
-            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], equal)
+            own, sign = rows[lanes // lines], sign[lanes // lines]
+            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], equal[lanes])
         value, place = table.reshape(2, 2, len(names), lines)
         return Extremes(value, place, still)
 
@@ -271,9 +272,10 @@ class Functions(Series):
             top &= np.tile(best[:half] + best[half:] > still[:half], (2, 1))[lane, owner][:, None]
             bend = np.abs(np.nan_to_num(table[:, 2:] - 2 * table[:, 1:-1] + table[:, :-2], posinf=0, neginf=0))
         bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
-        # The first place of a line counts if it is as large within rounding.
-        top[first[piece], 0] = True
-        top &= np.isfinite(table) & (table + bend >= (best - still)[lane, owner][:, None])
+        # The first place of a piece counts if it is as large within rounding.
+        top[:, 0] = True
+        equal = np.maximum(still, ROUNDED * np.where(np.isfinite(best), np.abs(best), 0.0))
+        top &= np.isfinite(table) & (table + bend >= (best - equal)[lane, owner][:, None])
         which, m = np.nonzero(top)
         lane, piece = lane[which], piece[which]
         x, value = self._refined(rows[lane], sign[lane], piece, m, table[which, m])

@@ -103,7 +103,8 @@ class Series:
         known = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
         own = np.zeros((len(self.names), len(pieces.line)), dtype=bool)
         if self._poled.any():
-            noise = EXACT / known ** orders[self._poled]
+            # Positions have lost digits there as well.
+            noise = EXACT / known ** (orders[self._poled] + 1)
             table = values[self._poled]
             lost = ~np.isfinite(table) | (noise > NOISE)
             _fill(table, lost)

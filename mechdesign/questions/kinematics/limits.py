@@ -60,7 +60,8 @@ def limits_table(limits: Sequence[Limit], along: Along) -> Table:
     passing = np.array([limit.end is None for limit in limits], dtype=bool)
     if passing.any():
         there = along.at(line[passing], place[passing])
-        values[:, passing] = [there[name] for name in names]
+        for row, name in zip(values, names, strict=True):
+            row[passing] = there[name]
     if not passing.all():
         values[:, ~passing] = along.at_ends([limit.end for limit in limits if limit.end is not None], names)
     for output, column in zip(shown, values, strict=True):
