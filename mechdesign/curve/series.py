@@ -111,7 +111,7 @@ class Series:
             left = np.where(lost, 0.0, noise).max(axis=2)
             with np.errstate(invalid="ignore"):
                 size = np.maximum(np.abs(table).max(axis=2), self._sizes[self._poled, None])
-                some = chebyshev.remainder(chebyshev.series(table)) <= left * size
+                some = _remainder(table, np.count_nonzero(lost, axis=2)) <= left * size
             own[self._poled] = some
             rounding = np.zeros(own.shape)
             rounding[self._poled] = np.where(some, left * size, 0.0)
@@ -192,3 +192,13 @@ def _fill(table: Floats, lost: Flags) -> None:
     number = np.count_nonzero(lost, axis=2)
     for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
         table[k, piece] = chebyshev.filled(table[k, piece], ~lost[k, piece])
+
+
+def _remainder(table: Floats, number: Ints) -> Floats:
+    """Truncation errors of series of which a `number` of nodes are filled, so that as many coefficients are zero."""
+    series = chebyshev.series(table)
+    rest = np.full(number.shape, np.inf)
+    for filled in range(MOST_LOST + 1):
+        some = number == filled
+        rest[some] = chebyshev.remainder(series[some][:, : chebyshev.COUNT - filled])
+    return rest

@@ -13,6 +13,8 @@ from mechdesign.results import Table
 
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
+# A row within this part of an extreme of the motion between the rows does not contradict it.
+AT_ROW = 1e-9
 
 
 def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
@@ -68,8 +70,13 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
             moves = peaks.value[1] - peaks.value[0] > peaks.still
         moving[followed] |= moves
         shown = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
+        # A row is evidence: no extreme contradicts one that is farther out by more than rounding.
+        with np.errstate(invalid="ignore"):
+            inner = np.array([[[-1.0]], [[1.0]]]) * (ends[:, 0, followed] - peaks.value)
+            kept = inner > AT_ROW * np.abs(peaks.value) + peaks.still
         for part, new in enumerate((peaks.value, shown)):
-            ends[:, part, followed] = np.where(np.isfinite(peaks.place) & moves, new, ends[:, part, followed])
+            better = np.isfinite(peaks.place) & moves & ~kept
+            ends[:, part, followed] = np.where(better, new, ends[:, part, followed])
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
