@@ -332,13 +332,16 @@ class Functions(Series):
         """Places at which functions times a sign go to plus infinity: lane, piece, place in it, infinity."""
         poles: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
         for k in np.flatnonzero(self._poled[rows]).tolist():
-            product, divisor = (chebyshev.series(table[rows[k]]) for table in (self._table, self._divisor))
-            sizes = self._scale[rows[k], self.pieces.line], self._divisor_scale[rows[k], self.pieces.line]
+            some = np.flatnonzero((self._divisor[rows[k]] != 1.0).any(axis=1))
+            if not len(some):
+                continue
+            line, fold = self.pieces.line[some], self.pieces.fold[some]
+            product, divisor = (chebyshev.series(table[rows[k], some]) for table in (self._table, self._divisor))
+            sizes = self._scale[rows[k], line], self._divisor_scale[rows[k], line]
             turned, place, level = turning = chebyshev.turning_points(divisor)
             piece, x = chebyshev.zeros(divisor, turning)
             flat = np.abs(level) <= ZERO * sizes[1][turned]
-            dead = np.stack([self.pieces.fold < 0, self.pieces.fold > 0], axis=1)
-            least = np.where(dead, ZERO_AT_FOLD, ZERO) * sizes[1][:, None]
+            least = np.where(np.stack([fold < 0, fold > 0], axis=1), ZERO_AT_FOLD, ZERO) * sizes[1][:, None]
             end = np.abs(chebyshev.at_places(divisor)[:, [0, -1]]) <= least
             rim, side = np.nonzero(end)
             piece = np.concatenate([piece, turned[flat], rim])
@@ -350,7 +353,7 @@ class Functions(Series):
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
             by = by ** self._orders[rows[k]]
             up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
-            poles.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
+            poles.append((np.full(np.count_nonzero(up), k), some[piece[up]], x[up]))
         lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
         return lane, piece, x, np.full(len(x), np.inf)
 

@@ -324,7 +324,7 @@ class Along:
                 table, conditioning = places._evaluated(line, s)
                 return table[rows], conditioning
 
-            curve = within(self.curve, [interval for _, interval in part], values)
+            curve = within(places.curve, [interval for _, interval in part], values)
             requests = [request._replace(part=()) for request in self._requests if request.part == part]
             self._within[part] = Along(self.question, curve, (), requests=requests)
         return self._within[part]
