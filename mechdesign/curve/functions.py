@@ -44,7 +44,7 @@ ENDLESS_POWER = 0.9
 # It does so only where its series is no closer than this part of its size.
 UNRESOLVED = 1e-3
 # Logarithms of the ratios of the distances of the outermost nodes from the end of a piece.
-_NEARER = np.diff(np.log(1.0 - chebyshev.NODES[:-4:-1]))
+_NEARER = np.diff(np.log(1.0 - chebyshev.NODES[:-5:-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +122,9 @@ class Functions(Series):
         total, sums = (np.bincount(self.pieces.line, part, self.curve.lines) for part in (weights.sum(axis=1), parts))
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = np.asarray(sums / np.where(total > 0, total, np.nan))
-        mean[self.pieces.line[self._endless(values * pace * self.pieces.stretch)]] = (
-            np.inf if absolute or power % 2 == 0 else np.nan
-        )
+        large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * self._sizes[self.names[name]]) ** power
+        endless = large & self._endless(values * pace * self.pieces.stretch)
+        mean[self.pieces.line[endless]] = np.inf if absolute or power % 2 == 0 else np.nan
         return mean
 
     def _endless(self, flow: Floats) -> Flags:
@@ -137,7 +137,7 @@ class Functions(Series):
             inwards = sizes[k, top:] if top < chebyshev.COUNT // 2 else sizes[k, top::-1]
             if top in (0, chebyshev.COUNT - 1):
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    powers = -np.diff(np.log(inwards[:3])) / _NEARER
+                    powers = -np.diff(np.log(inwards[:4])) / _NEARER
                 endless[k] = (powers >= ENDLESS_POWER).all()
             else:
                 endless[k] = self.pieces.depth[k] >= MOST_HALVINGS - 1 and _rises(inwards)
