@@ -240,8 +240,10 @@ class Functions(Series):
         The lanes are the smallest values of all functions, then their largest values.
         """
         line, poled, half = self.pieces.line, self._poled[rows], len(rows) // 2
-        values = self._table[rows[:half]]
-        values = np.where(np.isnan(values) | poled[:half, None, None], -np.inf, values)
+        rough = self._rough[rows]
+        values = self._quotients(rows[:half])
+        # A quotient is judged by its series, but where these are not exact.
+        values = np.where(np.isnan(values) | (poled & ~rough.T).T[:half, :, None], -np.inf, values)
         with np.errstate(invalid="ignore"):
             steps = np.nan_to_num(np.abs(np.diff(values, axis=2)), nan=np.inf).max(axis=2)
         nodes = np.concatenate([np.where(np.isinf(values), -np.inf, -values).max(axis=2), values.max(axis=2)])
@@ -249,7 +251,6 @@ class Functions(Series):
         largest(best, line, nodes)
         # Between its nodes a function is larger than there by less than it moves from one to the next.
         first = np.append(True, line[1:] != line[:-1])
-        rough = self._rough[rows] & ~poled[:, None]
         with np.errstate(invalid="ignore", over="ignore"):
             high = nodes + 2 * np.tile(steps, (2, 1)) >= best[:, line] - still[:, line]
         lane, piece = np.nonzero((high | poled[:, None] | first) & ~rough)
@@ -285,6 +286,13 @@ class Functions(Series):
             np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *corners), strict=True)
         )  # type: ignore[return-value]
 
+    def _quotients(self, rows: Ints, piece: Ints | slice = slice(None)) -> Floats:
+        """Values of functions at the nodes of pieces; nan where the divisor is zero."""
+        divisors = self._divisor[rows, piece]
+        orders = self._orders[rows].reshape(-1, *(1,) * (divisors.ndim - 1))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return np.where(divisors != 0, self._table[rows, piece] / divisors**orders, np.nan)
+
     def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
         """Places in pieces, and values, of local maxima of functions times a sign near to `chebyshev.PLACES[m]`."""
         powers = self._divisor[rows, piece] ** self._orders[rows, None]
@@ -319,7 +327,7 @@ class Functions(Series):
 
     def _corners(self, rows: Ints, sign: Floats, piece: Ints) -> tuple[Floats, Floats]:
         """Place and value of the largest node, for functions with a corner in a piece, whose series are not exact."""
-        nodes = self._table[rows, piece]
+        nodes = self._quotients(rows, piece)
         nodes = np.where(np.isnan(nodes), -np.inf, sign[:, None] * nodes)
         k = nodes.argmax(axis=1)
         tops = nodes[np.arange(len(k)), k]
