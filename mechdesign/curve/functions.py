@@ -380,8 +380,11 @@ class Functions(Series):
             every = (every + period * np.arange(first, last + 1)[:, None]).ravel()
         series = chebyshev.series(table)
         table = chebyshev.at_places(series)
+        turned, _, extreme = chebyshev.turning_points(series)
+        least, most = table.min(axis=1), table.max(axis=1)
+        np.minimum.at(least, turned, extreme)
+        np.maximum.at(most, turned, extreme)
         with np.errstate(invalid="ignore"):
-            least, most = table.min(axis=1), table.max(axis=1)
             slack = TOUCHED * np.maximum(np.abs(least), np.abs(most))
             moves = most - least > 2 * slack
             met = (every >= (least - slack)[:, None]) & (every <= (most + slack)[:, None])

@@ -25,7 +25,10 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     """The curve of a question with pieces on which its measures, its loads and, for errors, its targets are smooth."""
     study, loads = question.study, question.loads
     targets = study.targets.values() if errors else ()
-    expressions = expressions_of([*question.watched, *coordinates_in(study, loads)])
+    named = [*question.watched, *coordinates_in(study, loads), *(question.listed if question.square else ())]
+    named += question.rated.values() if question.section.rated else ()
+    named += [study.mechanism.coordinate(name) for name in question.section.mechanical_advantage]
+    expressions = expressions_of(named)
     corners = corners_of(expressions.values())
     written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
     written += [target.expression for target in targets if target.expression is not None]
