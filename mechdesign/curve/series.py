@@ -21,6 +21,8 @@ EXACT = 2e-15
 # A truncation error below this part of the size, and not four times smaller in either half of the piece, is rounding,
 # as of a load that begins on a short way; no halving would make it smaller. Of a corner one half has none.
 ROUNDING = 1e-11
+# The same of a piece that has been halved so often: a function that ends as a root has lost half of its digits there.
+DEEP, ROUNDING_DEEP = 20, 1e-3
 # Error of means, as a part of the function's size.
 MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
@@ -146,7 +148,8 @@ class Series:
             rough = ~(rest <= exact * scale) & finite.any(axis=2) & ~own
             if before is not None:
                 rounding = np.minimum(*np.split(rest, 2, axis=1)) > before / 4
-                rough &= ~(np.tile(rounding, 2) & (rest <= ROUNDING * scale))
+                part = np.where(pending.depth >= DEEP, ROUNDING_DEEP, ROUNDING)
+                rough &= ~(np.tile(rounding, 2) & (rest <= part * scale))
             with np.errstate(invalid="ignore"):
                 steps = np.abs(np.diff(finite_values, axis=2))
                 steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
