@@ -229,6 +229,8 @@ class Functions(Series):
 
     def _true(self, rows: Ints, line: Ints, values: Floats, series: Floats) -> Floats:
         """Values of the functions themselves, or of their series where the functions have lost digits."""
+        # At a corner that lies beyond the outermost node of a piece the series of a magnitude is negative.
+        series = np.where(self._magnitudes[rows], np.maximum(series, 0.0), series)
         size = np.maximum(self._scale, self._sizes[:, None])[rows, line]
         with np.errstate(invalid="ignore"):
             near = np.abs(values - series) <= TRUE * np.where(self._poled[rows], np.abs(series), size)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from mechdesign.curve.motion import AT_ONCE, BUDGET, Curve
-from mechdesign.curve.pieces import MOST_HALVINGS, Pieces, largest
+from mechdesign.curve.pieces import BESIDE, MOST_HALVINGS, RESOLVED, Pieces, largest
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -23,6 +23,8 @@ EXACT = 2e-15
 ROUNDING = 1e-11
 # The same of a piece that has been halved so often: a function that ends as a root has lost half of its digits there.
 DEEP, ROUNDING_DEEP = 20, 1e-3
+# A magnitude below this part of its size is nearly zero. Pieces are divided at such places so many times at the most.
+NEARLY_ZERO, MOST_PARTED = 3e-2, 8
 # Error of means, as a part of the function's size.
 MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
@@ -47,6 +49,8 @@ class Series:
         For each function with poles: the function that is zero there, and the order of the poles.
     extremes, means, zeros : sequence of str
         Functions of which extremes, means and zeros are needed; the others are only evaluated.
+    magnitudes : sequence of str
+        Sizes of vectors, which have a corner where these are zero; their squares are smooth there.
     everywhere : sequence of str
         Functions whose series are needed on every piece.
     ends : mapping of str to int
@@ -57,7 +61,7 @@ class Series:
         self, curve: Curve, names: Sequence[str], evaluate: Evaluate, sizes: Sequence[float],
         divisors: Mapping[str, tuple[str, int]] | None = None, *,
         extremes: Sequence[str] = (), means: Sequence[str] = (), zeros: Sequence[str] = (),
-        everywhere: Sequence[str] = (), ends: Mapping[str, int] = MappingProxyType({}),
+        everywhere: Sequence[str] = (), magnitudes: Sequence[str] = (), ends: Mapping[str, int] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self.curve, self.names, self._evaluate = curve, {name: k for k, name in enumerate(names)}, evaluate
         self._sizes = np.array(sizes, dtype=float)
@@ -68,6 +72,7 @@ class Series:
         self._means, self._zeros, self._everywhere = (
             np.array([name in group for name in names], dtype=bool) for group in (means, zeros, everywhere)
         )
+        self._magnitudes = np.array([name in magnitudes for name in names], dtype=bool)
         # Whether the largest and the smallest value of each function are needed.
         self._extremes = np.array(
             [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
@@ -125,8 +130,15 @@ class Series:
     def _follow(self) -> None:
         """Halve pieces until every series is exact where extremes, means or zeros depend on it."""
         lines, spent = self.curve.lines, np.zeros(self.curve.lines)
-        pieces = pending = self.curve.pieces
+        pieces = self.curve.pieces
         values, divisors, exact, own = self._sampled(pieces)
+        for _ in range(MOST_PARTED if self._magnitudes.any() else 0):
+            piece, x = self._nearly_zero(pieces, values, divisors)
+            if not len(piece):
+                break
+            pieces = pieces.divided(piece, x)
+            values, divisors, exact, own = self._sampled(pieces)
+        pending = pieces
         done: list[tuple[Pieces, Floats, Floats, Floats, Flags]] = []
         self._scale = np.zeros((len(self.names), lines))
         self._divisor_scale = np.zeros((len(self.names), lines))
@@ -188,6 +200,28 @@ class Series:
         self.pieces = joined.take(order)
         self._table, self._divisor = (np.concatenate(part, axis=1)[:, order] for part in parts[1:3])
         self._rough = np.concatenate(parts[4], axis=1)[:, order]
+
+    def _nearly_zero(self, pieces: Pieces, values: Floats, divisors: Floats) -> tuple[Ints, Floats]:
+        """Pieces, and places in them, at which magnitudes are smallest and nearly zero, or may be so."""
+        rows = self._magnitudes
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            squares = (values[rows] / divisors[rows] ** self._orders[rows, None, None]) ** 2
+        squares[~np.isfinite(squares)] = np.nan
+        sizes = np.zeros((len(squares), self.curve.lines))
+        largest(sizes, pieces.line, np.nan_to_num(squares).max(axis=2, initial=0.0))
+        # What is rounding everywhere is nowhere nearly zero.
+        sizes[sizes < (NOISE * self._sizes[rows, None]) ** 2] = 0.0
+        small = NEARLY_ZERO**2 * sizes[:, pieces.line]
+        with np.errstate(invalid="ignore"):
+            magnitude, piece = np.nonzero(squares.min(axis=2, initial=np.inf) < small)
+        series = chebyshev.series(squares[magnitude, piece])
+        # A value loses digits by the size of the largest, its square in proportion to both.
+        size = np.sqrt(sizes[magnitude, pieces.line[piece]] * np.abs(series).max(axis=1, initial=0.0))
+        rough = chebyshev.remainder(series) > RESOLVED * size
+        which, x, value = chebyshev.turning_points(series)
+        inside = ~rough[which] & (value < small[magnitude, piece][which]) & (np.abs(x) < 1.0 - BESIDE)
+        owner = np.concatenate([piece[which[inside]], piece[rough]])
+        return owner, np.concatenate([x[inside], np.zeros(np.count_nonzero(rough))])
 
 
 def _fill(table: Floats, lost: Flags) -> None:

@@ -280,3 +280,27 @@ kinematics: {path: {C: {line: [[0, 170], [1, 40]], points: 14}}, outputs: [C], s
 
     part = brentq(across, 0.2, 0.9, xtol=1e-14)
     assert (limits["C.x"][0], limits["C.y"][0]) == pytest.approx((part, 170 - 130 * part), rel=1e-9)
+
+
+def test_the_size_of_a_force_that_changes_its_sign_is_zero_there():
+    """The rod of a crank that a load at B alone pushes bears F/cos: it is zero with the load, and never negative."""
+    answer = mechdesign.dynamics(
+        mechdesign.load(
+            text="""
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, 30]
+    rod: [A, B, 90]
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: O}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [84, 0]}
+dynamics: {sweep: {theta: {from: 0, to: 360, step: 17}}, loads: [{at: B, force: ["10*sin(theta - 77.77)*cos(3*theta)", 0]}]}
+"""
+        )
+    )
+    for name in ("A_force", "guide_force"):
+        low, _, high, _ = extremes(answer, name)
+        assert 0 <= low < 1e-9
+        assert high > 1

@@ -82,7 +82,11 @@ class ForceQuestion:
         of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
                     for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip
         kinds = column_kinds(mechanism, self.joints, moving=self.moves)
-        return [Static(name, label(kind), *of_drive.get(name, (name, {})), sizes[kind]) for name, kind in kinds.items()]
+        magnitudes = {"shaking", *self.forces}
+        return [
+            Static(name, label(kind), *of_drive.get(name, (name, {})), sizes[kind], name in magnitudes)
+            for name, kind in kinds.items()
+        ]
 
     @cached_property
     def size(self) -> float:

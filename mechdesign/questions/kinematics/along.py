@@ -120,6 +120,7 @@ class Along:
         self._follow = partial(
             Functions, curve, self._names, self._evaluated, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
+            magnitudes=[s.name for s in question.statics if s.magnitude and s.name in columns],
             ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
         )  # fmt: skip
 

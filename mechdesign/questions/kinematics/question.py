@@ -54,6 +54,7 @@ class Static:
     kind: str
     words: Mapping[str, str]  # at the places of the kind
     size: float = 0.0  # least size, by which its rounding is judged
+    magnitude: bool = False  # whether it is the size of a vector
 
 
 class Borne(Protocol):
