@@ -122,7 +122,9 @@ class Functions(Series):
         total, sums = (np.bincount(self.pieces.line, part, self.curve.lines) for part in (weights.sum(axis=1), parts))
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = np.asarray(sums / np.where(total > 0, total, np.nan))
-        large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * self._sizes[self.names[name]]) ** power
+        row = self.names[name]
+        size = np.maximum(self._scale[row], self._sizes[row])[self.pieces.line]
+        large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * size) ** power
         endless = large & self._endless(values * pace * self.pieces.stretch)
         mean[self.pieces.line[endless]] = np.inf if absolute or power % 2 == 0 else np.nan
         return mean
