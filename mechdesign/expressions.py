@@ -24,6 +24,8 @@ HELP_PAGE = "reference/expressions"
 
 Number = float | Floats
 
+# Powers up to this have no narrow peaks.
+MILD_POWER = 4
 # Longest text accepted, in characters, and its deepest nesting of parentheses.
 MAX_TEXT = 1000
 MAX_NESTING = 50
@@ -342,13 +344,13 @@ class Expression:
         corners: list[tuple[tuple[Step, ...], Corner]] = []
 
         def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
-            for program, levels, period in _corners(function, inner, self.angle_unit):
+            for program, *places in _corners(function, inner, self.angle_unit):
                 if any(kind == "name" for kind, _ in program):
-                    corners.append((program, Corner(replace(self, program=program), levels, period)))
+                    corners.append((program, Corner(replace(self, program=program), *places)))
             return _call_steps(function, inner)
 
         self._run(_constant_step, lambda name: (("name", name),), call)
-        return list({(program, corner.levels): corner for program, corner in corners}.values())
+        return list({(program, corner.levels, corner.turning): corner for program, corner in corners}.values())
 
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[Any, list[Any]], Any]
@@ -412,40 +414,46 @@ class Expression:
 class Corner:
     """Places at which an expression is not smooth: where its `argument` takes one of some levels.
 
-    With a `period` (0 for none) these are repeated.
+    With a `period` (0 for none) these are repeated. With `turning` it may have a narrow peak where the argument turns
+    back, as the exponential function has.
     """
 
     argument: Expression
     levels: tuple[float, ...] = (0.0,)
     period: float = 0.0
+    turning: bool = False
 
 
 def _corners(
     function: Called, inner: list[tuple[Step, ...]], angle_unit: float
-) -> Iterator[tuple[tuple[Step, ...], tuple[float, ...], float]]:
-    """Programs, levels and periods of the corners of a call; see `Corner`."""
+) -> Iterator[tuple[tuple[Step, ...], tuple[float, ...], float, bool]]:
+    """Programs, levels and periods of the corners of a call, and whether it has peaks; see `Corner`."""
     if isinstance(function, Tabulated):
-        yield inner[0], tuple(place for place, _ in function.rows), function.period
+        yield inner[0], tuple(place for place, _ in function.rows), function.period, False
     elif function in ("min", "max"):
-        yield _call_steps("-", inner), (0.0,), 0.0
+        yield _call_steps("-", inner), (0.0,), 0.0, False
     elif function in ("abs", "sqrt", "log"):
-        yield inner[0], (0.0,), 0.0
+        yield inner[0], (0.0,), 0.0, False
+    elif function == "exp":
+        yield inner[0], (), 0.0, True
     elif function in ("asin", "acos"):
-        yield inner[0], (-1.0, 1.0), 0.0
+        yield inner[0], (-1.0, 1.0), 0.0, False
     elif function == "tan":
-        yield inner[0], (math.pi / 2 / angle_unit,), math.pi / angle_unit
+        yield inner[0], (math.pi / 2 / angle_unit,), math.pi / angle_unit, False
     elif function == "atan2":
         # It jumps from half a turn to minus half a turn where y is zero, at the x below zero.
-        yield inner[0], (0.0,), 0.0
+        yield inner[0], (0.0,), 0.0, False
     elif function == "hypot":
         # It bends where both are zero.
-        yield from ((part, (0.0,), 0.0) for part in inner)
+        yield from ((part, (0.0,), 0.0, False) for part in inner)
     elif function == "/":
-        yield inner[1], (0.0,), 0.0
+        yield inner[1], (0.0,), 0.0, True
     elif function == "**":
         exponent = inner[1][0][1] if len(inner[1]) == 1 else None
         if not (isinstance(exponent, float) and exponent >= 0 and exponent.is_integer()):
-            yield inner[0], (0.0,), 0.0
+            yield inner[0], (0.0,), 0.0, True
+        elif exponent > MILD_POWER:
+            yield inner[0], (), 0.0, True
 
 
 def _function(called: Called) -> _Function | Tabulated:

@@ -56,7 +56,7 @@ def divide(curve: Curve, corners: Sequence[Corner], variables: Variables) -> tup
         argument = Functions(
             before, ["argument"], partial(_argument, corner, variables), [0.0], everywhere=["argument"]
         )
-        line, place = argument.crossings("argument", corner.levels, corner.period)
+        line, place = argument.crossings("argument", corner.levels, corner.period, turning=corner.turning)
         if len(line):
             piece = before.piece_at(line, place)
             curve.pieces = before.pieces.divided(piece, before.pieces.take(piece).within(place))

@@ -369,10 +369,13 @@ class Functions(Series):
         lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
         return lane, piece, x, np.full(len(x), np.inf)
 
-    def crossings(self, name: str, levels: Sequence[float], period: float) -> tuple[Ints, Floats]:
+    def crossings(
+        self, name: str, levels: Sequence[float] = (0.0,), period: float = 0.0, *, turning: bool = False
+    ) -> tuple[Ints, Floats]:  # fmt: skip
         """Places at which a function crosses or touches some levels, repeated with a `period` if it is not 0.
 
-        Lines and places in rows, each of shape (n,). A function that rests at a level does not cross it.
+        Lines and places in rows, each of shape (n,). A function that rests at a level does not cross it. With `turning`
+        the places at which it turns back are among them.
         """
         table, every = self._table[self.names[name]], np.array(levels)
         finite = table[np.isfinite(table)]
@@ -384,7 +387,7 @@ class Functions(Series):
             every = (every + period * np.arange(first, last + 1)[:, None]).ravel()
         series = chebyshev.series(table)
         table = chebyshev.at_places(series)
-        turned, _, extreme = chebyshev.turning_points(series)
+        turned, back, extreme = chebyshev.turning_points(series)
         least, most = table.min(axis=1), table.max(axis=1)
         np.minimum.at(least, turned, extreme)
         np.maximum.at(most, turned, extreme)
@@ -395,13 +398,16 @@ class Functions(Series):
         piece, level = np.nonzero(met & moves[:, None])
         shifted = series[piece]
         shifted[:, 0] -= every[level]
-        turned, place, extreme = turning = chebyshev.turning_points(shifted)
-        which, x = chebyshev.zeros(shifted, turning)
-        touched = np.abs(extreme) <= slack[piece[turned]]
+        grazing, place, extreme = points = chebyshev.turning_points(shifted)
+        which, x = chebyshev.zeros(shifted, points)
+        touched = np.abs(extreme) <= slack[piece[grazing]]
         rim, side = np.nonzero(np.abs(chebyshev.at_places(shifted)[:, [0, -1]]) <= slack[piece, None])
-        which = piece[np.concatenate([which, turned[touched], rim])]
-        places = self.pieces.take(which).places(np.concatenate([x, place[touched], 2.0 * side - 1.0]))
-        return self.pieces.line[which], places
+        which = piece[np.concatenate([which, grazing[touched], rim])]
+        x = np.concatenate([x, place[touched], 2.0 * side - 1.0])
+        if turning:
+            own = moves[turned]
+            which, x = np.concatenate([which, turned[own]]), np.concatenate([x, back[own]])
+        return self.pieces.line[which], self.pieces.take(which).places(x)
 
     def zeros(self, names: Sequence[str], touching: float) -> Zeros:
         """Places at which functions cross zero, or turn back or end nearer to zero than `touching`."""

@@ -68,6 +68,19 @@ def test_a_load_that_acts_between_two_rows_is_seen(width):
     assert low == pytest.approx(efforts.min(), rel=1e-9)
 
 
+def test_a_bell_of_a_tenth_of_a_degree_is_seen_between_rows_of_five():
+    text = ARM.rstrip() + """
+  measures: {bell: "exp(-((theta - 123.4)/0.1)**2)", witch: "1/(1 + ((theta - 77.7)/0.1)**2)"}
+kinematics: {outputs: [bell, witch], sweep: {theta: {from: 0, to: 360, step: 5}}}
+requirements: [{result: kinematics.bell, at_most: 0.99}, {result: kinematics.bell.mean, at_most: 1}]
+"""
+    gate, mean = verdicts(text)
+    assert gate == (False, pytest.approx(1, rel=1e-12))
+    assert mean == (True, pytest.approx(0.1 * math.sqrt(math.pi) / 360, rel=1e-9))
+    _, _, high, place = extremes(mechdesign.kinematics(mechdesign.load(text=text)), "witch")
+    assert (high, place) == pytest.approx((1, 77.7), rel=1e-12)
+
+
 @pytest.mark.parametrize("width", [1, 0.2, 0.004])
 def test_extremes_and_means_of_a_narrow_measure_are_those_of_its_triangle(width):
     text = ARM.rstrip() + f"""
