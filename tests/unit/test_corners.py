@@ -55,7 +55,7 @@ def verdicts(text):
 
 @pytest.mark.parametrize("width", [4, 0.4, 0.02])
 def test_a_load_that_acts_between_two_rows_is_seen(width):
-    """At the top of the pulse the arm's effort is the load times the arm, however narrow the pulse and coarse the rows."""
+    """The arm's effort is the load times its lever, however narrow the pulse and coarse the rows."""
     study = mechdesign.load(
         text=ARM + "kinematics:\n  sweep: {theta: {from: 0, to: 360, step: 5}}\n"
         f'  loads: [{{at: A, force: [0, "-20*max(0, 1 - abs(theta - 123.4)/{width / 2})"]}}]\n'
@@ -69,11 +69,14 @@ def test_a_load_that_acts_between_two_rows_is_seen(width):
 
 
 def test_a_bell_of_a_tenth_of_a_degree_is_seen_between_rows_of_five():
-    text = ARM.rstrip() + """
+    text = (
+        ARM.rstrip()
+        + """
   measures: {bell: "exp(-((theta - 123.4)/0.1)**2)", witch: "1/(1 + ((theta - 77.7)/0.1)**2)"}
 kinematics: {outputs: [bell, witch], sweep: {theta: {from: 0, to: 360, step: 5}}}
 requirements: [{result: kinematics.bell, at_most: 0.99}, {result: kinematics.bell.mean, at_most: 1}]
 """
+    )
     gate, mean = verdicts(text)
     assert gate == (False, pytest.approx(1, rel=1e-12))
     assert mean == (True, pytest.approx(0.1 * math.sqrt(math.pi) / 360, rel=1e-9))
@@ -83,7 +86,9 @@ requirements: [{result: kinematics.bell, at_most: 0.99}, {result: kinematics.bel
 
 @pytest.mark.parametrize("width", [1, 0.2, 0.004])
 def test_extremes_and_means_of_a_narrow_measure_are_those_of_its_triangle(width):
-    text = ARM.rstrip() + f"""
+    text = (
+        ARM.rstrip()
+        + f"""
   measures: {{pulse: "100*max(0, 1 - abs(theta - 123.4)/{width})"}}
 kinematics: {{outputs: [pulse], sweep: {{theta: {{from: 0, to: 360, step: 5}}}}}}
 requirements:
@@ -92,6 +97,7 @@ requirements:
   - {{result: kinematics.pulse.rms, at_most: 1e9}}
   - {{result: kinematics.pulse.peak, at_most: 99.99}}
 """
+    )
     gate, mean, rms, peak = verdicts(text)
     assert gate == (False, pytest.approx(100, rel=1e-9))
     assert peak == gate
@@ -104,22 +110,28 @@ requirements:
 @pytest.mark.parametrize("step", [5, 7, 45])
 def test_a_velocity_that_jumps_does_not_overshoot(step):
     """d/dt (40 + 10 |sin w|) has the values 10 and -10 on the two sides of each half turn."""
-    text = FOLLOWER.rstrip() + f"""
+    text = (
+        FOLLOWER.rstrip()
+        + f"""
   couplings: {{lift: {{set: guide.slide, to: "40 + 10*abs(sin(w))"}}}}
 kinematics: {{outputs: [F.y], rates: {{w: 1 rad/s}}, sweep: {{w: {{from: 0, to: 360, step: {step}}}}}}}
 requirements: [{{result: kinematics.F.y_velocity, at_most: 10.1, at_least: -10.1}}]
 """
+    )
     assert verdicts(text)[0][0]
     low, _, high, _ = extremes(mechdesign.kinematics(mechdesign.load(text=text)), "F.y_velocity")
     assert (low, high) == (pytest.approx(-10, rel=1e-12), pytest.approx(10, rel=1e-12))
 
 
 def test_a_bump_of_a_follower_between_coarse_rows_is_seen_and_its_limits_too():
-    text = FOLLOWER.rstrip() + """
+    text = (
+        FOLLOWER.rstrip()
+        + """
   couplings: {lift: {set: guide.slide, to: "40 + max(0, 1 - abs(w - 47)/0.5)"}}
 kinematics: {outputs: [F.y], rates: {w: 1 rad/s}, sweep: {w: {from: 0, to: 360, step: 30}}}
 requirements: [{result: kinematics.F.y, at_most: 40.5}]
 """
+    )
     assert verdicts(text) == [(False, pytest.approx(41, rel=1e-12))]
     answer = mechdesign.kinematics(mechdesign.load(text=text))
     steep = math.degrees(1) / 0.5
@@ -133,7 +145,9 @@ requirements: [{result: kinematics.F.y, at_most: 40.5}]
 
 def test_a_pulse_in_time_between_two_instants_is_seen():
     """A force of 8 ms on a motion of 1 s, of which the rows hold 1.2 %."""
-    text = ARM + """
+    text = (
+        ARM
+        + """
 dynamics:
   motion: {theta: [{from: 0, to: 90, time: 1 s, law: constant}]}
   loads: [{at: A, force: [0, "-50*max(0, 1 - abs(time - 0.5012)/0.004)"]}]
@@ -142,6 +156,7 @@ requirements:
   - {result: dynamics.theta_effort.peak, at_most: 10}
   - {result: dynamics.theta_effort.mean, at_most: 1e9}
 """
+    )
     time = np.linspace(0.4972, 0.5052, 400_001)
     efforts = 50 * (1 - np.abs(time - 0.5012) / 0.004) * 100 * np.cos(np.pi / 2 * time)
     gate, peak, mean = verdicts(text)
@@ -151,7 +166,9 @@ requirements:
 
 def test_a_load_of_a_velocity_bends_where_the_velocity_changes_its_sign():
     """A brake -c |v| v/|v| is largest at the crank's fastest rod; a force max(0, v - limit) acts over a few degrees."""
-    text = FOUR_BAR + """
+    text = (
+        FOUR_BAR
+        + """
 kinematics:
   outputs: [B.x]
   rates: {theta: 1 rad/s}
@@ -159,6 +176,7 @@ kinematics:
   loads: [{at: B, force: ["-max(0, B.x_velocity - 27)", 0]}]
 requirements: [{result: kinematics.theta_effort, at_most: 1e9}]
 """
+    )
     coarse, fine = (verdicts(text.replace("STEP", step))[0][1] for step in ("15", "0.05"))
     assert fine > 0
     assert coarse == pytest.approx(fine, rel=1e-12)
@@ -179,7 +197,10 @@ mechanism:
     rocker: [D, B, 30]
   drives: {{theta: {{angle: crank}}}}
   sketch: {{A: [10, 28], B: [110, 28]}}
-kinematics: {{outputs: [M, rocker.angle], rates: {{theta: 1 rad/s}}, sweep: {{theta: {{from: 0, to: 360, step: {step}}}}}}}
+kinematics:
+  outputs: [M, rocker.angle]
+  rates: {{theta: 1 rad/s}}
+  sweep: {{theta: {{from: 0, to: 360, step: {step}}}}}
 """
         )
     )
@@ -250,7 +271,8 @@ def test_a_target_by_a_table_is_compared_between_its_rows_too():
     """The table has a peak of 1 deg within rows of 15 deg; the error's largest value is at its top."""
     answer = mechdesign.kinematics(
         mechdesign.load(
-            text=FOUR_BAR.rstrip() + """
+            text=FOUR_BAR.rstrip()
+            + """
   measures: {m: 0*theta}
   targets: {m: [[0, 0], [222, 0], [222.5, 7], [223, 0], [360, 0]]}
 kinematics: {outputs: [m], sweep: {theta: {from: 0, to: 360, step: 15}}}
@@ -274,7 +296,11 @@ mechanism:
     upper_right: [B, C, 130]
   drives: {q1: {angle: left}, q2: {angle: right}}
   sketch: {A: [-120, 70], B: [120, 70], C: [0, 170]}
-kinematics: {path: {C: {line: [[0, 170], [1, 40]], points: 14}}, outputs: [C], speed: 50, loads: [{at: C, force: [3, -20]}]}
+kinematics:
+  path: {C: {line: [[0, 170], [1, 40]], points: 14}}
+  outputs: [C]
+  speed: 50
+  loads: [{at: C, force: [3, -20]}]
 """
         )
     )
@@ -309,7 +335,9 @@ mechanism:
   joints: {guide: {prismatic: [ground, slider], through: O}}
   drives: {theta: {angle: crank}}
   sketch: {A: [0, 30], B: [84, 0]}
-dynamics: {sweep: {theta: {from: 0, to: 360, step: 17}}, loads: [{at: B, force: ["10*sin(theta - 77.77)*cos(3*theta)", 0]}]}
+dynamics:
+  sweep: {theta: {from: 0, to: 360, step: 17}}
+  loads: [{at: B, force: ["10*sin(theta - 77.77)*cos(3*theta)", 0]}]
 """
         )
     )
