@@ -344,9 +344,9 @@ class Expression:
         corners: list[tuple[tuple[Step, ...], Corner]] = []
 
         def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
-            for program, *places in _corners(function, inner, self.angle_unit):
+            for program, levels, period, turning in _corners(function, inner, self.angle_unit):
                 if any(kind == "name" for kind, _ in program):
-                    corners.append((program, Corner(replace(self, program=program), *places)))
+                    corners.append((program, Corner(replace(self, program=program), levels, period, turning)))
             return _call_steps(function, inner)
 
         self._run(_constant_step, lambda name: (("name", name),), call)

@@ -447,4 +447,4 @@ class Functions(Series):
 def _rises(inwards: Floats) -> bool:
     """Whether values still rise to the first of them, as to a pole; at a corner or a jump they do not."""
     first, second, third = inwards[:3].tolist() if len(inwards) > 2 else (0.0, 0.0, 0.0)
-    return first - second > RISES * abs(first) and second - third > RISES * abs(second)
+    return bool(first - second > RISES * abs(first) and second - third > RISES * abs(second))

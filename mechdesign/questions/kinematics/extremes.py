@@ -74,9 +74,9 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         with np.errstate(invalid="ignore"):
             inner = np.array([[[-1.0]], [[1.0]]]) * (ends[:, 0, followed] - peaks.value)
             kept = inner > AT_ROW * np.abs(peaks.value) + peaks.still
-        for part, new in enumerate((peaks.value, shown)):
-            better = np.isfinite(peaks.place) & moves & ~kept
-            ends[:, part, followed] = np.where(better, new, ends[:, part, followed])
+        better = np.isfinite(peaks.place) & moves & ~kept
+        for k, new in enumerate((peaks.value, shown)):
+            ends[:, k, followed] = np.where(better, new, ends[:, k, followed])
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
