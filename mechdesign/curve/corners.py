@@ -13,10 +13,13 @@ from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
 from mechdesign.expressions import Corner
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
+from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
+# Halvings of the distance between two places, after which only rounding is left.
+BISECTIONS = 60
 # Values of variables of expressions at places of lines, by name.
 Variables = Callable[[frozenset[str], Ints, Floats], Mapping[str, ArrayLike]]
 
@@ -63,6 +66,22 @@ def divide(curve: Curve, corners: Sequence[Corner], variables: Variables) -> tup
             lines.append(line)
             places.append(place)
     return curve, np.concatenate(lines), np.concatenate(places)
+
+
+def switched(curve: Curve, label: Callable[[Ints, Floats], Ints]) -> Curve:
+    """The curve with pieces that end where a label of places changes, such as the side of a path that is nearest."""
+    table = curve.pieces.places(np.broadcast_to(chebyshev.PLACES, (len(curve.pieces.line), len(chebyshev.PLACES))))
+    line = np.broadcast_to(curve.pieces.line[:, None], table.shape)
+    labels = label(line.ravel(), table.ravel()).reshape(table.shape)
+    piece, k = np.nonzero(labels[:, 1:] != labels[:, :-1])
+    line, before, low, high = curve.pieces.line[piece], labels[piece, k], table[piece, k], table[piece, k + 1]
+    for _ in range(BISECTIONS if len(line) else 0):
+        middle = (low + high) / 2
+        same = label(line, middle) == before
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    curve, pieces = copy(curve), curve.pieces
+    curve.pieces = pieces.divided(piece, pieces.take(piece).within(high))
+    return curve
 
 
 def _argument(corner: Corner, variables: Variables, line: Ints, s: Floats) -> tuple[Floats, Floats]:

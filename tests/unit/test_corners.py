@@ -282,6 +282,21 @@ kinematics: {outputs: [m], sweep: {theta: {from: 0, to: 360, step: 15}}}
     assert extremes(answer, "m_error")[:2] == [pytest.approx(-7, rel=1e-12), pytest.approx(222.5, abs=1e-9)]
 
 
+def test_the_error_from_a_path_has_its_largest_value_where_the_nearest_side_changes():
+    """Between the sides y = 80 and y = -90 a point is farthest from both at y = -5: there it is 85 away."""
+    answer = mechdesign.kinematics(
+        mechdesign.load(
+            text=ARM.rstrip()
+            + """
+  targets: {A: [[-300, 80], [300, 80], [300, -90], [-300, -90]]}
+kinematics: {outputs: [A], sweep: {theta: {from: 0, to: 360, step: 30}}}
+"""
+        )
+    )
+    turn = math.degrees(math.asin(0.05))
+    assert extremes(answer, "A_error")[2:] == pytest.approx([85, 180 + turn], rel=1e-12)
+
+
 def test_a_path_through_a_singularity_is_told_where_the_outputs_are_the_path_itself():
     """Both motors of the five-bar lose the tip where its upper links lie in one line."""
     answer = mechdesign.kinematics(

@@ -195,15 +195,15 @@ def test_extremes_of_errors_lie_between_the_poses() -> None:
 def test_nearest_points_of_a_polyline() -> None:
     corners = np.array([0, 1, 1, 1 + 1j])  # with a corner twice
     points = np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j, np.nan])
-    assert nearest(points, corners)[:4] == pytest.approx([0.5, 0, 1 + 0.5j, 1 + 1j])
-    assert np.isnan(nearest(points, corners)[4])
-    assert nearest(points, corners[:1])[:4] == pytest.approx([0, 0, 0, 0])
+    assert nearest(points, corners)[0][:4] == pytest.approx([0.5, 0, 1 + 0.5j, 1 + 1j])
+    assert np.isnan(nearest(points, corners)[0][4])
+    assert nearest(points, corners[:1])[0][:4] == pytest.approx([0, 0, 0, 0])
     # Against every point of a fine subdivision of each piece, in more blocks than one.
     rng = np.random.default_rng(1)
     points, corners = rng.normal(size=(3000, 2)) @ [1, 1j], rng.normal(size=(400, 2)) @ [1, 1j]
     fine = (corners[:-1, None] + np.diff(corners)[:, None] * np.linspace(0, 1, 201)).ravel()
     distance = np.abs(points[:50, None] - fine).min(axis=1)
-    found = np.abs(points - nearest(points, corners))[:50]
+    found = np.abs(points - nearest(points, corners)[0])[:50]
     assert (found <= distance + 1e-12).all()
     assert found == pytest.approx(distance, abs=0.05)
 

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.curve.corners import divide
+from mechdesign.curve.corners import divide, switched
 from mechdesign.curve.motion import Curve
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.kinematics import targets as targeted
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import moving_at
-from mechdesign.questions.kinematics.targets import knots
 from mechdesign.questions.loads import coordinates_in, variable
 from mechdesign.questions.poses import SolvedPoses
 from mechdesign.study.schema.loads import VELOCITY
+from mechdesign.study.schema.targets import Target
 
 
 def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
@@ -33,7 +35,7 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
     written += [target.expression for target in targets if target.expression is not None]
     corners += [corner for expression in written for corner in expression.corners()]
-    corners += [corner for target in targets for corner in knots(study, target, question.poses)]
+    corners += [corner for target in targets for corner in targeted.knots(study, target, question.poses)]
 
     def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
         poses, configuration = curve.solve(line, s, judged=False)
@@ -48,4 +50,15 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
             for name in names
         }
 
-    return divide(curve, corners, variables)[0]
+    divided, _, _ = divide(curve, corners, variables)
+    for target in targets:
+        if targeted.path(target, question.poses):
+            divided = switched(divided, partial(_side, question, curve, target))
+    return divided
+
+
+def _side(question: MotionQuestion, curve: Curve, target: Target, line: Ints, s: Floats) -> Ints:
+    """Side or corner of the path that a point should follow that is nearest to it."""
+    configuration = curve.solve(line, s, judged=False, turning=False)[1]
+    x, y = (configuration.value(question.study.mechanism.coordinate(name)) for name in target.coordinates)
+    return targeted.owner(target, question.poses, np.asarray(x + 1j * np.asarray(y)), line)

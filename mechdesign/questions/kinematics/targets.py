@@ -71,6 +71,20 @@ def knots(study: Study, target: Target, poses: Poses) -> list[Corner]:
     return [Corner(values, tuple(np.unique(table[:, 0]).tolist()), turn) for table in _tables(target, poses)]
 
 
+def path(target: Target, poses: Poses) -> bool:
+    """Whether a target is a path without timing, a polyline."""
+    return target.table is not None and not target.timed and not _a_value_each(target, poses)
+
+
+def owner(target: Target, poses: Poses, points: Complexes, line: Ints) -> Ints:
+    """Corner or side of its path without timing that is nearest to each point, of the motion of a line."""
+    tables, owners = _tables(target, poses), np.zeros(len(points), dtype=np.intp)
+    for k, table in enumerate(tables):
+        some = np.flatnonzero((line == k) | (len(tables) == 1))
+        owners[some] = nearest(points[some], table[:, 0] + 1j * table[:, 1])[1]
+    return owners
+
+
 def _a_value_each(target: Target, poses: Poses) -> bool:
     """Whether a target has a value for each pose of a design."""
     return target.table is not None and not target.timed and len(target.table) == poses.count // poses.designs
@@ -152,7 +166,7 @@ def _by_table(
     if _a_value_each(target, poses):
         return list(table[rows % len(table)].T)
     x, y = (values[name] for name in target.coordinates)
-    foot = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
+    foot, _ = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
     return [foot.real, foot.imag]
 
 
@@ -170,22 +184,29 @@ def _interpolated(table: Floats, at: Floats, turn: float | None) -> list[Floats]
     return [np.where(outside | np.isnan(at), np.nan, np.interp(at, table[:, 0], column)) for column in table[:, 1:].T]
 
 
-def nearest(points: Complexes, corners: Complexes) -> Complexes:
-    """The nearest point of a polyline, given by its corners, to each point (x + i y); a single corner is a point."""
+def nearest(points: Complexes, corners: Complexes) -> tuple[Complexes, Ints]:
+    """The nearest point of a polyline to each point (x + i y), and which of its corners or sides it lies on.
+
+    The polyline is given by its corners, which have even numbers; its sides have odd ones. A single corner is a point.
+    """
     if len(corners) == 1:
-        return np.where(np.isnan(points), np.nan, corners[0])
+        return np.where(np.isnan(points), np.nan, corners[0]), np.zeros(len(points), dtype=np.intp)
     begins, spans = corners[:-1], np.diff(corners)
     lengths = norm2(spans)
     # A piece without length is its corner: any positive divisor gives part 0.
     lengths = np.where(lengths > 0, lengths, 1.0)
-    nearest_feet = np.empty(len(points), dtype=complex)
+    nearest_feet, owners = np.empty(len(points), dtype=complex), np.empty(len(points), dtype=np.intp)
     step = max(1, MAX_DISTANCES // len(spans))
     for first in range(0, len(points), step):
         some = points[first : first + step, None]
-        feet = begins + np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0) * spans
+        parts = np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0)
+        feet = begins + parts * spans
         best = np.argmin(norm2(some - feet), axis=1)
-        nearest_feet[first : first + step] = feet[np.arange(len(feet)), best]
-    return nearest_feet
+        lanes = np.arange(len(feet))
+        nearest_feet[first : first + step] = feet[lanes, best]
+        part = parts[lanes, best]
+        owners[first : first + step] = 2 * best + np.where(part <= 0, 0, np.where(part >= 1, 2, 1))
+    return nearest_feet, owners
 
 
 def totals(errors: Sequence[Error], designs: int, valid: Flags) -> Floats:
