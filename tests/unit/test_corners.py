@@ -213,6 +213,38 @@ kinematics:
     assert max(abs(low), abs(high)) < 1e-6
 
 
+def test_a_crossed_parallelogram_goes_smoothly_through_its_change_points():
+    """With a = A and d = D, B - A is (d - a)^2 |d| / |d - a|^2, for d - a is the axis of the kite that mirrors it."""
+    answer = mechdesign.kinematics(
+        mechdesign.load(
+            text="""
+mechanism:
+  branch: follow
+  links:
+    ground: {O: [0, 0], D: [84.519, 0]}
+    crank: [O, A, 46.2367]
+    rod: {from: A, to: B, length: 84.519, points: {M: [34.1277, -32.3175]}}
+    rocker: [D, B, 46.2367]
+  drives: [crank]
+  sketch: {A: [-27.139609160, -37.433595092], B: [40.300297601, 13.510691507]}
+kinematics:
+  outputs: [M]
+  rates: {crank: 1 rad/s}
+  sweep: {crank: {from: -180, to: 180, step: 2}}
+"""
+        )
+    )
+    turn = np.linspace(-np.pi, np.pi, 400_001)
+    a = 46.2367 * np.exp(1j * turn)
+    along = (84.519 - a) ** 2 / np.abs(84.519 - a) ** 2
+    velocity = np.gradient(a + along * (34.1277 - 32.3175j), turn, edge_order=2)
+    acceleration = np.gradient(velocity, turn, edge_order=2)
+    for name, values in (("velocity", velocity), ("acceleration", acceleration)):
+        for axis, part in (("x", values.real[3:-3]), ("y", values.imag[3:-3])):
+            low, _, high, _ = extremes(answer, f"M.{axis}_{name}")
+            assert (low, high) == pytest.approx((part.min(), part.max()), rel=1e-5)
+
+
 def test_a_slider_crank_of_equal_links_moves_as_twice_a_cosine():
     answer = mechdesign.kinematics(
         mechdesign.load(

@@ -12,6 +12,8 @@ from mechdesign.curve.ends import End, Ends
 from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
 from mechdesign.curve.parts import within
+from mechdesign.curve.series import Evaluate
+from mechdesign.curve.through import Through
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.four_bars import FourBar
@@ -117,8 +119,11 @@ class Along:
         functions |= {f"{_MEAN_OF}{name}": columns[name] for name in self._means if name in divisors}
         means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
         self._names = list(functions)
+        self._evaluate: Evaluate = self._evaluated
+        if curve.plan.change_points is not None:
+            self._evaluate = Through(curve, self._evaluated, corners.determinant(question.study, curve))
         self._follow = partial(
-            Functions, curve, self._names, self._evaluated, list(functions.values()), divisors,
+            Functions, curve, self._names, self._evaluate, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
             magnitudes=[s.name for s in question.statics if s.magnitude and s.name in columns],
             ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
@@ -300,7 +305,7 @@ class Along:
         return np.where(zero, 0.0, value), np.where(zero, first, place)
 
     def _squared(self, name: str, line: Ints, s: Floats) -> tuple[Floats, Floats]:
-        table, conditioning = self._evaluated(line, s)
+        table, conditioning = self._evaluate(line, s)
         return table[[self._names.index(name)]] ** 2, conditioning
 
     def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
@@ -322,7 +327,7 @@ class Along:
             rows = [places._names.index(name) for name, _ in part]
 
             def values(line: Ints, s: Floats) -> tuple[Floats, Floats]:
-                table, conditioning = places._evaluated(line, s)
+                table, conditioning = places._evaluate(line, s)
                 return table[rows], conditioning
 
             curve = within(places.curve, [interval for _, interval in part], values)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mechdesign.curve.corners import divide, switched
 from mechdesign.curve.motion import Curve
+from mechdesign.curve.series import Evaluate
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
@@ -19,6 +20,7 @@ from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import coordinates_in, variable
 from mechdesign.questions.poses import SolvedPoses
+from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY
 from mechdesign.study.schema.targets import Target
 
@@ -55,6 +57,17 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
         if targeted.path(target, question.poses):
             divided = switched(divided, partial(_side, question, curve, target))
     return divided
+
+
+def determinant(study: Study, curve: Curve) -> Evaluate:
+    """Determinant of the loop equations along motions, zero where the drives hold the mechanism no longer."""
+
+    def evaluate(line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        linear = study.mechanism.linearize(curve.solve(line, s, judged=False, turning=False)[1])
+        signed = np.broadcast_arrays(np.ones(len(s)), *linear.conditionings.values())
+        return np.prod(signed, axis=0)[None], np.ones(len(s))
+
+    return evaluate
 
 
 def _side(question: MotionQuestion, curve: Curve, target: Target, line: Ints, s: Floats) -> Ints:
