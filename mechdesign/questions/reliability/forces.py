@@ -24,6 +24,7 @@ from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import column_kinds
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.loads import coordinates_in
+from mechdesign.questions.reliability.corners import Bend, bends
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, pace_of
 from mechdesign.study import Study
@@ -73,6 +74,28 @@ def followed(study: Study) -> set[str]:
             if section.density is not None:
                 section.with_numbers(note)
     return {name for name in study.parameters.nominal if study.parameters.moved([name]) & names}
+
+
+def load_bends(study: Study) -> tuple[Bend, ...]:
+    """Where the loads of dynamics are not smooth in coordinates alone, parameters at their nominal values."""
+    places: dict[Bend, None] = {}
+    nominal = study.parameters.nominal
+    for load in study.dynamics.loads if study.dynamics is not None else ():
+        for expression in (part for _, part, _ in load.numbers if isinstance(part, Expression)):
+            known = set(study.mechanism.coordinates) - nominal.keys()
+            parts = tuple(study.mechanism.coordinate(name) for name in sorted(expression.names & known))
+            values: dict[str, Expression | float] = {
+                name: nominal.get(name, Expression(name, (("name", name),), expression.angle_unit))
+                for name in expression.names
+            }
+            whole = Coordinate("", "expression", "none", expression=expression.substituted(values), parts=parts)
+            for bend in bends(whole):
+                names = {
+                    name for argument in bend.arguments if argument.expression for name in argument.expression.names
+                }
+                if names <= {part.name for argument in bend.arguments for part in argument.parts}:
+                    places[bend] = None
+    return tuple(places)
 
 
 @dataclass(frozen=True, eq=False)

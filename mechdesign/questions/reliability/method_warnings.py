@@ -21,8 +21,9 @@ _NEAR = 4.75
 def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Warnings about the results of the methods."""
     return [
-        *_outside(task), *disagreements(results, task), *_unseen(results, task), *_unreached(results, task),
-        *_pointless(results, task), *_not_assembled(results, task), *_unassembled(results), *_of_cycles(results, task),
+        *_outside(task), *_cornered(task), *disagreements(results, task), *_unseen(results, task),
+        *_unreached(results, task), *_pointless(results, task), *_not_assembled(results, task), *_unassembled(results),
+        *_of_cycles(results, task),
     ]  # fmt: skip
 
 
@@ -47,6 +48,24 @@ def _outside(task: Task) -> list[Caution]:
             f"lies outside its limits, {between}{f' {unit}' if unit else ''}",
             pose=task.where(pose),
         ))  # fmt: skip
+    return cautions
+
+
+def _cornered(task: Task) -> list[Caution]:
+    """Warnings of outputs with a corner among their errors, which have no first order there."""
+    cautions = []
+    for output in dict.fromkeys(output for output, *_ in task.question.bends):
+        poses = np.flatnonzero(np.isnan(task.linear.whole.components[output]).any(axis=0) & task.assembled)
+        if len(poses):
+            where = task.where(int(poses[0]))
+            several = f" (the first of {len(poses)} poses)" if len(poses) > 1 else ""
+            cautions.append(Caution(
+                "undefined",
+                f"{task.question.channels[output].name} bends, jumps or ends within its errors at {where}{several}: "
+                "it has no derivative there by which analytic, second_order and the contributions could judge it; ask "
+                "for monte_carlo or quasi_monte_carlo",
+                pose=where,
+            ))  # fmt: skip
     return cautions
 
 
