@@ -16,6 +16,7 @@ from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
 from mechdesign.questions.reliability.allocation import allocate
+from mechdesign.questions.reliability.between import between_poses, places_between
 from mechdesign.questions.reliability.cycle import with_cycle
 from mechdesign.questions.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.questions.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
@@ -53,6 +54,9 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     section = ReliabilitySection.of(study)
     task, groups, doubts = _first_order(study, poses, sources)
     warnings += [*doubts, *ambiguous_points(study, task.question)]
+    closer = places_between(poses) if task.question.limited else None
+    if closer is not None:
+        warnings += between_poses(task, _first_order(study, closer, sources)[0])
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,

@@ -1,0 +1,67 @@
+"""What the poses of a motion miss: the worst place between them, to the first order.
+
+All methods judge the poses alone, and a cycle is one made mechanism at all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.methods.auto import FACTOR
+from mechdesign.questions.reliability.task import Task
+from mechdesign.study.poses import Poses
+
+# Parts of each step, and the most places at which a motion is judged.
+_PARTS = 16
+_MOST_PLACES = 2048
+# Probability of failure between the poses that is worth no warning.
+_SMALL = 1e-9
+
+
+def places_between(poses: Poses) -> Poses | None:
+    """Places of one motion between its poses; None where none is followed, or it has too many poses."""
+    parts = min(_PARTS, _MOST_PLACES // max(poses.count, 1))
+    if not poses.followed or poses.designs > 1 or parts < 2:
+        return None
+    s = np.arange(0.0, poses.end + 0.5 / parts, 1.0 / parts)
+    s = s[np.round(s) != s]
+    # Of a single design, which is the study's own.
+    return replace(poses.along(np.zeros(len(s), dtype=np.intp), s), motion=True)
+
+
+def between_poses(task: Task, places: Task) -> list[Caution]:
+    """A warning where a limit fails more often between the poses of `task` than at the worst of them."""
+    here, there = _worst(task), _worst(places)
+    if not len(there) or not len(here) or not np.isfinite(here).any():
+        return []
+    row, place = int(np.nanargmax(here)), int(np.nanargmax(there))
+    if not there[place] > max(FACTOR * here[row], _SMALL):
+        return []
+    why = f"{there[place]:.3g} to the first order" if places.assembled[place] else "1, as it cannot be assembled there"
+    return [Caution(
+        "unconverged",
+        f"between the poses, at {places.where(place)}, the probability of failure is {why}, and at the worst pose, "
+        f"{task.where(row)}, {here[row]:.3g}: pose and cycle are judged at the poses alone, so take a finer step",
+        "reliability", pose=places.where(place),
+    )]  # fmt: skip
+
+
+def _worst(task: Task) -> Floats:
+    """Probability of failure by the limit, or the margin of assembly, that is broken most often, shape (poses,)."""
+    from scipy.special import ndtr
+
+    from mechdesign.questions.reliability.probability import failure_probability
+
+    question, linear = task.question.at(task.nominal), task.linear
+    mean, covariance = linear.whole.shift().T, linear.whole.covariance()
+    failure = ndtr(-task.closing.distance()).max(axis=0, initial=0.0)
+    for rows in linear.alike():
+        for limit in question.single:
+            bands, discs = linear.limits(limit.bands, limit.discs, rows)
+            own = failure_probability(covariance[rows], bands, discs, mean[rows])
+            failure[rows] = np.fmax(failure[rows], own)
+    return np.where(task.assembled, failure, 1.0)
