@@ -258,8 +258,8 @@ def test_poses_between_which_a_motion_cannot_be_assembled_are_told() -> None:
     # At 180 deg the rocker's pin is 260.5 from the crank's, and rocker and rod reach 260.4.
     result = ask(
         SWEPT, "mechanism.links.rod=[A, B, 130.4]", "mechanism.links.crank=[O, A, 60.5]",
-        "mechanism.sketch.A=[60.5, 0]", "mechanism.sketch.B=[150, 120]", "reliability.sweep.theta={from: 150, to: 210, step: 60}",
-        "reliability.limits={rocker.angle: 3}",
+        "mechanism.sketch.A=[60.5, 0]", "mechanism.sketch.B=[150, 120]",
+        "reliability.sweep.theta={from: 150, to: 210, step: 60}", "reliability.limits={rocker.angle: 3}",
     )  # fmt: skip
     (warning,) = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
     assert "1, as it cannot be assembled there" in warning
