@@ -206,24 +206,37 @@ def test_a_corner_beyond_the_errors_changes_nothing():
 LOADED = """
 units: {length: m}
 mechanism:
+  parameters: {lift: 3}
   links: {ground: {O: [0, 0]}, arm: {from: O, to: A, length: 0.1}}
   drives: [arm]
-dynamics: {loads: [{at: A, force: [0, "-100*max(0, arm - 40)"]}]}
+  measures: {high: "max(A.y, 0.06)"}
+dynamics: {loads: [{at: A, force: [0, "LOAD"]}], rates: {arm: 2 rad/s}, poses: [{arm: 0}]}
 reliability:
   poses: [{arm: 39.9}, {arm: 41}]
-  dimensions: {arm: {sigma: 0.05}}
+  dimensions: {arm: {sigma: 0.05}, arm.length: {sigma: 1e-4}, lift: {sigma: 0.02}}
   outputs: [arm_effort, O_force]
-  methods: [analytic]
+  methods: [analytic, second_order]
 """
 
 
-def test_a_load_that_begins_within_the_errors_leaves_efforts_and_forces_without_a_first_order():
-    result = mechdesign.reliability(mechdesign.load(text=LOADED))
+@pytest.mark.parametrize(
+    ("load", "smooth"),
+    [
+        ("-100*max(0, arm - 40)", [False, True]),
+        ("-100*max(0, arm - 38 - lift)", [True, False]),
+        ("-100*max(0, A.y_velocity - 0.1536)", [False, True]),
+        ("-high*hypot(lift - 3, 4)", [True, True]),
+        ("-1/(lift - 2.95)", [False, False]),
+        ("-100*max(0, arm - 20 - lift)", [True, True]),
+    ],
+)
+def test_a_load_with_a_corner_within_the_errors_leaves_efforts_and_forces_without_a_first_order(load, smooth):
+    result = mechdesign.reliability(mechdesign.load(text=LOADED.replace("LOAD", load)))
     table = result.tables["moments"]
     for name in ("arm_effort", "O_force"):
-        assert np.isfinite(rows(table, output=name)["sigma"]).tolist() == [False, True]
-        assert any(w.kind == "undefined" and str(w).startswith(name) for w in result.warnings)
-    assert rows(table, output="O_force")["sigma"][1] == pytest.approx(100 * 0.05, rel=1e-6)
+        for method in ("analytic", "second_order"):
+            assert np.isfinite(rows(table, output=name, method=method)["sigma"]).tolist() == smooth
+        assert any(w.kind == "undefined" and str(w).startswith(name) for w in result.warnings) == (False in smooth)
 
 
 @pytest.mark.slow

@@ -15,9 +15,9 @@ from mechdesign.mechanism.coordinates import Coordinate
 
 @dataclass(frozen=True)
 class Bend:
-    """A coordinate is not smooth where all `arguments` have one of the levels at once; with a period (0: none)."""
+    """What is not smooth where all `arguments` have one of the levels at once; with a period (0: none)."""
 
-    arguments: tuple[Coordinate, ...]
+    arguments: tuple[Coordinate | Expression, ...]
     levels: tuple[float, ...] = (0.0,)
     period: float = 0.0
 
@@ -41,22 +41,25 @@ def bends(coordinate: Coordinate) -> Iterator[Bend]:
     if coordinate.kind == "distance":
         yield Bend(_span(coordinate))
     if coordinate.expression is not None:
-        yield from _bends(coordinate, coordinate.expression)
+        for bend in bends_of(coordinate.expression):
+            arguments = (_inner(coordinate, part) for part in bend.arguments if isinstance(part, Expression))
+            yield replace(bend, arguments=tuple(arguments))
     for part in coordinate.parts:
         yield from bends(part)
 
 
-def _bends(coordinate: Coordinate, expression: Expression) -> Iterator[Bend]:
+def bends_of(expression: Expression) -> Iterator[Bend]:
+    """Where an expression is not smooth in its variables, its arguments as expressions."""
     function, arguments = expression.outermost()
     if function in ("hypot", "atan2"):
-        yield Bend(tuple(_inner(coordinate, argument) for argument in arguments))
+        yield Bend(tuple(arguments))
     elif not isinstance(function, Tabulated):
         inner = {corner for argument in arguments for corner in argument.corners()}
         for corner in expression.corners() if function else ():
             if corner not in inner:
-                yield Bend((_inner(coordinate, corner.argument),), corner.levels, corner.period)
+                yield Bend((corner.argument,), corner.levels, corner.period)
     for argument in arguments:
-        yield from _bends(coordinate, argument)
+        yield from bends_of(argument)
 
 
 def _squared(sum_of: Expression) -> list[Expression]:

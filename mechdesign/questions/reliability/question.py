@@ -17,7 +17,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.reliability.corners import Bend, bends, vector_of
-from mechdesign.questions.reliability.forces import kinds_of_forces, load_bends
+from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
@@ -163,8 +163,11 @@ class ReliabilityQuestion:
     def whole(self) -> tuple[Channel, ...]:
         """The channels, the components of lengths, and the arguments by which corners are judged."""
         parts = [part for _, vector in self._vectors for part in vector]
-        arguments = [CoordinateChannel(argument, 0) for _, bend in self._bends for argument in bend.arguments]
-        return (*self.channels, *parts, *arguments)
+        arguments = (argument for _, bend in self._bends for argument in bend.arguments)
+        return (*self.channels, *parts, *(
+            CoordinateChannel(argument, 0) if isinstance(argument, Coordinate)
+            else ForceChannel(argument_name(argument), "none") for argument in arguments
+        ))  # fmt: skip
 
     @cached_property
     def lengths(self) -> list[tuple[int, tuple[int, int]]]:
@@ -305,7 +308,7 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
     joints = study.dynamics.joints(mechanism).names if forces and study.dynamics is not None else ()
     axes = {"shaking": ("shaking.x", "shaking.y")} | {name: (f"{name}.fx", f"{name}.fy") for name in joints}
-    bent = load_bends(study) if forces else ()
+    bent = tuple(load_bends(study)) if forces else ()
     channels += [
         ForceChannel(name, kinds[name], axes.get(name, ()), () if name.endswith("_energy") else bent) for name in forces
     ]
