@@ -263,3 +263,17 @@ def test_poses_between_which_a_motion_cannot_be_assembled_are_told() -> None:
     )  # fmt: skip
     (warning,) = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
     assert "1, as it cannot be assembled there" in warning
+
+
+@pytest.mark.parametrize("limit", ["{pulse: {usl: 0.5}}", "{theta_effort: {lsl: -100, usl: 100}}"])
+def test_what_is_narrow_between_the_poses_is_told(limit: str) -> None:
+    """A measure and a load that act over a tenth of a degree, between poses of 5 deg."""
+    pulse = "max(0, 1 - abs(theta - 123.4)/0.05)"
+    text = SWEPT.replace("reliability:", f"""
+  measures: {{pulse: "{pulse} + A.x/1000"}}
+dynamics: {{loads: [{{at: B, force: [0, "-100*{pulse}"]}}]}}
+reliability:""").replace("{usl: 150}", "{usl: 1000}")  # fmt: skip
+    result = ask(text, "reliability.dimensions.theta={sigma: 0.001}", f"reliability.limits={limit}")
+    (warning,) = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
+    assert float(warning.partition("theta = ")[2].split()[0]) == pytest.approx(123.4, abs=0.05)
+    assert "failure is 1 to the first order" in warning

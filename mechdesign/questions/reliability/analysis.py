@@ -54,7 +54,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     section = ReliabilitySection.of(study)
     task, groups, doubts = _first_order(study, poses, sources)
     warnings += [*doubts, *ambiguous_points(study, task.question)]
-    closer = places_between(poses) if task.question.limited else None
+    closer = places_between(study, task.question, poses) if task.question.limited else None
     if closer is not None:
         warnings += between_poses(task, _first_order(study, closer, sources)[0])
     failures, failed = judge_failures(study, poses, task.reason)

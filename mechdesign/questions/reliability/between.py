@@ -5,32 +5,78 @@ All methods judge the poses alone, and a cycle is one made mechanism at all of t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechdesign.cautions import Caution
-from mechdesign.numerics.arrays import Floats
+from mechdesign.curve.corners import curve_of, divide
+from mechdesign.curve.motion import Curve
+from mechdesign.expressions import Expression
+from mechdesign.mechanism.coordinates import corners_of, expressions_of
+from mechdesign.mechanism.forces import Moving
+from mechdesign.numerics.arrays import Floats, Ints, evenly
+from mechdesign.questions.kinematics.rates import moving_at
+from mechdesign.questions.loads import coordinates_in, variable
+from mechdesign.questions.poses import SolvedPoses, followed_angles
+from mechdesign.questions.reliability.forces import pace
 from mechdesign.questions.reliability.methods.auto import FACTOR
+from mechdesign.questions.reliability.question import CoordinateChannel, ForceChannel, ReliabilityQuestion
 from mechdesign.questions.reliability.task import Task
+from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.loads import VELOCITY
 
-# Parts of each step, and the most places at which a motion is judged.
+# Parts of each step, and about half the most places at which a motion is judged.
 _PARTS = 16
 _MOST_PLACES = 2048
 # Probability of failure between the poses that is worth no warning.
 _SMALL = 1e-9
 
 
-def places_between(poses: Poses) -> Poses | None:
-    """Places of one motion between its poses; None where none is followed, or it has too many poses."""
+def places_between(study: Study, question: ReliabilityQuestion, poses: Poses) -> Poses | None:
+    """Places of one motion between its poses; None where none is followed, or it has too many poses.
+
+    They divide each step evenly, and each piece of the motion on which outputs and loads are smooth, so that what is
+    narrow is seen between its corners.
+    """
     parts = min(_PARTS, _MOST_PLACES // max(poses.count, 1))
     if not poses.followed or poses.designs > 1 or parts < 2:
         return None
+    nodes = _smooth(study, question, poses).pieces.nodes.ravel()
     s = np.arange(0.0, poses.end + 0.5 / parts, 1.0 / parts)
-    s = s[np.round(s) != s]
-    # Of a single design, which is the study's own.
+    s = np.unique(np.concatenate([s[np.round(s) != s], nodes[evenly(len(nodes), _MOST_PLACES)]]))
     return replace(poses.along(np.zeros(len(s), dtype=np.intp), s), motion=True)
+
+
+def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
+    """The motion with pieces that end at the corners of the limited outputs and of loads."""
+    channels = [question.channels[k] for k in question.limited_channels]
+    forced = any(isinstance(channel, ForceChannel) for channel in channels)
+    loads = study.dynamics.loads if forced and study.dynamics is not None else ()
+    coordinates = [channel.coordinate for channel in channels if isinstance(channel, CoordinateChannel)]
+    coordinates += coordinates_in(study, loads)
+    plan = study.mechanism.plan(poses.groups[0].names)
+    curve = curve_of(study, poses, followed_angles(study.mechanism, plan, coordinates))
+    expressions = expressions_of(coordinates)
+    written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
+    corners = [*corners_of(coordinates), *(corner for expression in written for corner in expression.corners())]
+
+    def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
+        places, configuration = curve.solve(line, s, judged=False)
+        moving = Moving()
+        if any(name.endswith(VELOCITY) for name in names):
+            solved = SolvedPoses(np.arange(len(s)), poses.groups[0].names, configuration)
+            moving = moving_at(study, pace(study), places, solved, study.mechanism.linearize(configuration))
+        parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
+        return {
+            name: parts[name] if name in parts else variable(study, name, places, slice(None), configuration, moving)
+            for name in names
+        }
+
+    return divide(curve, corners, variables)[0]
 
 
 def between_poses(task: Task, places: Task) -> list[Caution]:
