@@ -5,15 +5,25 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.numerics.arrays import evenly
+from mechdesign.progress import NULL
+from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, reached
 from mechdesign.questions.reliability.methods.auto import FACTOR, disagree
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.task import MethodResult, Task
 
+# Poses at which the first order alone is compared with the second, and mechanisms that are solved for it; least
+# probability that is compared, and the ratio from which on a warning says so.
+_CURVED_POSES = 100
+_CURVED_WORK = 100_000
+_CURVED_LEAST = 1e-5
+_CURVED_FACTOR = 2.0
 # Distance of a dead centre, in standard deviations of its margin, up to which there is a warning (1 in a million).
 _NEAR = 4.75
 
@@ -21,9 +31,9 @@ _NEAR = 4.75
 def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Warnings about the results of the methods."""
     return [
-        *_outside(task), *_cornered(task), *disagreements(results, task), *_unseen(results, task),
-        *_unreached(results, task), *_pointless(results, task), *_not_assembled(results, task), *_unassembled(results),
-        *_of_cycles(results, task),
+        *_outside(task), *_cornered(task), *_curved(results, task), *disagreements(results, task),
+        *_unseen(results, task), *_unreached(results, task), *_pointless(results, task), *_not_assembled(results, task),
+        *_unassembled(results), *_of_cycles(results, task),
     ]  # fmt: skip
 
 
@@ -67,6 +77,34 @@ def _cornered(task: Task) -> list[Caution]:
                 pose=where,
             ))  # fmt: skip
     return cautions
+
+
+def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `analytic` alone is asked and its errors curve over the tolerances, by their second order.
+
+    Beside another method `disagreements` tells.
+    """
+    if not task.question.limited or [result.method for result in results] != ["analytic"]:
+        return []
+    components = task.linear.components.shape[1]
+    some = evenly(len(task.settings), max(1, min(_CURVED_POSES, _CURVED_WORK // (components * components + 1))))
+    settings = [task.settings[k] for k in some.tolist()]
+    second = methods.run("second_order", replace(task, settings=settings, progress=NULL)).estimates
+    first = results[0].estimates
+    apart = {
+        setting.pose: disagree(first[setting.pose], second[setting.pose]) for setting in settings
+        if max(first[setting.pose].failure, second[setting.pose].failure) > _CURVED_LEAST
+    }  # fmt: skip
+    pose = max(apart, key=apart.__getitem__, default=-1)
+    if pose < 0 or not apart[pose] > _CURVED_FACTOR:
+        return []
+    return [Caution(
+        "disagree",
+        f"analytic: errors curve over the tolerances at {task.where(pose)}: the probability of failure is "
+        f"{first[pose].failure:.3g} to the first order and {second[pose].failure:.3g} to the second; ask for "
+        "second_order or monte_carlo",
+        "reliability", pose=task.where(pose),
+    )]  # fmt: skip
 
 
 def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
