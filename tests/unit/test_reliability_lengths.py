@@ -85,7 +85,7 @@ def test_unequal_deviations_give_the_law_of_hoyt_down_to_an_absolute_value(sy):
 
 
 def test_a_long_force_has_the_first_order_of_its_length():
-    # Twenty deviations and more: the length follows the component along it.
+    # A hundred deviations: the length follows the component along it.
     result = rotor("{shaking: {usl: 40.9}}", off=2.0)
     moments = rows(result.tables["moments"], method="analytic", output="shaking")
     assert moments["mean"][0] == pytest.approx(40.0, rel=1e-12)
@@ -239,6 +239,28 @@ def test_a_load_with_a_corner_within_the_errors_leaves_efforts_and_forces_withou
         assert any(w.kind == "undefined" and str(w).startswith(name) for w in result.warnings) == (False in smooth)
 
 
+def test_a_length_has_its_law_beside_poses_that_cannot_be_assembled():
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0], Q: [0, 40]}, crank: [O, A, 40], rod: [A, B, 72], rocker: [D, B, 66]}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [60, 55]}
+  measures: {gap: {distance: [A, Q]}}
+reliability:
+  sweep: {theta: {from: 0, to: 360, step: 90}}
+  dimensions: {crank.length: {sigma: 0.01}, ground.Q.x: {sigma: 0.01}}
+  limits: {gap: {usl: 90}}
+  methods: [analytic, second_order]
+"""
+    result = mechdesign.reliability(mechdesign.load(text=text))
+    for method in ("analytic", "second_order"):
+        moments = rows(result.tables["moments"], method=method)
+        assert moments["sigma"][1] == pytest.approx(0.01 * np.sqrt(2 - np.pi / 2), rel=1e-6)
+        assert np.isnan(moments["sigma"]).tolist() == [False, False, True, False, False]
+    shares = rows(result.tables["contributions"], output="gap", theta=90.0)
+    assert shares["share"] == pytest.approx(0.5, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_designs_and_allocation_judge_a_length_by_its_own_law():
     text = ROTOR.replace("center: [OFF, 0]", "center: [e, 0]").replace("  links:", "  parameters: {e: 0}\n  links:", 1)
@@ -256,3 +278,54 @@ def test_designs_and_allocation_judge_a_length_by_its_own_law():
     # Equal costs: equal deviations s with exp(-(limit / s)^2 / 2) of 5 %.
     sigma = 0.8 / PULL / np.sqrt(-2 * np.log(0.05))
     assert confirmed["allocation"]["allocated"] == pytest.approx(3 * sigma, rel=0.03)
+
+
+FOUR_BAR = """
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{O: [0, 0], D: [{d}, 5], Q: [{q[0]}, {q[1]}]}}
+    crank: [O, A, {a}]
+    rod: {{from: A, to: B, length: {b}, points: {{P: [45, {p}]}}}}
+    rocker: [D, B, {c}]
+  drives: {{theta: {{angle: crank}}}}
+  sketch: {{A: [0, {a}], B: [{d}, {c}]}}
+  measures:
+    gap: {{distance: [P, Q]}}
+    side: "abs({n[0]}*(P.x - Q.x) + {n[1]}*(P.y - Q.y))"
+reliability:
+  poses: [{{theta: {theta}}}]
+  dimensions: {{"*.length": {t[0]}, rod.P.x: {t[1]}, theta: {t[2]}, ground.Q.y: {t[3]}}}
+  outputs: [gap, side, P.x, P.y]
+  limits: {limits}
+  methods: [analytic, second_order, quasi_monte_carlo]
+  samples: 30000
+  sobol: 0
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_lengths_of_random_four_bars_fail_and_spread_as_made_mechanisms_do(seed):
+    rng = np.random.default_rng(seed)
+    numbers = {"a": 20, "b": rng.uniform(80, 130), "c": rng.uniform(65, 95), "d": rng.uniform(80, 115),
+               "p": rng.uniform(-40, 40), "theta": rng.uniform(0, 360), "n": rng.normal(size=2),
+               "t": rng.uniform(0.005, 0.06, 4), "q": (0.0, 0.0), "limits": "{}"}  # fmt: skip
+    first = mechdesign.reliability(mechdesign.load(text=FOUR_BAR.format(**numbers).replace("[analytic, second_order, "
+                                   "quasi_monte_carlo]", "analytic"))).tables["moments"]  # fmt: skip
+    x, y = (rows(first, output=name) for name in ("P.x", "P.y"))
+    sigma = np.hypot(x["sigma"][0], y["sigma"][0])
+    # From on the target to as far from it as is long.
+    away = rng.choice([0.0, 0.3, 1.0, 4.0, 15.0, 25.0]) * sigma * np.exp(1j * rng.uniform(0, 2 * np.pi))
+    numbers["q"] = x["nominal"][0] + away.real, y["nominal"][0] + away.imag
+    low, high = max(abs(away) - rng.uniform(0.5, 2) * sigma, 0.0), abs(away) + rng.uniform(0.5, 2) * sigma
+    limits = [f"gap: {{lsl: {low}, usl: {high}}}", f"side: {{usl: {abs(away) + sigma}}}", f"P.x: {2 * sigma}"]
+    numbers["limits"] = f"{{{', '.join(limits[: rng.integers(1, 4)])}}}"
+    tables = mechdesign.reliability(mechdesign.load(text=FOUR_BAR.format(**numbers))).tables
+    made = rows(tables["reliability"], method="quasi_monte_carlo")["failure"][0]
+    for method in ("analytic", "second_order"):
+        assert rows(tables["reliability"], method=method)["failure"][0] == pytest.approx(made, abs=0.012)
+        for name in ("gap", "side"):
+            own, drawn = (rows(tables["moments"], output=name, method=m) for m in (method, "quasi_monte_carlo"))
+            assert own["mean"][0] == pytest.approx(drawn["mean"][0], abs=0.04 * drawn["sigma"][0])
+            assert own["sigma"][0] == pytest.approx(drawn["sigma"][0], rel=0.03)

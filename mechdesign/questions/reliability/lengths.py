@@ -19,8 +19,8 @@ from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.question import Band, Disc, ReliabilityQuestion, limits_at
 
 # Length of a mean vector, in deviations of its components, up to which its length has a law of its own. Beyond it the
-# vector turns by less than 3 degrees, and its length is linear to 1/40 of a deviation.
-_LONG = 20.0
+# vector turns by less than 2 degrees, and its length is linear to 1/60 of a deviation.
+_LONG = 30.0
 # Deviations within which a corner of an expression leaves no first order: 0.3 % of made mechanisms lie beyond.
 _NEAR = 3.0
 # Directions of the integral over a turn, and of the search for the longest vector.
@@ -117,41 +117,56 @@ class WithLengths(FirstOrder):
         return self._own[0]
 
     @cached_property
+    def _means(self) -> Floats:
+        """Derivatives of the mean lengths by the vectors, shape (lengths, 2, poses); zero where they are long."""
+        mean, covariance = self._vectors.shift(), self._vectors.covariance()
+        slopes = np.zeros((len(self.outputs), 2, mean.shape[1]))
+        for k, short in enumerate(self.short):
+            rows, pair = np.flatnonzero(short), slice(2 * k, 2 * k + 2)
+            slopes[k][:, rows] = length_moments(mean[pair, rows].T, covariance[rows, pair, pair])[1].T
+        return slopes
+
+    def _along(self, way: Floats) -> FirstOrder:
+        """The parts of the vectors along a way, of shape (lengths, 2, poses) or (2, 1)."""
+        x, y = way[..., 0, :], way[..., 1, :]
+        components, offset = self._vectors.components, self._vectors.offset
+        along = x[..., None, :] * components[0::2] + y[..., None, :] * components[1::2]
+        return FirstOrder(self.sources, along, x * offset[0::2] + y * offset[1::2])
+
+    @cached_property
     def parts(self) -> Floats:
-        """As of the linear model; of a length about zero what each source adds to its mean square."""
-        return self._replaced(
-            super().parts, self._vectors.parts.reshape(len(self.outputs), 2, -1, self.short.shape[1]).sum(axis=1)
-        )
+        """As of the linear model; what the mean length does not say of a short one is shared as its mean square is."""
+        along, square = self._along(self._means).parts, self._vectors.parts[0::2] + self._vectors.parts[1::2]
+        rest = self.deviation()[list(self.outputs)] ** 2 - along.sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            own = along + square * (np.maximum(rest, 0.0) / square.sum(axis=1))[:, None]
+        return self._replaced(super().parts, np.nan_to_num(own))
 
     @cached_property
     def sensitivity(self) -> Floats:
         """As of the linear model; of a length about zero the size of the vector's derivative."""
-        vectors = self._vectors.sensitivity
-        return self._replaced(super().sensitivity, np.linalg.norm(vectors.reshape(-1, 2, *vectors.shape[1:]), axis=1))
+        way, along = self._means, self._along(self._means).sensitivity
+        size = np.hypot(self._vectors.sensitivity[0::2], self._vectors.sensitivity[1::2])
+        turned = np.maximum(1.0 - (way**2).sum(axis=1), 0.0)[:, None] * size**2
+        own = np.where(along < 0, -1.0, 1.0) * np.sqrt(along**2 + turned)
+        return self._replaced(super().sensitivity, own)
 
     def worst_case(self) -> Floats:
-        return self._replaced(super().worst_case(), self._farthest[2])
+        low, high = self._farthest
+        return self._replaced(super().worst_case(), np.maximum(-low, high))
 
     def worst_ends(self) -> tuple[Floats, Floats]:
         low, high = super().worst_ends()
-        least, most, _ = self._farthest
-        return self._replaced(low, least - self.sizes), self._replaced(high, most - self.sizes)
+        return self._replaced(low, self._farthest[0]), self._replaced(high, self._farthest[1])
 
     @cached_property
-    def _farthest(self) -> tuple[Floats, Floats, Floats]:
-        """Least and largest length, and largest change of the vector, by all ends of tolerances, (lengths, poses)."""
-        least, most, change = np.zeros((3, *self.sizes.shape))
+    def _farthest(self) -> tuple[Floats, Floats]:
+        """Lowest and highest error of lengths by all ends of tolerances, shape (lengths, poses)."""
+        least, most = np.zeros((2, *self.sizes.shape))
         for angle in 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if self.short.any() else ():
-            components, offset = (
-                np.cos(angle) * part[0::2] + np.sin(angle) * part[1::2]
-                for part in (self._vectors.components, self._vectors.offset)
-            )
-            along = FirstOrder(self.sources, components, offset)
-            low, high = along.worst_ends()
-            least, most, change = (
-                np.maximum(least, low), np.maximum(most, high), np.maximum(change, along.worst_case())
-            )  # fmt: skip
-        return least, most, change
+            low, high = self._along(np.array([[np.cos(angle)], [np.sin(angle)]])).worst_ends()
+            least, most = np.maximum(least, low), np.maximum(most, high)
+        return least - self.sizes, most - self.sizes
 
     def _replaced(self, linear: Floats, own: Floats) -> Floats:
         """Values of the linear model, those of lengths about zero by their own, along the axes channels ... poses."""
