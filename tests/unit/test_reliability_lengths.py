@@ -107,13 +107,15 @@ mechanism:
     oval: "hypot(A.x - 60, 2*(A.y - 80))"
     root: "sqrt((A.x - 60)**2 + (A.y - 80)*(A.y - 80))"
     turned: "abs(arm.angle - 53.12)"
+    smooth: "exp((A.x - 60)/100) + (A.y - 80)**9 + atan2(A.y, A.x)"
     most: "max(A.x - 60, A.y - 80)"
     twice: "1 + 2*abs(A.x - 60)"
+    way: "atan2(A.y - 80, A.x - 60)"
 reliability:
   poses: [{arm: 53.13010235415598, tip: 20}]
   dimensions: {arm.length: {sigma: 0.03}, arm: {sigma: 0.02}, ground.Q.x: 0.03, tip.length: 0.05}
   clearances: {O: {radial: 0.02, pin: normal_in_disc}}
-  outputs: [gap, beside, off, oval, root, turned]
+  outputs: [gap, beside, off, oval, root, turned, smooth]
   LIMITS
   methods: [analytic, second_order, quasi_monte_carlo]
   samples: 60000
@@ -132,7 +134,7 @@ def arm(limits="", **changes):
 @pytest.mark.slow
 def test_moments_of_distances_and_absolute_values_about_zero_are_those_of_made_mechanisms():
     table = arm().tables["moments"]
-    for name in ("gap", "beside", "off", "oval", "root", "turned"):
+    for name in ("gap", "beside", "off", "oval", "root", "turned", "smooth"):
         made = rows(table, output=name, method="quasi_monte_carlo")
         for method in ("analytic", "second_order"):
             own = rows(table, output=name, method=method)
@@ -178,7 +180,7 @@ def test_contributions_and_worst_cases_of_a_distance_about_zero_are_those_of_its
     assert moments["worst_low"][0] == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("measure", ["most", "twice", "gap_velocity"])
+@pytest.mark.parametrize("measure", ["most", "twice", "way", "gap_velocity"])
 def test_what_has_a_corner_within_its_errors_has_no_first_order_and_the_message_names_the_method_to_use(measure):
     # The distance of a point that passes Q turns from falling to rising there.
     result = arm(
@@ -197,7 +199,7 @@ def test_what_has_a_corner_within_its_errors_has_no_first_order_and_the_message_
 
 
 def test_a_corner_beyond_the_errors_changes_nothing():
-    result = arm(**{"A.x - 60, A.y - 80": "A.x - 60.3, A.y - 80", "turned]": "most]"})
+    result = arm(**{"A.x - 60, A.y - 80": "A.x - 60.3, A.y - 80", "turned,": "most,"})
     moments = rows(result.tables["moments"], output="most")
     assert moments["sigma"] == pytest.approx(moments["sigma"][2], rel=0.01)
     assert not [w for w in result.warnings if w.kind == "undefined"]

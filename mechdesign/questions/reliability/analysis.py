@@ -207,6 +207,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
     followed, forces = _followed(task), force_model(task.study, task.poses)
+    whole = task.question.whole
     settings = []
     for solved, rates in groups:
         by_drives = set(solved.names) == set(mechanism.drives)
@@ -223,7 +224,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]).only(range(len(task.nominal))),
+                    None if task.elastic is None else task.elastic.take([row]).of(whole, task.question.vectors),
                     None if forces is None else forces.take([row]), scale, row == followed,
                 )
             )  # fmt: skip

@@ -56,7 +56,7 @@ def bends_of(expression: Expression) -> Iterator[Bend]:
     elif not isinstance(function, Tabulated):
         inner = {corner for argument in arguments for corner in argument.corners()}
         for corner in expression.corners() if function else ():
-            if corner not in inner:
+            if corner.levels and corner not in inner:
                 yield Bend((corner.argument,), corner.levels, corner.period)
     for argument in arguments:
         yield from bends_of(argument)

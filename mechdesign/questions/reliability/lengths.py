@@ -57,11 +57,11 @@ class WithLengths(FirstOrder):
 
     @cached_property
     def short(self) -> Flags:
-        """Where a length has a law of its own, shape (lengths, poses)."""
-        mean, deviation = (
-            part.reshape(-1, 2, part.shape[-1]) for part in (self._vectors.shift(), self._vectors.deviation())
-        )
-        return np.asarray(np.linalg.norm(mean, axis=1) <= _LONG * np.linalg.norm(deviation, axis=1))
+        """Where a length has a law of its own, shape (lengths, poses): short beside its deviation or its mean error."""
+        mean, deviation = self._vectors.shift(), self._vectors.deviation()
+        length, spread = (np.hypot(part[0::2], part[1::2]) for part in (mean, deviation))
+        least = np.minimum(length, self.sizes)
+        return np.asarray((least <= _LONG * spread) | (self.sizes < _LONG * np.abs(length - self.sizes)))
 
     @cached_property
     def whole(self) -> FirstOrder:

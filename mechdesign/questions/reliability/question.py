@@ -160,11 +160,15 @@ class ReliabilityQuestion:
         return places
 
     @cached_property
+    def vectors(self) -> tuple[Channel, ...]:
+        """The channels, and the components of those that are lengths."""
+        return (*self.channels, *(part for _, vector in self._vectors for part in vector))
+
+    @cached_property
     def whole(self) -> tuple[Channel, ...]:
         """The channels, the components of lengths, and the arguments by which corners are judged."""
-        parts = [part for _, vector in self._vectors for part in vector]
         arguments = (argument for _, bend in self._bends for argument in bend.arguments)
-        return (*self.channels, *parts, *(
+        return (*self.vectors, *(
             CoordinateChannel(argument, 0) if isinstance(argument, Coordinate)
             else ForceChannel(argument_name(argument), "none") for argument in arguments
         ))  # fmt: skip

@@ -76,11 +76,10 @@ def run(task: Task) -> MethodResult:
 def _at_pose(steps: Floats, law: Cumulants, task: Task, setting: Setting) -> tuple[Floats, Floats]:
     question, count = task.question, len(task.question.channels)
     # Components of lengths are smooth; their moments are of values, not of errors.
-    whole = replace(
-        setting, question=replace(question, channels=question.whole),
-        centres=[*setting.centres, *[0.0] * (len(question.whole) - count)],
-        elastic=None if task.elastic is None else task.elastic.take([setting.pose]),
-    )  # fmt: skip
+    smooth = replace(question, channels=question.whole)
+    elastic = None if task.elastic is None else task.elastic.take([setting.pose]).of(question.whole, smooth.vectors)
+    centres = [*setting.centres, *[0.0] * (len(question.whole) - count)]
+    whole = replace(setting, question=smooth, centres=centres, elastic=elastic)
     mean, covariance = quadratic(whole, task.sources, steps).moments(law)
     rows = np.array(question.rows)
     mean, covariance = mean[rows], covariance[np.ix_(rows, rows)]
