@@ -5,29 +5,25 @@ All methods judge the poses alone, and a cycle is one made mechanism at all of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mechdesign.cautions import Caution
 from mechdesign.curve.corners import curve_of, divide
 from mechdesign.curve.motion import Curve
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
-from mechdesign.mechanism.forces import Moving
-from mechdesign.numerics.arrays import Floats, Ints, evenly
-from mechdesign.questions.kinematics.rates import moving_at
-from mechdesign.questions.loads import coordinates_in, variable
-from mechdesign.questions.poses import SolvedPoses, followed_angles
+from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.questions.kinematics.corners import variables_of
+from mechdesign.questions.loads import coordinates_in
+from mechdesign.questions.poses import followed_angles
 from mechdesign.questions.reliability.forces import pace
 from mechdesign.questions.reliability.methods.auto import FACTOR
 from mechdesign.questions.reliability.question import CoordinateChannel, ForceChannel, ReliabilityQuestion
 from mechdesign.questions.reliability.task import Task
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.loads import VELOCITY
 
 # Parts of each step, and about half the most places at which a motion is judged.
 _PARTS = 16
@@ -64,19 +60,7 @@ def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
     written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
     corners = [*corners_of(coordinates), *(corner for expression in written for corner in expression.corners())]
 
-    def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
-        places, configuration = curve.solve(line, s, judged=False)
-        moving = Moving()
-        if any(name.endswith(VELOCITY) for name in names):
-            solved = SolvedPoses(np.arange(len(s)), poses.groups[0].names, configuration)
-            moving = moving_at(study, pace(study), places, solved, study.mechanism.linearize(configuration))
-        parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
-        return {
-            name: parts[name] if name in parts else variable(study, name, places, slice(None), configuration, moving)
-            for name in names
-        }
-
-    return divide(curve, corners, variables)[0]
+    return divide(curve, corners, variables_of(study, pace(study), curve, expressions))[0]
 
 
 def between_poses(task: Task, places: Task) -> list[Caution]:
