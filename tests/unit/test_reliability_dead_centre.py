@@ -180,5 +180,9 @@ def test_the_first_order_alone_is_warned_of_where_errors_curve():
     assert "0 to the first order" in message
     assert float(message.partition("order and ")[2].split()[0]) == pytest.approx(exact, rel=0.05)
     assert not warnings(poses=[{"theta": 90}])
-    assert not warnings(limits={"B.x": {"min": -0.2}})
+    # Where both orders fail as often the deviation differs still: that of a squared normal angle.
+    (deviation,) = warnings(limits={"B.x": {"min": -0.2}})
+    sigma = 0.5 * 50 * (1 + 50 / 150) * math.radians(1) ** 2 * math.sqrt(2)
+    assert "the standard deviation of B.x is 0 to the first order" in deviation
+    assert float(deviation.partition("order and ")[2].split()[0]) == pytest.approx(sigma, rel=0.01)
     assert not warnings(methods=["analytic", "second_order"])

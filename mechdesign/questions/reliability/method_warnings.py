@@ -24,6 +24,8 @@ _CURVED_POSES = 100
 _CURVED_WORK = 100_000
 _CURVED_LEAST = 1e-5
 _CURVED_FACTOR = 2.0
+# Least deviation that counts, as a part of the largest in the same unit.
+_FLAT_LEAST = 1e-3
 # Distance of a dead centre, in standard deviations of its margin, up to which there is a warning (1 in a million).
 _NEAR = 4.75
 
@@ -84,27 +86,45 @@ def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
 
     Beside another method `disagreements` tells.
     """
-    if not task.question.limited or [result.method for result in results] != ["analytic"]:
+    if [result.method for result in results] != ["analytic"]:
         return []
     components = task.linear.components.shape[1]
     some = evenly(len(task.settings), max(1, min(_CURVED_POSES, _CURVED_WORK // (components * components + 1))))
     settings = [task.settings[k] for k in some.tolist()]
-    second = methods.run("second_order", replace(task, settings=settings, progress=NULL)).estimates
-    first = results[0].estimates
+    second = methods.run("second_order", replace(task, settings=settings, progress=NULL))
+    first, other = results[0].estimates, second.estimates
     apart = {
-        setting.pose: disagree(first[setting.pose], second[setting.pose]) for setting in settings
-        if max(first[setting.pose].failure, second[setting.pose].failure) > _CURVED_LEAST
+        pose: disagree(first[pose], other[pose]) for pose in (setting.pose for setting in settings)
+        if task.question.limited and max(first[pose].failure, other[pose].failure) > _CURVED_LEAST
     }  # fmt: skip
     pose = max(apart, key=apart.__getitem__, default=-1)
-    if pose < 0 or not apart[pose] > _CURVED_FACTOR:
+    if pose >= 0 and apart[pose] > _CURVED_FACTOR:
+        what = f"the probability of failure is {first[pose].failure:.3g}", f"{other[pose].failure:.3g}"
+    elif (worst := _flat(task, second)) is not None:
+        output, pose, sigma, true = worst
+        what = f"the standard deviation of {task.question.channels[output].name} is {sigma:.3g}", f"{true:.3g}"
+    else:
         return []
     return [Caution(
         "disagree",
-        f"analytic: errors curve over the tolerances at {task.where(pose)}: the probability of failure is "
-        f"{first[pose].failure:.3g} to the first order and {second[pose].failure:.3g} to the second; ask for "
-        "second_order or monte_carlo",
-        "reliability", pose=task.where(pose),
+        f"analytic: errors curve over the tolerances at {task.where(pose)}: {what[0]} to the first order and {what[1]} "
+        "to the second; ask for second_order or monte_carlo",
+        pose=task.where(pose),
     )]  # fmt: skip
+
+
+def _flat(task: Task, second: MethodResult) -> tuple[int, int, float, float] | None:
+    """Output and pose whose deviation has the least part of the first order, where that is half or less; both."""
+    deviation = task.linear.deviation() * task.scale[:, None]
+    true = np.sqrt(np.diagonal(second.moments(task)[1], axis1=1, axis2=2).T) * task.scale[:, None]
+    unit = task.labels[2]
+    largest = np.array([np.nanmax(np.fmax(true, deviation)[unit == own], initial=0.0) for own in unit])[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = np.where(true > _FLAT_LEAST * largest, deviation / true, np.nan)
+    if not (part < 1.0 / _CURVED_FACTOR).any():
+        return None
+    output, pose = np.unravel_index(np.nanargmin(part), part.shape)
+    return int(output), int(pose), float(deviation[output, pose]), float(true[output, pose])
 
 
 def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
