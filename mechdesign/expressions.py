@@ -336,6 +336,18 @@ class Expression:
         program = self._run(_constant_step, lambda variable: (("name", variable),), call)
         return replace(self, program=program), arctangents
 
+    def outermost(self) -> tuple[Called, list[Expression]]:
+        """The function that is called last, and its arguments; an empty name where none is called."""
+        last: tuple[Called, list[tuple[Step, ...]]] = "", []
+
+        def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
+            nonlocal last
+            last = function, inner
+            return _call_steps(function, inner)
+
+        self._run(_constant_step, lambda name: (("name", name),), call)
+        return last[0], [replace(self, program=program) for program in last[1]]
+
     def corners(self) -> list[Corner]:
         """Where the expression is not smooth, the inner corners before the outer ones, which are smooth between them.
 

@@ -415,3 +415,27 @@ reliability:
         assert row["reliability.reliability"] == pytest.approx(
             alone.tables["reliability"]["reliability"].min(), rel=1e-9
         )
+
+
+@pytest.mark.slow
+def test_a_distance_about_zero_is_the_length_of_the_deflection() -> None:
+    """Of the tip from where it is without a load, whose components are C F."""
+    text = ARM.replace("ground: {O: [0, 0]}", "ground: {O: [0, 0], Q: [X, Y]}") + LOADED
+    place = 0.5 * np.exp(1j * np.deg2rad(30)) + 0.4 * np.exp(1j * np.deg2rad(80))
+    text = text.replace("X, Y", f"{place.real:.15g}, {place.imag:.15g}").replace(
+        "outputs: [P, lower.angle]", "outputs: [gap]"
+    )
+    text = text.replace("  drives: {shoulder", "  measures: {gap: {distance: [P, Q]}}\n  drives: {shoulder")
+    unloaded = text.replace("load: [100, -50, 10]", "load: [0, 0, 0]")
+    compliance = matrix(ask_stiffness(ARM), "C")[:2]
+    for study, mean_load in ((text, [100, -50, 10]), (unloaded, [0, 0, 0])):
+        result = ask(study, "reliability.methods=[analytic, second_order, monte_carlo]")
+        rng = np.random.default_rng(2)
+        load = np.array(mean_load)[:, None] + np.array([[20.0], [0.0], [1.0]]) * rng.standard_normal((3, 400_000))
+        longer = 1e-5 / 3 * rng.standard_normal(400_000)
+        moved = compliance @ load + longer * np.array([[np.cos(np.deg2rad(30))], [np.sin(np.deg2rad(30))]])
+        length = np.hypot(*moved)
+        for method in ("analytic", "second_order", "monte_carlo"):
+            mean, sigma = (pick(result, "moments", name, method=method)[0] for name in ("mean", "sigma"))
+            assert mean == pytest.approx(length.mean(), rel=0.01), (method, mean_load)
+            assert sigma == pytest.approx(length.std(), rel=0.01), (method, mean_load)

@@ -212,3 +212,68 @@ def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.Mon
     table = result.tables["reliability"]
     assert (table["samples"][table["scope"] == "pose"] == 100_000).all()
     assert "40000 whole cycles" in result.interrupted
+
+
+SWEPT = """
+mechanism:
+  links: {ground: {O: [0, 0], C: [200, 0]}, crank: [O, A, 60], rocker: [C, B, 130], rod: [A, B, 170]}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 60], B: [165, 125]}
+reliability:
+  sweep: {theta: {from: 0, to: 360, step: 5}}
+  dimensions: {rod.length: {sigma: 0.1}, crank.length: {sigma: 0.1}}
+  limits: {rocker.angle: {usl: 150}}
+  methods: [analytic]
+"""
+
+
+def between(step: float, top: float) -> tuple[list[str], float]:
+    result = ask(
+        SWEPT, f"reliability.sweep.theta.step={step}", f"reliability.limits={{rocker.angle: {{usl: {top!r}}}}}"
+    )
+    warnings = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
+    table = result.tables["reliability"]
+    return warnings, float(table["failure"][table["scope"] == "pose"].max())
+
+
+def test_a_limit_that_fails_between_the_poses_of_a_sweep_is_told() -> None:
+    moved = mechdesign.kinematics(mechdesign.load(text=SWEPT.partition("reliability:")[0] + """
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 0.25}}, outputs: [rocker.angle]}
+""")).tables["motion"]  # fmt: skip
+    fine = moved["rocker.angle"]
+    for step in (60, 40, 15):
+        rows = fine[:: 4 * step].max()
+        top = float(rows + 0.9 * (fine.max() - rows))
+        warnings, worst = between(step, top)
+        assert len(warnings) == 1
+        # The sweep passes the limit, where at least half of the made mechanisms fail.
+        told = float(warnings[0].partition("failure is ")[2].split()[0])
+        assert told > 0.5 > worst
+        place = float(warnings[0].partition("theta = ")[2].split()[0])
+        assert place == pytest.approx(moved["theta"][fine.argmax()], abs=step / 16 + 0.25)
+    assert not between(1, float(fine.max()) + 1.0)[0]
+
+
+def test_poses_between_which_a_motion_cannot_be_assembled_are_told() -> None:
+    # At 180 deg the rocker's pin is 260.5 from the crank's, and rocker and rod reach 260.4.
+    result = ask(
+        SWEPT, "mechanism.links.rod=[A, B, 130.4]", "mechanism.links.crank=[O, A, 60.5]",
+        "mechanism.sketch.A=[60.5, 0]", "mechanism.sketch.B=[150, 120]",
+        "reliability.sweep.theta={from: 150, to: 210, step: 60}", "reliability.limits={rocker.angle: 3}",
+    )  # fmt: skip
+    (warning,) = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
+    assert "1, as it cannot be assembled there" in warning
+
+
+@pytest.mark.parametrize("limit", ["{pulse: {usl: 0.5}}", "{theta_effort: {lsl: -100, usl: 100}}"])
+def test_what_is_narrow_between_the_poses_is_told(limit: str) -> None:
+    """A measure and a load that act over a tenth of a degree, between poses of 5 deg."""
+    pulse = "max(0, 1 - abs(theta - 123.4)/0.05)"
+    text = SWEPT.replace("reliability:", f"""
+  measures: {{pulse: "{pulse} + A.x/1000"}}
+dynamics: {{loads: [{{at: B, force: [0, "-100*{pulse}"]}}]}}
+reliability:""").replace("{usl: 150}", "{usl: 1000}")  # fmt: skip
+    result = ask(text, "reliability.dimensions.theta={sigma: 0.001}", f"reliability.limits={limit}")
+    (warning,) = [str(w) for w in result.warnings if str(w).startswith("between the poses")]
+    assert float(warning.partition("theta = ")[2].split()[0]) == pytest.approx(123.4, abs=0.05)
+    assert "failure is 1 to the first order" in warning

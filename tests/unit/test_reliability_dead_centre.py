@@ -152,3 +152,37 @@ def test_slopes_of_the_margins_are_their_differences(text: str) -> None:
     for k, name in enumerate(places):
         difference = (margins(name, 1.0) - margins(name, -1.0)) / 2e-6 / scale
         assert slopes[:, k] == pytest.approx(difference, rel=1e-5, abs=1e-6)
+
+
+STROKE = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 50], rod: [A, B, 150], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: O}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [35, 35], B: [180, 0]}
+reliability:
+  poses: [{theta: 0}, {theta: 90}]
+  dimensions: {theta: {sigma: 1}}
+  limits: {B.x: {min: -0.03}}
+"""
+
+
+def test_the_first_order_alone_is_warned_of_where_errors_curve():
+    def warnings(**changes):
+        overrides = {f"reliability.{key}": value for key, value in changes.items()}
+        study = mechdesign.load(text=STROKE, overrides={"reliability.methods": ["analytic"], **overrides})
+        return [str(w) for w in mechdesign.reliability(study).warnings if "curve" in str(w)]
+
+    (message,) = warnings()
+    assert "theta = 0 deg" in message
+    # At the end of the stroke B falls back by r (1 + r/l)/2 of the squared angle, whatever its sign.
+    exact = 2 * ndtr(-math.sqrt(2 * 0.03 / (50 * (1 + 50 / 150))) / math.radians(1))
+    assert "0 to the first order" in message
+    assert float(message.partition("order and ")[2].split()[0]) == pytest.approx(exact, rel=0.05)
+    assert not warnings(poses=[{"theta": 90}])
+    # Where both orders fail as often the deviation differs still: that of a squared normal angle.
+    (deviation,) = warnings(limits={"B.x": {"min": -0.2}})
+    sigma = 0.5 * 50 * (1 + 50 / 150) * math.radians(1) ** 2 * math.sqrt(2)
+    assert "the standard deviation of B.x is 0 to the first order" in deviation
+    assert float(deviation.partition("order and ")[2].split()[0]) == pytest.approx(sigma, rel=0.01)
+    assert not warnings(methods=["analytic", "second_order"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from scipy.special import ndtr
 
 import mechdesign
 from mechdesign.errors import Interrupted, StudyError
@@ -187,3 +188,71 @@ def test_a_limit_of_the_smallest_number_there_is(method):
     # A design point is known to a thousandth of sigma; whoever finds none says so.
     near = 1e-3 if method == "form" else 0.0
     assert failure[0] >= 1 - near or (np.isnan(failure[0]) and "no design point" in str(found.warnings[0]))
+
+
+FOUR_BAR = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 5]}
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: {from: D, to: B, length: 60, points: {Q: [30, 10]}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+reliability:
+  poses: [{theta: 40}]
+  dimensions:
+    '*.length': {sigma: 0.02}
+    rod.P.x: {sigma: 0.02}
+    rod.P.y: {sigma: 0.02}
+    rocker.Q.x: {sigma: 0.01}
+    rocker.Q.y: {sigma: 0.02}
+    ground.O.x: {sigma: 0.01}
+    ground.O.y: {sigma: 0.01}
+    ground.D.x: {sigma: 0.02}
+    ground.D.y: {sigma: 0.01}
+    theta: {sigma: 0.02}
+  outputs: [P.x, P.y, rocker.angle, Q.x]
+  samples: 20000
+"""
+
+
+@pytest.fixture(scope="module")
+def spread() -> dict[str, tuple[float, float]]:
+    """Nominal value and standard deviation of the four-bar's outputs."""
+    table = mechdesign.reliability(study_of(FOUR_BAR, "reliability.methods=[analytic]")).tables["moments"]
+    columns = (table[name].tolist() for name in ("output", "nominal", "sigma"))
+    return {output: (nominal, sigma) for output, nominal, sigma in zip(*columns, strict=True)}
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("beyond", [25.0, 11.0, 3.0, 1.0, -1.0, -6.0, -9.5, -14.0])
+def test_form_of_one_limit_is_that_of_a_normal_error_inside_of_it_and_outside(
+    beyond: float, side: int, spread: dict[str, tuple[float, float]]
+) -> None:
+    nominal, sigma = spread["P.x"]
+    end = "usl" if side > 0 else "lsl"
+    limit = f"reliability.limits={{P.x: {{{end}: {nominal - side * beyond * sigma!r}}}}}"
+    table = mechdesign.reliability(study_of(FOUR_BAR, limit, "reliability.methods=[form]")).tables["reliability"]
+    # The four-bar's errors are linear over such tolerances but for some hundredths of a deviation.
+    lowest, highest = ndtr(beyond - 0.05), ndtr(beyond + 0.05)
+    assert lowest <= table["failure"][0] <= highest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_form_agrees_with_sampling_wherever_the_nominal_lies_among_several_limits(
+    seed: int, spread: dict[str, tuple[float, float]]
+) -> None:
+    rng = np.random.default_rng(seed)
+    limits = []
+    for output in rng.permutation([*spread])[: rng.integers(1, 4)].tolist():
+        low, high = np.sort(rng.uniform(-12, 12, 2)) if rng.random() < 0.5 else np.sort(rng.normal(0, 2.5, 2))
+        nominal, sigma = spread[output]
+        limits.append(f"{output}: {{lsl: {nominal + low * sigma:.12g}, usl: {nominal + high * sigma:.12g}}}")
+    methods = "reliability.methods=[form, importance_sampling, analytic]"
+    study = study_of(FOUR_BAR, f"reliability.limits={{{', '.join(limits)}}}", methods)
+    table = mechdesign.reliability(study).tables["reliability"]
+    form, sampled, analytic = table["failure"].tolist()
+    assert form == pytest.approx(analytic, rel=0.03, abs=1e-14), limits
+    assert sampled == pytest.approx(analytic, rel=0.05, abs=1e-14), limits

@@ -121,7 +121,7 @@ class ForceQuestion:
     ) -> Mapping[str, Value]:  # fmt: skip
         """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
 
-        Of a subset of the columns joint forces are computed only if one is among them, and then their sizes alone.
+        Of a subset of the columns joint forces are computed only if one is among them, and then as vectors alone.
         """
         columns, held = self._held(poses, linear, rows, moving)
         if self.subset is None or not self.subset.isdisjoint(self.forces):
@@ -134,7 +134,9 @@ class ForceQuestion:
                     borne, self.joints, applied, section, self.study.mechanism.size or 1.0, held.couplings
                 )  # fmt: skip
             for name, reaction in zip(self.forces, borne, strict=True):
-                columns |= self._parts(name, reaction) if self.subset is None else {name: np.abs(reaction.force)}
+                force = np.asarray(reaction.force)
+                vector = {name: np.abs(force), f"{name}.fx": force.real, f"{name}.fy": force.imag}
+                columns |= self._parts(name, reaction) if self.subset is None else vector
         if self.subset is None:
             whole = held.balance if isinstance(held, Slipping) else held
             columns |= self._turned(linear.configuration, whole)

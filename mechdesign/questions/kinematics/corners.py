@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.curve.corners import divide, switched
+from mechdesign.curve.corners import Variables, divide, switched
 from mechdesign.curve.motion import Curve
 from mechdesign.curve.series import Evaluate
 from mechdesign.expressions import Expression
-from mechdesign.mechanism.coordinates import corners_of, expressions_of
+from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics import targets as targeted
@@ -22,6 +22,7 @@ from mechdesign.questions.loads import coordinates_in, variable
 from mechdesign.questions.poses import SolvedPoses
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY
+from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.schema.targets import Target
 
 
@@ -39,24 +40,32 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     corners += [corner for expression in written for corner in expression.corners()]
     corners += [corner for target in targets for corner in targeted.knots(study, target, question.poses)]
 
+    divided, _, _ = divide(curve, corners, variables_of(study, question.section, curve, expressions))
+    for target in targets:
+        if targeted.path(target, question.poses):
+            divided = switched(divided, partial(_side, question, curve, target))
+    return divided
+
+
+def variables_of(
+    study: Study, section: MotionSection, curve: Curve, expressions: Mapping[str, Coordinate]
+) -> Variables:
+    """Variables of these expressions, and of loads, along a curve whose rates a section gives."""
+
     def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
         poses, configuration = curve.solve(line, s, judged=False)
         moving = Moving()
         if any(name.endswith(VELOCITY) for name in names):
             linear = study.mechanism.linearize(configuration)
-            solved = SolvedPoses(np.arange(len(s)), question.poses.groups[0].names, configuration)
-            moving = moving_at(study, question.section, poses, solved, linear)
+            solved = SolvedPoses(np.arange(len(s)), curve.poses.groups[0].names, configuration)
+            moving = moving_at(study, section, poses, solved, linear)
         parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
         return {
             name: parts[name] if name in parts else variable(study, name, poses, slice(None), configuration, moving)
             for name in names
         }
 
-    divided, _, _ = divide(curve, corners, variables)
-    for target in targets:
-        if targeted.path(target, question.poses):
-            divided = switched(divided, partial(_side, question, curve, target))
-    return divided
+    return variables
 
 
 def determinant(study: Study, curve: Curve) -> Evaluate:

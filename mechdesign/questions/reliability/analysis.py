@@ -16,10 +16,12 @@ from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
 from mechdesign.questions.reliability.allocation import allocate
+from mechdesign.questions.reliability.between import between_poses, places_between
 from mechdesign.questions.reliability.cycle import with_cycle
 from mechdesign.questions.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.questions.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
 from mechdesign.questions.reliability.forces import force_model, pace
+from mechdesign.questions.reliability.lengths import model_of
 from mechdesign.questions.reliability.method_warnings import method_warnings
 from mechdesign.questions.reliability.question import ambiguous_points, ask
 from mechdesign.questions.reliability.schema.methods import METHODS
@@ -52,6 +54,9 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     section = ReliabilitySection.of(study)
     task, groups, doubts = _first_order(study, poses, sources)
     warnings += [*doubts, *ambiguous_points(study, task.question)]
+    closer = places_between(study, task.question, poses) if task.question.limited else None
+    if closer is not None:
+        warnings += between_poses(task, _first_order(study, closer, sources)[0])
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,
@@ -126,7 +131,7 @@ def first_order_tables(
         If nothing varies.
     """
     task, groups, _ = _first_order(study, poses, find_sources(study, poses)[0])
-    results = [MethodResult(normal=(task.linear.shift(), task.linear.covariance()), method="analytic")]
+    results = [MethodResult(normal=(task.linear.whole.shift(), task.linear.whole.covariance()), method="analytic")]
     if "reliability" in names:
         results = [with_cycle(methods.run("analytic", task), task, ())]
     built = [tables.moments(task, results)] if "moments" in names else []
@@ -147,7 +152,7 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     mechanism, section = study.mechanism, ReliabilitySection.of(study)
     question = ask(study, poses.section(section))
     bent, doubts = elasticity(study, poses)
-    channels, forces = question.channels, force_model(study, poses)
+    channels, forces = question.whole, force_model(study, poses)
     coordinates = [*question.coordinates, *(forces.coordinates if forces is not None else ())]
     reason = np.zeros(poses.count, dtype=np.int8)
     nominal = np.full((len(channels), poses.count), np.nan)
@@ -184,15 +189,16 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             closing.components[:, :, rows[block]], closing.offset[:, rows[block]] = margins.components, margins.offset
         groups.append((solved, rates))
     if bent is not None and elastic is not None:
-        doubts += cautions(study, bent, channels)
+        doubts += cautions(study, bent, question.channels)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~elastic.held, np.int8(Reason.NOT_HELD), reason)
         linear = replace(linear, offset=elastic.offset)
     if question.columns:
-        held = np.isfinite(nominal[-len(question.columns) :]).all(axis=0)
+        held = np.isfinite(nominal[len(question.channels) - len(question.columns) : len(question.channels)]).all(axis=0)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~held, np.int8(Reason.NOT_HELD), reason)
-    task = Task(study, poses, question, sources, reason, nominal, linear, closing, elastic)
-    linear.components[:, :, ~task.assembled] = np.nan
-    return task, groups, doubts
+    linear.components[:, :, ~np.isin(reason, (Reason.OK, Reason.LIMIT))] = np.nan
+    model = model_of(question, linear, nominal)
+    nominal = nominal[: len(question.channels)]
+    return Task(study, poses, question, sources, reason, nominal, model, closing, elastic), groups, doubts
 
 
 def _settings(task: Task, groups: _Groups) -> list[Setting]:
@@ -201,6 +207,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
     followed, forces = _followed(task), force_model(task.study, task.poses)
+    whole = task.question.whole
     settings = []
     for solved, rates in groups:
         by_drives = set(solved.names) == set(mechanism.drives)
@@ -217,7 +224,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]),
+                    None if task.elastic is None else task.elastic.take([row]).of(whole, task.question.vectors),
                     None if forces is None else forces.take([row]), scale, row == followed,
                 )
             )  # fmt: skip

@@ -2,7 +2,7 @@
 
 A made mechanism keeps its dimensions and the radii of its clearances over the whole motion; only the places of its pins
 in their holes are drawn anew at each pose. It fails where it breaks a limit, or cannot be assembled, at any pose.
-Failures between two poses are not seen: the step of a sweep is the resolution of the result.
+Failures between two poses are not seen: the step of a sweep is the resolution of the result. `between` warns of them.
 """
 
 from __future__ import annotations

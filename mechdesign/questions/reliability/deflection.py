@@ -51,9 +51,9 @@ class Elastic:
         """The deflections at these poses."""
         return Elastic(self.flexibility[:, :, poses], _of_poses(self.load, poses))
 
-    def only(self, channels: Sequence[int]) -> Elastic:
-        """The deflections of these channels."""
-        return replace(self, flexibility=self.flexibility[list(channels)])
+    def of(self, channels: Sequence[Channel], some: Sequence[Channel]) -> Elastic:
+        """The deflections of some of the channels that it is of."""
+        return replace(self, flexibility=self.flexibility[[channels.index(channel) for channel in some]])
 
     def errors(self, loads: Mapping[str, Floats], count: int) -> Floats:
         """Deflections of `count` mechanisms at a single pose, shape (channels, count), from deviations of the load."""
@@ -117,6 +117,8 @@ class Elasticity:
             rates, held = self._rates(part, self.question if poses is None else self.question.take(poses[assembled]))
             for k, coordinate in deflected:
                 moved = np.broadcast_to(first(part, coordinate, rates), (self.question.size, len(assembled)))
+                # A distance of zero has no derivative: its vector has.
+                moved = np.nan_to_num(moved) if coordinate.kind == "distance" else moved
                 flexibility[k, : self.question.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load if poses is None else _of_poses(self.load, poses))
 

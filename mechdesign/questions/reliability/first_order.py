@@ -5,9 +5,10 @@ Var(output) = sum over sources of (d output / d source)^2 Var(source)          [
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,14 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import Channel, CoordinateChannel, ForceChannel
+from mechdesign.questions.reliability.question import (
+    Band,
+    Channel,
+    CoordinateChannel,
+    Disc,
+    ForceChannel,
+    limits_at,
+)
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
 
@@ -83,6 +91,25 @@ class FirstOrder:
             return np.asarray(sigma * (correlation @ (sigma * self.components)))
         return np.asarray(sigma * np.einsum("pzy,cyp->czp", correlation, sigma * self.components))
 
+    @property
+    def whole(self) -> FirstOrder:
+        """The model with all that limits are judged by; beside the channels the vectors of lengths, see `lengths`."""
+        return self
+
+    def alike(self) -> list[slice | Ints]:
+        """Poses at which `limits` are those of the same channels of `whole`."""
+        return [slice(None)]
+
+    def limits(
+        self, bands: Sequence[Band], discs: Sequence[Disc], poses: Any
+    ) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
+        """The limits of the channels, of errors, at some poses that are `alike`, as those of `whole`."""
+        return limits_at(bands, discs, poses)
+
+    def own(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of the channels, from those of `whole`, in the shapes of `MethodResult.normal`."""
+        return mean, covariance
+
     def beside(self, other: FirstOrder) -> FirstOrder:
         """A model with the channels of both."""
         return replace(
@@ -122,13 +149,18 @@ class FirstOrder:
                 steepest[:, k] = np.abs(self.components[:, self.owner == k]).sum(axis=1)
         return steepest
 
+    @cached_property
+    def parts(self) -> Floats:
+        """What each source adds to the variance, shape (channels, sources, poses)."""
+        products = self.components * self._weighted
+        return np.stack([products[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
+
     def share(self) -> Floats:
         """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
 
         The share of a correlated source is its covariance with the error, which may be negative.
         """
-        products = self.components * self._weighted
-        parts = np.stack([products[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
+        parts = self.parts
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
@@ -161,24 +193,25 @@ def nominal_values(
     orders = {channel.order for channel in channels if isinstance(channel, CoordinateChannel)}
     columns = _columns(channels)
     velocity = acceleration = None
+    borne: Iterator[Value] = iter(())
     if columns or orders - {0}:
         linear = mechanism.linearize(configuration)
+    if columns:
+        assert forces is not None
+        borne = iter(forces.values(columns, linear, rates))
     if orders - {0}:
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
     values = []
     for channel in channels:
         if isinstance(channel, ForceChannel):
-            continue
-        if velocity is None or channel.order == 0:
+            values.append(next(borne))
+        elif velocity is None or channel.order == 0:
             values.append(configuration.value(channel.coordinate))
         elif acceleration is None or channel.order == 1:
             values.append(first(configuration, channel.coordinate, velocity))
         else:
             values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
-    if columns:
-        assert forces is not None
-        values += forces.values(columns, linear, rates)
     return values
 
 
@@ -206,13 +239,14 @@ def derivatives(
         return slopes
     names = [names[row] for row in rows]
     columns, moved = _columns(channels), [c for c in channels if isinstance(c, CoordinateChannel)]
+    coordinates = np.array([isinstance(channel, CoordinateChannel) for channel in channels])
     linear = mechanism.linearize(configuration)
     position = linear.sensitivity(names)
     if any(channel.order for channel in moved):
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-    for row, channel in zip(slopes, moved, strict=False):
+    for row, channel in zip((slopes[k] for k in np.flatnonzero(coordinates)), moved, strict=True):
         if channel.order == 0:
             row[rows] = first(configuration, channel.coordinate, position)
         elif channel.order == 1:
@@ -223,12 +257,14 @@ def derivatives(
             )
     if columns:
         assert forces is not None
-        slopes[len(moved) :, rows] = forces.slopes(columns, mechanism, configuration, position, names, rates)
+        slopes[np.ix_(np.flatnonzero(~coordinates), np.array(rows))] = forces.slopes(
+            columns, mechanism, configuration, position, names, rates
+        )
     return slopes
 
 
 def _columns(channels: Sequence[Channel]) -> list[str]:
-    """The columns of dynamics among channels, which are the last of them."""
+    """The columns of dynamics among channels."""
     return [channel.name for channel in channels if isinstance(channel, ForceChannel)]
 
 

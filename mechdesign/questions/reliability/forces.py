@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,13 +18,14 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value, Vector, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
-from mechdesign.mechanism.forces import Moving
+from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import column_kinds
 from mechdesign.questions.kinematics.rates import DriveRates
-from mechdesign.questions.loads import coordinates_in
+from mechdesign.questions.loads import Loading, coordinates_in
+from mechdesign.questions.reliability.corners import Bend, bends, bends_of
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, pace_of
 from mechdesign.study import Study
@@ -75,6 +77,20 @@ def followed(study: Study) -> set[str]:
     return {name for name in study.parameters.nominal if study.parameters.moved([name]) & names}
 
 
+def argument_name(argument: Expression) -> str:
+    """A name of a column that no column of dynamics has."""
+    return f"argument: {argument.program}"
+
+
+def load_bends(study: Study) -> list[Bend]:
+    """Where the loads of dynamics are not smooth: in their variables, and in the coordinates that they follow."""
+    loads = study.dynamics.loads if study.dynamics is not None else ()
+    numbers = [part for load in loads for _, part, _ in load.numbers]
+    expressions = (part.expression if isinstance(part, Amount) else part for part in numbers)
+    own = [bend for part in expressions if isinstance(part, Expression) for bend in bends_of(part)]
+    return [*dict.fromkeys([*own, *(bend for part in coordinates_in(study, loads) for bend in bends(part))])]
+
+
 @dataclass(frozen=True, eq=False)
 class ForceModel:
     """The forces of a mechanism in motion, of designs or made mechanisms with `parameters` of their own.
@@ -119,8 +135,18 @@ class ForceModel:
         nominal = self.question.study.parameters.nominal
         poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
-        columns = self.question.lean(names).columns(poses, linear, slice(None), moving)
+        columns = dict(self.question.lean(names).columns(poses, linear, slice(None), moving))
+        loading, acting = Loading(self.question.study, (), poses, slice(None)), Forces(linear.configuration)
+        for name, argument in self.arguments.items():
+            if name in names:
+                columns[name] = loading.value(argument, acting, moving)
         return [np.where(held, columns[name], np.nan) for name in names]
+
+    @cached_property
+    def arguments(self) -> Mapping[str, Expression]:
+        """What the corners of the loads are judged by, by the names of columns of its own."""
+        parts = (part for bend in load_bends(self.question.study) for part in bend.arguments)
+        return {argument_name(part): part for part in parts if isinstance(part, Expression)}
 
     @quiet
     def slopes(

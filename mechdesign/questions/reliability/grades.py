@@ -15,6 +15,7 @@ import numpy as np
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.cheapest import ToleranceModel
 from mechdesign.questions.reliability.first_order import FirstOrder
+from mechdesign.questions.reliability.lengths import WithLengths
 
 # Most partial choices that are followed at once.
 _MOST_BRANCHES = 100_000
@@ -133,12 +134,13 @@ def _searched(choices: _Choices, best: Ints) -> tuple[Ints, float]:
 def _conditions(choices: _Choices) -> tuple[list[Floats], Floats]:
     """The variance that each grade of each free tolerance causes, shape (conditions, grades), and the allowed ones.
 
-    There are no conditions where a tolerance also changes the mean, or where deviations are correlated.
+    There are no conditions where a tolerance also changes the mean, as of a length, or where deviations are correlated.
     """
     model = choices.model
     sources, scalars = model.task.sources, model.task.sources.scalars
     free = model.free.tolist()
-    if sources.correlation is not None or any(scalars[k].law.moments[0] != scalars[k].law.mean for k in free):
+    own = isinstance(model.task.linear, WithLengths) and model.task.linear.short.any()
+    if own or sources.correlation is not None or any(scalars[k].law.moments[0] != scalars[k].law.mean for k in free):
         return [np.zeros((0, len(steps))) for steps in model.steps], np.zeros(0)
     poses = [setting.pose for setting in model.task.settings]
     linear, question = model.task.linear.take(poses), model.task.question.at(model.task.nominal[:, poses])

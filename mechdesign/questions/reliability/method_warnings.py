@@ -5,15 +5,27 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.numerics.arrays import evenly
+from mechdesign.progress import NULL
+from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, reached
 from mechdesign.questions.reliability.methods.auto import FACTOR, disagree
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.task import MethodResult, Task
 
+# Poses at which the first order alone is compared with the second, and mechanisms that are solved for it; least
+# probability that is compared, and the ratio from which on a warning says so.
+_CURVED_POSES = 100
+_CURVED_WORK = 100_000
+_CURVED_LEAST = 1e-5
+_CURVED_FACTOR = 2.0
+# Least deviation that counts, as a part of the largest in the same unit.
+_FLAT_LEAST = 1e-3
 # Distance of a dead centre, in standard deviations of its margin, up to which there is a warning (1 in a million).
 _NEAR = 4.75
 
@@ -21,8 +33,9 @@ _NEAR = 4.75
 def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Warnings about the results of the methods."""
     return [
-        *_outside(task), *disagreements(results, task), *_unseen(results, task), *_unreached(results, task),
-        *_pointless(results, task), *_not_assembled(results, task), *_unassembled(results), *_of_cycles(results, task),
+        *_outside(task), *_cornered(task), *_curved(results, task), *disagreements(results, task),
+        *_unseen(results, task), *_unreached(results, task), *_pointless(results, task), *_not_assembled(results, task),
+        *_unassembled(results), *_of_cycles(results, task),
     ]  # fmt: skip
 
 
@@ -48,6 +61,70 @@ def _outside(task: Task) -> list[Caution]:
             pose=task.where(pose),
         ))  # fmt: skip
     return cautions
+
+
+def _cornered(task: Task) -> list[Caution]:
+    """Warnings of outputs with a corner among their errors, which have no first order there."""
+    cautions = []
+    for output in dict.fromkeys(output for output, *_ in task.question.bends):
+        poses = np.flatnonzero(np.isnan(task.linear.whole.components[output]).any(axis=0) & task.assembled)
+        if len(poses):
+            where = task.where(int(poses[0]))
+            several = f" (the first of {len(poses)} poses)" if len(poses) > 1 else ""
+            cautions.append(Caution(
+                "undefined",
+                f"{task.question.channels[output].name} bends, jumps or ends within its errors at {where}{several}: "
+                "it has no derivative there by which analytic, second_order and the contributions could judge it; ask "
+                "for monte_carlo or quasi_monte_carlo",
+                pose=where,
+            ))  # fmt: skip
+    return cautions
+
+
+def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `analytic` alone is asked and its errors curve over the tolerances, by their second order.
+
+    Beside another method `disagreements` tells.
+    """
+    if [result.method for result in results] != ["analytic"]:
+        return []
+    components = task.linear.components.shape[1]
+    some = evenly(len(task.settings), max(1, min(_CURVED_POSES, _CURVED_WORK // (components * components + 1))))
+    settings = [task.settings[k] for k in some.tolist()]
+    second = methods.run("second_order", replace(task, settings=settings, progress=NULL))
+    first, other = results[0].estimates, second.estimates
+    apart = {
+        pose: disagree(first[pose], other[pose]) for pose in (setting.pose for setting in settings)
+        if task.question.limited and max(first[pose].failure, other[pose].failure) > _CURVED_LEAST
+    }  # fmt: skip
+    pose = max(apart, key=apart.__getitem__, default=-1)
+    if pose >= 0 and apart[pose] > _CURVED_FACTOR:
+        what = f"the probability of failure is {first[pose].failure:.3g}", f"{other[pose].failure:.3g}"
+    elif (worst := _flat(task, second)) is not None:
+        output, pose, sigma, true = worst
+        what = f"the standard deviation of {task.question.channels[output].name} is {sigma:.3g}", f"{true:.3g}"
+    else:
+        return []
+    return [Caution(
+        "disagree",
+        f"analytic: errors curve over the tolerances at {task.where(pose)}: {what[0]} to the first order and {what[1]} "
+        "to the second; ask for second_order or monte_carlo",
+        pose=task.where(pose),
+    )]  # fmt: skip
+
+
+def _flat(task: Task, second: MethodResult) -> tuple[int, int, float, float] | None:
+    """Output and pose whose deviation has the least part of the first order, where that is half or less; both."""
+    deviation = task.linear.deviation() * task.scale[:, None]
+    true = np.sqrt(np.diagonal(second.moments(task)[1], axis1=1, axis2=2).T) * task.scale[:, None]
+    unit = task.labels[2]
+    largest = np.array([np.nanmax(np.fmax(true, deviation)[unit == own], initial=0.0) for own in unit])[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = np.where(true > _FLAT_LEAST * largest, deviation / true, np.nan)
+    if not (part < 1.0 / _CURVED_FACTOR).any():
+        return None
+    output, pose = np.unravel_index(np.nanargmin(part), part.shape)
+    return int(output), int(pose), float(deviation[output, pose]), float(true[output, pose])
 
 
 def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.special import erfcx, ndtr, ndtri
@@ -51,20 +52,24 @@ def made_failure(
     linear, closing : FirstOrder
         Errors, and margins of assembly.
     mean, covariance : ndarray, optional
-        In place of those of `linear`, in the shapes of `failure_probability`.
+        In place of those of the linear model's `whole`, in the shapes of `failure_probability`.
     """
-    mean = linear.shift().T if mean is None else mean
-    covariance = linear.covariance() if covariance is None else covariance
-    failure = failure_probability(covariance, bands, discs, mean)
+    mean = linear.whole.shift().T if mean is None else mean
+    covariance = linear.whole.covariance() if covariance is None else covariance
+    failure = np.full(len(mean), np.nan)
+    # The same lengths have a law of their own at all of these poses.
+    for rows in linear.alike():
+        failure[rows] = failure_probability(covariance[rows], *linear.limits(bands, discs, rows), mean[rows])
     # What is left where a limit breaks almost surely is all that assembly can add.
     parts = np.minimum(ndtr(-closing.distance()), 1.0 - failure)
     counts = parts > np.maximum(_NO_PART * failure, _LEAST_PART)
     count = covariance.shape[-1]
     for pose in np.flatnonzero(counts.any(axis=0)).tolist():
-        both = linear.beside(closing).take([pose])
+        both = linear.whole.beside(closing).take([pose])
         spread, middle = both.covariance()[0], both.shift()[:, 0]
         spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
-        limits, circles = limits_at(bands, discs, pose)
+        limits, circles = linear.limits(bands, discs, [pose])
+        limits, circles = limits_at(limits, circles, 0)
         margins = [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
         failure[pose] = failure_probability(spread, [*limits, *margins], circles, middle)
     return failure
@@ -73,7 +78,7 @@ def made_failure(
 def failure_probability(
     covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
 ) -> Floats:
-    """Probability that normal errors break any limit, shape (...); nan where a covariance or mean is not finite.
+    """Probability that normal errors break any limit, shape (...); nan where a limited one's moments are not finite.
 
     Parameters
     ----------
@@ -94,11 +99,18 @@ def failure_probability(
         pair = [band.output for band in bands]
         low, high = (np.stack([end[k] for end in ends]) for k in (0, 1))
         return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
-    finite = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(mean).all(axis=-1)
+    limited = [band.output for band in bands] + [axis for disc in discs for axis in (disc.x, disc.y)]
+    finite = np.isfinite(covariance[..., limited, :][..., limited]).all(axis=(-2, -1))
+    finite &= np.isfinite(mean[..., limited]).all(axis=-1)
     failure = np.full(finite.shape, np.nan)
     if len(discs) == 1 and not bands:
-        pair, radius = [discs[0].x, discs[0].y], np.broadcast_to(discs[0].radius, finite.shape)
-        failure[finite] = disc_failures(covariance[finite][:, pair][..., pair], radius[finite], mean[finite][:, pair])
+        pair = [discs[0].x, discs[0].y]
+        radius, least = (np.broadcast_to(end, finite.shape)[finite] for end in (discs[0].radius, discs[0].least))
+        spread, middle = covariance[finite][:, pair][..., pair], mean[finite][:, pair]
+        beyond = disc_failures(spread, radius, middle)
+        for row in np.flatnonzero(least > 0).tolist():
+            beyond[row] += disc_chance(spread[row], float(least[row]), middle[row])
+        failure[finite] = np.minimum(beyond, 1.0)
         return failure
     for place in filter(np.asarray(finite).__getitem__, np.ndindex(failure.shape)):
         failure[place] = _of_several(covariance[place], *limits_at(bands, discs, place), mean[place])
@@ -128,9 +140,17 @@ def _of_several(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]
 def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float | None:
     """Probability outside any of several limits where it is small; None where a lattice is better."""
     total = sum(float(outside(*_standard(band, covariance, mean))) for band in bands)
+    nearer = []
     for disc in discs:
         pair = [disc.x, disc.y]
         total += disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
+        if disc.least > 0:
+            # A point within the circle is nearer to its middle than a line that touches it.
+            away = mean[pair] / (np.hypot(*mean[pair]) or 1.0)
+            sigma = np.sqrt(max(float(away @ covariance[np.ix_(pair, pair)] @ away), 0.0))
+            depth = disc.least - float(away @ mean[pair])
+            total += float(ndtr(depth / sigma)) if sigma > 0 else float(depth > 0)
+            nearer.append((disc, away))
     if total > _RARE:
         return None
     squares, axes = np.linalg.eigh(covariance)
@@ -143,6 +163,9 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
         for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
             slopes.append(x * rows[disc.x] + y * rows[disc.y])
             ends.append(disc.radius * np.cos(np.pi / _POLYGON_SIDES) - x * mean[disc.x] - y * mean[disc.y])
+    for disc, (x, y) in nearer:
+        slopes.append(-x * rows[disc.x] - y * rows[disc.y])
+        ends.append(x * mean[disc.x] + y * mean[disc.y] - disc.least)
     size = np.linalg.norm(slopes, axis=1)
     used = (size > 0) & np.isfinite(ends)
     flat = np.count_nonzero(used[: 2 * len(bands)])
@@ -150,7 +173,8 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     def broken(u: Floats, held: Flags) -> Flags:
         outside_any = np.asarray(held[:flat].any(axis=0))
         for disc in discs:
-            outside_any |= np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y))) > disc.radius
+            size = np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y)))
+            outside_any |= (size > disc.radius) | (size < disc.least)
         return outside_any
 
     return half_spaces(
@@ -236,27 +260,53 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
     -----
     In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
     """
-    squares, axes = np.linalg.eigh(covariance)
-    b, a = np.sqrt(np.maximum(squares, 0.0))
-    n, m = (0.0, 0.0) if mean is None else axes.T @ mean
+    if radius == np.inf:
+        return 0.0
+    a, b, m, n = _principal(covariance, mean)
     if radius <= 0 or a == 0:
         return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
     if b < 1e-12 * a:
-        half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
+        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
         return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
-    total = float(outside((-radius - m) / a, (radius - m) / a))
+    height, weight = _across(radius, a, b, m, n)
+    return float(outside((-radius - m) / a, (radius - m) / a)
+                 + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))  # fmt: skip
+
+
+def disc_chance(covariance: Floats, radius: float, mean: Floats) -> float:
+    """P(bivariate normal within a circle about zero), to all digits of a small one; see `disc_failure`."""
+    a, b, m, n = _principal(covariance, mean)
+    if radius <= 0 or a == 0:
+        return float(np.hypot(m, n) <= radius > 0)
+    if b < 1e-12 * a:
+        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
+        return float(ndtr((half - m) / a) - ndtr((-half - m) / a))
+    height, weight = _across(radius, a, b, m, n)
+    return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
+
+
+def _principal(covariance: Floats, mean: Floats | None) -> tuple[Any, Any, Any, Any]:
+    """Standard deviations along the principal axes, the larger first, and the sizes of the mean's parts along them."""
+    squares, axes = np.linalg.eigh(covariance)
+    b, a = np.sqrt(np.maximum(squares, 0.0))
+    n, m = (0.0, 0.0) if mean is None else np.abs(axes.T @ mean)
+    return a, b, m, n
+
+
+def _across(radius: float, a: Any, b: Any, m: Any, n: Any) -> tuple[Floats, Floats]:
+    """Half the heights of a circle at places x along the first axis, and their weights by the density of x."""
     begin, end = (np.arcsin(np.clip((m + sign * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for sign in (-1, 1))
     if begin == end:
-        return total
+        return np.zeros(0), np.zeros(0)
     # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.
     spread = np.array([0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0, 16.0, 40.0]) * b
-    near = np.arccos(np.clip(np.concatenate([abs(n) + spread, abs(n) - spread]) / radius, 0.0, 1.0))
+    near = np.arccos(np.clip(np.concatenate([n + spread, n - spread]) / radius, 0.0, 1.0))
     count = min(int(np.ceil((end - begin) * radius / a)) + 8, 800)
     edges = np.unique(np.concatenate([np.linspace(begin, end, count), near, -near]))
     t, weight = _panels(edges[(edges >= begin) & (edges <= end)])
     x, height = radius * np.sin(t), radius * np.cos(t)
     density = np.exp(-0.5 * ((x - m) / a) ** 2) / (a * np.sqrt(2 * np.pi))
-    return float(total + np.sum(weight * density * height * (ndtr((-height - n) / b) + ndtr((n - height) / b))))
+    return height, weight * density * height
 
 
 def _panels(edges: Floats) -> tuple[Floats, Floats]:
@@ -268,10 +318,10 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
 
 def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], centre: Floats) -> float:
     """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it."""
-    order: list[tuple[int, float, float, float]] = [(b.output, b.low, b.high, 0.0) for b in bands]
+    order: list[tuple[int, float, float, float, float]] = [(b.output, b.low, b.high, 0.0, 0.0) for b in bands]
     for disc in discs:
         low, high = (sign * disc.radius - float(centre[disc.x]) for sign in (-1, 1))
-        order += [(disc.x, low, high, 0.0), (disc.y, low, high, disc.radius)]
+        order += [(disc.x, low, high, 0.0, 0.0), (disc.y, low, high, disc.radius, disc.least)]
     chosen = [output for output, *_ in order]
     root = _pivot_free_cholesky(covariance[np.ix_(chosen, chosen)])
     primes = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71], dtype=float)
@@ -285,19 +335,29 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], c
         drawn = np.zeros((len(order), _LATTICE_POINTS))
         log_success = np.zeros(_LATTICE_POINTS)
         before = np.zeros(_LATTICE_POINTS)
-        for k, (output, low, high, radius) in enumerate(order):
+        for k, (output, low, high, radius, least) in enumerate(order):
             mean = root[k, :k] @ drawn[:k]
             lower, upper = low - mean, high - mean
+            # Half the chord of the circle within which y is too near to the middle.
+            hole = np.sqrt(np.maximum(least * least - before * before, 0.0)) if least > 0 else None
             if radius:
                 chord = np.sqrt(np.maximum(radius * radius - before * before, 0.0))
                 lower, upper = (sign * chord - centre[output] - mean for sign in (-1, 1))
             if root[k, k] > 0:
                 a, b = ndtr(lower / root[k, k]), ndtr(-upper / root[k, k])
+                begin, gap = 1.0, 0.0
+                if hole is not None:
+                    begin, end = (ndtr((sign * hole - centre[output] - mean) / root[k, k]) for sign in (-1, 1))
+                    gap = end - begin
                 with np.errstate(divide="ignore"):
-                    log_success += np.log1p(-np.minimum(a + b, 1.0))
-                drawn[k] = ndtri(np.clip(a + points[:, k] * (1.0 - a - b), 1e-300, 1.0 - 1e-16))
+                    log_success += np.log1p(-np.minimum(a + b + gap, 1.0))
+                share = a + points[:, k] * (1.0 - a - b - gap)
+                drawn[k] = ndtri(np.clip(share + np.where(share > begin, gap, 0.0), 1e-300, 1.0 - 1e-16))
             else:
-                log_success = np.where((lower <= 0) & (upper >= 0), log_success, -np.inf)
+                within = (lower <= 0) & (upper >= 0)
+                if hole is not None:
+                    within &= np.abs(centre[output] + mean) >= hole
+                log_success = np.where(within, log_success, -np.inf)
             before = mean + root[k, k] * drawn[k] + centre[output]
         means.append(-np.expm1(log_success).mean())
     return float(np.mean(means))

@@ -16,7 +16,8 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.outputs import default_outputs, expand_outputs
-from mechdesign.questions.reliability.forces import kinds_of_forces
+from mechdesign.questions.reliability.corners import Bend, bends, vector_of
+from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
@@ -63,6 +64,8 @@ class ForceChannel:
 
     name: str
     kind: str
+    vector: tuple[str, ...] = ()  # columns of the components of a force whose size it is
+    bends: tuple[Bend, ...] = ()  # where the loads that it follows are not smooth
 
     @property
     def words(self) -> tuple[str, str]:
@@ -97,11 +100,15 @@ class Band:
 
 @dataclass(frozen=True)
 class Disc:
-    """A circle about zero that limits the errors of the channels `x` and `y`; its radius may be an array of poses."""
+    """A circle about zero that limits the errors of the channels `x` and `y`; its radius may be an array of poses.
+
+    Errors within the circle of radius `least` about zero are beyond the limit, too.
+    """
 
     x: int
     y: int
     radius: Any
+    least: Any = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +137,64 @@ class ReliabilityQuestion:
     def moving(self) -> bool:
         """Whether velocities count."""
         return any(isinstance(channel, ForceChannel) or channel.order > 0 for channel in self.channels)
+
+    @cached_property
+    def _vectors(self) -> list[tuple[int, tuple[Channel, ...]]]:
+        """Channels that are the length of a vector, and its components."""
+        vectors: list[tuple[int, tuple[Channel, ...]]] = []
+        for k, channel in enumerate(self.channels):
+            if isinstance(channel, ForceChannel):
+                vectors.append((k, tuple(ForceChannel(name, channel.kind) for name in channel.vector)))
+            elif channel.order == 0:
+                vectors.append((k, tuple(CoordinateChannel(part, 0) for part in vector_of(channel.coordinate))))
+        return [(k, vector) for k, vector in vectors if vector]
+
+    @cached_property
+    def _bends(self) -> list[tuple[int, Bend]]:
+        """Channels with the places at which they are not smooth; a length's are those of its vector."""
+        vectors, places = dict(self._vectors), list[tuple[int, Bend]]()
+        for k, channel in enumerate(self.channels):
+            for part in vectors.get(k, (channel,)) if isinstance(channel, CoordinateChannel) else (channel,):
+                own = part.bends if isinstance(part, ForceChannel) else bends(part.coordinate)
+                places += [(k, bend) for bend in dict.fromkeys(own)]
+        return places
+
+    @cached_property
+    def vectors(self) -> tuple[Channel, ...]:
+        """The channels, and the components of those that are lengths."""
+        return (*self.channels, *(part for _, vector in self._vectors for part in vector))
+
+    @cached_property
+    def whole(self) -> tuple[Channel, ...]:
+        """The channels, the components of lengths, and the arguments by which corners are judged."""
+        arguments = (argument for _, bend in self._bends for argument in bend.arguments)
+        return (*self.vectors, *(
+            CoordinateChannel(argument, 0) if isinstance(argument, Coordinate)
+            else ForceChannel(argument_name(argument), "none") for argument in arguments
+        ))  # fmt: skip
+
+    @cached_property
+    def lengths(self) -> list[tuple[int, tuple[int, int]]]:
+        """Channels that are lengths, with the places in `whole` of the components x and y; -1: always zero."""
+        place, lengths = len(self.channels), []
+        for k, vector in self._vectors:
+            lengths.append((k, (place, place + 1 if len(vector) > 1 else -1)))
+            place += len(vector)
+        return lengths
+
+    @property
+    def rows(self) -> list[int]:
+        """Places in `whole` of the channels, and of the components of their lengths."""
+        return [*range(len(self.channels)), *(place for _, pair in self.lengths for place in pair)]
+
+    @cached_property
+    def bends(self) -> list[tuple[int, range, Bend]]:
+        """Channels that are not smooth somewhere, the places in `whole` of the arguments, and where that is."""
+        place, judged = len(self.channels) + sum(len(vector) for _, vector in self._vectors), []
+        for k, bend in self._bends:
+            judged.append((k, range(place, place + len(bend.arguments)), bend))
+            place += len(bend.arguments)
+        return judged
 
     @property
     def limited(self) -> bool:
@@ -222,7 +287,7 @@ def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple
     """The limits at one pose or some, by an index of the arrays of poses."""
     return (
         tuple(replace(band, low=at_rows(band.low, poses), high=at_rows(band.high, poses)) for band in bands),
-        tuple(replace(disc, radius=at_rows(disc.radius, poses)) for disc in discs),
+        tuple(replace(disc, radius=at_rows(disc.radius, poses), least=at_rows(disc.least, poses)) for disc in discs),
     )
 
 
@@ -245,7 +310,12 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     orders = 3 if section.rated else 1
     forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
     channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
-    channels += [ForceChannel(name, kinds[name]) for name in forces]
+    joints = study.dynamics.joints(mechanism).names if forces and study.dynamics is not None else ()
+    axes = {"shaking": ("shaking.x", "shaking.y")} | {name: (f"{name}.fx", f"{name}.fy") for name in joints}
+    bent = tuple(load_bends(study)) if forces else ()
+    channels += [
+        ForceChannel(name, kinds[name], axes.get(name, ()), () if name.endswith("_energy") else bent) for name in forces
+    ]
     places = {channel.words: k for k, channel in enumerate(channels)}
 
     def place(base: str, order: int) -> int:

@@ -71,10 +71,10 @@ class Setting:
 
     def narrowed(self) -> Setting:
         """The same pose with the limited channels only, which suffice for the limits."""
-        channels = self.question.limited_channels
+        channels, vectors = self.question.limited_channels, self.question.vectors
         return replace(
             self, question=self.question.narrowed, centres=[self.centres[k] for k in channels], scale=None,
-            elastic=None if self.elastic is None else self.elastic.only(channels),
+            elastic=None if self.elastic is None else self.elastic.of(vectors, self.question.narrowed.vectors),
             forces=self.forces if self.question.narrowed.columns else None,
         )  # fmt: skip
 
@@ -118,13 +118,20 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
     """
     solved = solve(setting, made)
     forces = None if setting.forces is None else setting.forces.made(made.parameters)
+    question, elastic = setting.question, setting.elastic
+    channels = question.channels if elastic is None else question.vectors
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        values = nominal_values(setting.mechanism, solved, setting.question.channels, setting.rates, forces)
-    errors = np.empty((len(values), count))
-    for error, value, centre in zip(errors, values, setting.centres, strict=True):
+        values = nominal_values(setting.mechanism, solved, channels, setting.rates, forces)
+    errors = np.empty((len(question.channels), count))
+    for error, value, centre in zip(errors, values, setting.centres, strict=False):
         error[:] = value - centre
-    if setting.elastic is not None:
-        errors += setting.elastic.errors(made.loads, count)
+    if elastic is not None:
+        moved = elastic.errors(made.loads, count)
+        errors += moved[: len(errors)]
+        for output, parts in question.lengths:
+            # A length is that of the deflected vector.
+            vector = [values[part] + moved[part] for part in parts if part >= 0]
+            errors[output] = np.linalg.norm(np.broadcast_arrays(*vector), axis=0) - setting.centres[output]
     valid = np.broadcast_to(solved.valid, (count,))
     return errors, valid if forces is None else valid & np.isfinite(errors).all(axis=0)
 

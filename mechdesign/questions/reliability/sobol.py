@@ -224,7 +224,9 @@ def _both_models(setting: Setting, sources: Sources, linear: FirstOrder) -> Call
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
     """Variances of the linear model by source and in all, with the laws of pins that are sampled; None if unknown."""
     pins = tuple(replace(pin, analytic=pin.sampled) for pin in linear.sources.pins)
-    model = replace(linear.take([pose]), sources=replace(linear.sources, pins=pins))
+    # The model beside which made mechanisms are sampled is linear, where a length about zero is not, too.
+    plain = FirstOrder(linear.sources, linear.components, linear.offset).take([pose])
+    model = replace(plain, sources=replace(linear.sources, pins=pins))
     whole = model.deviation()[:, 0] ** 2
     parts = np.nan_to_num(model.share()[:, :, 0]) * whole[:, None]
     return (parts, whole) if np.isfinite(whole).all() else None

@@ -114,7 +114,7 @@ class MethodResult:
         Estimates of all methods that `auto` tried.
     normal : (ndarray, ndarray) or None
         Mean, shape (channels, poses), and covariance, shape (poses, channels, channels), of errors that are not drawn
-        (radians, lengths); None where the method gives none.
+        (radians, lengths), of the channels of the linear model's `whole`; None where the method gives none.
     cycles : tuple of Estimate
         One for each design; empty where no cycle is estimated.
     method : str
@@ -137,7 +137,7 @@ class MethodResult:
     def moments(self, task: Task) -> tuple[Floats, Floats]:
         """Mean and covariance of the errors, in the shapes of `normal`, or those of the samples; nan where unknown."""
         if self.normal is not None:
-            return self.normal
+            return task.linear.own(*self.normal)
         channels, poses = task.nominal.shape
         mean, covariance = np.full((channels, poses), np.nan), np.full((poses, channels, channels), np.nan)
         for pose, sums in self.sums.items():

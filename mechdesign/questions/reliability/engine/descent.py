@@ -19,6 +19,9 @@ _FRACTIONS = np.array([0.5, 0.25, 0.0625])
 # over the margin at the mean, is this small.
 _SHORT_STEP = 5e-3
 _ZERO_MARGIN = 1e-2
+# Margin, over that at the mean, beyond which a point is off its limit; distance of a limit that is far from the mean.
+_OFF_MARGIN = 0.5
+_FAR_LIMIT = 8.0
 # A step that leaves more than this share of the merit gains little.
 _LITTLE_GAIN = 0.95
 # Two points differ where their directions are farther apart on the circle than this.
@@ -74,9 +77,13 @@ def descend(
         at = u[:, lanes]
         step = slope * (((slope * at).sum(axis=0) - g) / size) - is_normal * at
         normal[:, lanes] = -slope / np.sqrt(size)
-        weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
-        before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
         trial = at + step
+        weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
+        # Where the mean fails, or a limit is far, a step to it must count for more than the distance that it costs.
+        way = (trial**2).sum(axis=0)
+        far_off = (g < -_OFF_MARGIN) | ((g > _OFF_MARGIN) & (way > _FAR_LIMIT**2))
+        weight = np.where(far_off, np.maximum(weight, way / np.maximum(np.abs(g), _OFF_MARGIN)), weight)
+        before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
         merit = _merit(problem, trial, limit[lanes], scale, weight)
         far = np.linalg.norm(step, axis=0) >= _SHORT_STEP * (1 + np.linalg.norm(at, axis=0))
         # A whole step that gains little would oscillate about the nearest point.

@@ -48,6 +48,8 @@ _TURNS = 6
 _NO_TURN = 0.02
 # Design points farther than the nearest one by this many standard deviations are neglected.
 _FARTHEST = 4.0
+# Distance beyond which nothing fails: the probability is too small a number.
+_NEVER = 37.0
 # Points, limits, normals and pulls as in `DesignPoints`, the points and normals of shape (dimension, points).
 _PointArrays = tuple[Floats, Ints, Floats, Floats]
 
@@ -225,10 +227,11 @@ def _distinct(problem: Problem, parts: Sequence[_PointArrays], failures: Floats,
     """Design points, the nearest first and each once; `lost` are limits that every explored sample breaks."""
     u, normal = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 2))
     limit, pull = (np.concatenate([part[k] for part in parts]) for k in (1, 3))
-    order = np.argsort((u * normal).sum(axis=0), kind="stable")
+    distance = (u * normal).sum(axis=0)
+    order = np.argsort(distance, kind="stable")
     kept: list[int] = []
     for k in order.tolist():
-        if len(kept) == MAX_POINTS:
+        if len(kept) == MAX_POINTS or distance[k] > _NEVER:
             break
         if not any(alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
             kept.append(k)

@@ -42,7 +42,7 @@ def run(name: str, task: Task) -> MethodResult:
 def normal(task: Task, mean: Floats, covariance: Floats) -> MethodResult:
     """Result for normal errors with these means, shape (channels, poses), and covariances, (poses, channels, channels).
 
-    Its estimates have no interval.
+    The channels are those of the linear model's `whole`. Its estimates have no interval.
     """
     estimates = of_normal(task, task.question, mean, covariance) if task.question.limited else {}
     return MethodResult(estimates, normal=(mean, covariance))
@@ -84,7 +84,7 @@ def of_limits(task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodRe
 
 def of_moments(task: Task, work: Callable[[Task, Setting], tuple[Floats, Floats]]) -> MethodResult:
     """Result as of `normal`, from the mean, shape (channels,), and the covariance by `work`, as `pose_by_pose`."""
-    mean = np.full(task.nominal.shape, np.nan)
+    mean = np.full((len(task.question.rows), task.poses.count), np.nan)
     covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
     try:
         for pose, (middle, spread) in _at_poses(task, work):

@@ -8,4 +8,4 @@ from mechdesign.questions.reliability.task import MethodResult, Task
 
 def run(task: Task) -> MethodResult:
     """Normal errors of the linear model."""
-    return normal(task, task.linear.shift(), task.linear.covariance())
+    return normal(task, task.linear.whole.shift(), task.linear.whole.covariance())

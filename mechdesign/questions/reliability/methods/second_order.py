@@ -7,7 +7,7 @@ error = f0 + a z + z H z / 2 for deviations z of all that varies; mean and covar
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
 
@@ -74,7 +74,20 @@ def run(task: Task) -> MethodResult:
 
 
 def _at_pose(steps: Floats, law: Cumulants, task: Task, setting: Setting) -> tuple[Floats, Floats]:
-    return quadratic(setting, task.sources, steps).moments(law)
+    question, count = task.question, len(task.question.channels)
+    # Components of lengths are smooth; their moments are of values, not of errors.
+    smooth = replace(question, channels=question.whole)
+    elastic = None if task.elastic is None else task.elastic.take([setting.pose]).of(question.whole, smooth.vectors)
+    centres = [*setting.centres, *[0.0] * (len(question.whole) - count)]
+    whole = replace(setting, question=smooth, centres=centres, elastic=elastic)
+    mean, covariance = quadratic(whole, task.sources, steps).moments(law)
+    rows = np.array(question.rows)
+    mean, covariance = mean[rows], covariance[np.ix_(rows, rows)]
+    mean[rows < 0] = covariance[rows < 0] = covariance[:, rows < 0] = 0.0
+    # Without a first order there is no second one.
+    lost = np.flatnonzero(np.isnan(task.linear.whole.components[:, :, setting.pose]).any(axis=1))
+    mean[lost] = covariance[lost] = covariance[:, lost] = np.nan
+    return mean, covariance
 
 
 def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:

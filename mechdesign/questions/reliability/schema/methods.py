@@ -75,7 +75,8 @@ _METHODS = (
     Method(
         "analytic", "first order", "first-order errors, normal",
         "The first answer, and that of optimize for every design: it solves no made mechanism. It is right where the "
-        "errors are linear over the tolerances, and misses the shift of the mean at a dead centre.",
+        "errors are linear over the tolerances, and of lengths about zero, which have their own law; it misses the "
+        "shift of the mean at a dead centre.",
         1, "BLUE", "D", "-", pin="analytic",
     ),
     Method(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Floats
@@ -26,6 +28,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.reliability.deflection import elasticity
     from mechdesign.questions.reliability.first_order import linear_errors, linear_margins, nominal_values
     from mechdesign.questions.reliability.forces import force_model, pace
+    from mechdesign.questions.reliability.lengths import model_of
     from mechdesign.questions.reliability.probability import made_failure
     from mechdesign.questions.reliability.question import ask
     from mechdesign.questions.reliability.study_sources import find_sources
@@ -45,9 +48,13 @@ def prepare(study: Study) -> Evaluate:
     bent = elasticity(study)[0]
 
     def evaluate(configuration: Configuration) -> Floats:
-        elastic = None if bent is None else bent.at(configuration, question.channels)
-        linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic, forces)
-        bands = question.at(nominal_values(mechanism, configuration, question.channels, rates, forces)).bands
+        elastic = None if bent is None else bent.at(configuration, question.whole)
+        linear = linear_errors(mechanism, configuration, question.whole, sources, rates, elastic, forces)
+        nominal = np.stack(np.broadcast_arrays(
+            *nominal_values(mechanism, configuration, question.whole, rates, forces), linear.offset[0]
+        )[:-1])  # fmt: skip
+        linear = model_of(question, linear, nominal)
+        bands = question.at(nominal).bands
         return 1.0 - made_failure(linear, linear_margins(mechanism, configuration, sources), bands, question.discs)
 
     return of_configurations(evaluate)
