@@ -118,7 +118,8 @@ class Margins:
         slides: Sequence[Value] = configuration.slides
         if self.legs and not self.plan.iterative:
             # Solved again, as lengths of poses that are not valid are nan.
-            slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given)).slides
+            turns = self.plan.near_of(configuration)
+            slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given), turns=turns).slides
         return [*(slides[slide] for slide in self.legs), *(given[k] for _, k in self.plan.structure.spans)]
 
     def _across(self, configuration: Configuration, index: int) -> Value:
@@ -222,15 +223,14 @@ def _fold(
     """The place of a fold of group `index`, and the state there."""
     from scipy.optimize import root
 
-    group, size = plan.structure.groups[index], plan.core.size
+    group, size, turns = plan.structure.groups[index], plan.core.size, plan.near_of(near)
     own = np.array(guess[plan.structure.unknowns[index]], dtype=float)
     weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
 
     def state_at(unknowns: Floats) -> State:
         """The mechanism up to the group, for the group's unknowns and the place, each in its own scale."""
         values = [np.asarray(value) for value in given(place + reach * unknowns[-1])]
-        state = State.start(plan.core.graph, plan.structure, near.vectors, values)
-        state.size = size
+        state = plan.begin(values, near.vectors, turns)
         run(state, plan.modes_at(values)[:index], guess)
         state.put(group, unknowns[:-1] * weights)
         return state

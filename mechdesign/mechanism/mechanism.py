@@ -161,7 +161,7 @@ class Mechanism(Core):
             given.append(0.0 if value is None else value)
         guess = self.sketch.unknowns(plan.structure) if plan.iterative else None
         values = [np.asarray(g) for g in given]
-        state = plan.run(values, self.geometry.nominal, guess)
+        state = plan.run(values, self.geometry.nominal, guess, turns=())
         reached = state.solved(()) if plan.iterative else None
         configuration = plan.configuration(state, (), {}, reached)
         if not configuration.valid:
@@ -288,7 +288,7 @@ class Variant(Mechanism):
 
     def _assemble_sketch(self) -> Configuration:
         before, changed = self.original.nominal, self._changed
-        if self.forward.iterative:
+        if self.forward.continued:
             pose = begun(self.original, changed)
             return replace(pose, places={name: v for name, v in pose.places.items() if v == before[name]})
         pose = drawn(self.original, changed)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.curve.anchors import Anchors
 from mechdesign.curve.corners import curve_of
 from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
@@ -141,12 +142,16 @@ def _solve_group(
     if angles and curve is None:
         curve = curve_of(study, poses, angles)
 
+    anchors = anchors_of(study, poses, plan, curve)
+
     def at(piece: slice) -> Configuration:
         """Poses of some rows, not yet judged by the limits."""
         rows = group.rows[piece]
         columns = zip(plan.structure.given, group.columns(), strict=True)
         values = [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
-        start = starts(mechanism, poses, rows) if plan.iterative else None
+        start = starts(mechanism, poses, rows) if plan.continued else None
+        if plan.angles and anchors is not None:
+            start = anchors.at(*np.divmod(rows, poses.line))
         return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
 
     turns = _Turns(study, poses, angles, curve)
@@ -221,6 +226,13 @@ class _Turns:
                 turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, sizes))
                 values += TURN * np.repeat(turns, lines.shape[1])
         return np.nan_to_num(table)
+
+
+def anchors_of(study: Study, poses: Poses, plan: Plan, curve: Curve | None = None) -> Anchors | None:
+    """Poses that count turns along the motions that some poses are; None where turns do not count, and of places."""
+    if not plan.angles or poses.listed or poses.regions:
+        return None
+    return Anchors(study, poses, plan) if curve is None else curve.anchors
 
 
 def dimensions(poses: Poses, rows: Ints) -> dict[str, Value]:
@@ -394,7 +406,8 @@ def solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
     names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
     values = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
-    return plan.solve(values)
+    anchors = anchors_of(study, poses, plan)
+    return plan.solve(values, start=None if anchors is None else anchors.at(*np.divmod(rows, poses.line)))
 
 
 def _rows(poses: Poses, most: int) -> Ints:
