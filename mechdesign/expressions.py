@@ -26,6 +26,8 @@ Number = float | Floats
 
 # Powers up to this have no narrow peaks.
 MILD_POWER = 4
+# Beyond its ends a table holds for this part of its length, by which angles in degrees are rounded.
+TABLE_ROUNDING = 1e-12
 # Longest text accepted, in characters, and its deepest nesting of parentheses.
 MAX_TEXT = 1000
 MAX_NESTING = 50
@@ -184,8 +186,12 @@ class Tabulated:
     def _at(self, x: Any, order: int) -> Any:
         if isinstance(x, Dual):
             return Dual(self._at(x.value, order), self._at(x.value, order + 1) * x.slope)
-        first = self.rows[0][0]
-        return self._spline(first + np.mod(np.subtract(x, first), self.period) if self.period else x, order)
+        first, last = self.rows[0][0], self.rows[-1][0]
+        if self.period:
+            return self._spline(first + np.mod(np.subtract(x, first), self.period), order)
+        # At an end of the table rounding of what is looked up must not lose its value.
+        inside = np.clip(x, first, last)
+        return self._spline(np.where(np.abs(inside - x) <= TABLE_ROUNDING * (last - first), inside, x), order)
 
     def value(self, x: Any) -> Any:
         """Value of the spline."""

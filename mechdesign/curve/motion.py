@@ -36,6 +36,8 @@ BEYOND = 1e-9
 ON_THE_CUT = 1e-9
 # Number of neighbouring floating-point numbers around a dead centre among which the last valid pose is sought.
 STRAIGHT = 128
+# Places by which an interval is divided to find the last one at which a coupling has a value.
+SECTIONS = 33
 # Distance inside a motion at which its ends are evaluated, as a part of the motion.
 INSET = 1e-9
 
@@ -280,8 +282,16 @@ class Curve:
                 turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
             row[:, 0] += TURN * turns[rank]
 
-    def _fold(self, line: int, good: float, bad: float) -> float | None:
-        """Place at which a group without a closed form turns back, between `good`, where it closes, and `bad`."""
+    def _fold(self, number: int, line: int, good: float, bad: float) -> float | None:
+        """Where a group without a closed form turns back, or a coupling its last value, between `good` and `bad`."""
+        if self.margins.causes[number].role == "value":
+            while abs(bad - good) > np.spacing(max(abs(good), abs(bad))):
+                places = np.linspace(good, bad, SECTIONS)
+                valued = self._look(np.full(SECTIONS, line), places)[0][number] >= 0
+                valued[0], valued[-1] = True, False
+                last = int(valued.argmin()) - 1
+                good, bad = float(places[last]), float(places[last + 1])
+            return good
         fold = self.turning_point(line, good, abs(bad - good))
         return None if fold is None else fold[0]
 

@@ -13,7 +13,7 @@ from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.cams import cams
-from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Linearization
@@ -216,7 +216,7 @@ class Mechanism(Core):
         configuration = plan.solve(given, dims, jobs=None)
         if configuration.shape == () and not configuration.valid:
             where = ", ".join(f"{name} = {float(np.asarray(value)):g}" for name, value in pose.items())
-            raise AssemblyError(f"pose {where}: {Reason(int(configuration.reason)).text}")
+            raise AssemblyError(f"pose {where}: {self.why(int(configuration.reason))}")
         return Pose(self, configuration)
 
 

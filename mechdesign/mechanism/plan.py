@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,12 +13,12 @@ from mechdesign.mechanism.algebra import TURN, Value, angle_of, nearest, picked,
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
-from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.coordinates import Coordinate, angles_of, leaves
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
 from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
-from mechdesign.mechanism.structure import Structure
+from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.threads import keep_freed_memory
@@ -397,6 +397,9 @@ class Plan:
             solved = state.solved(shape)
             reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
             reason[~reached & ~solved] = Reason.NOT_CLOSED
+        for number, lost in self._lost_values(state):
+            first = lost & (reason < Reason.NO_VALUE)
+            reason[np.broadcast_to(first, shape)] = Reason.NO_VALUE + number
         nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
         if (reason != Reason.OK).any():
             lost = reason != Reason.OK
@@ -407,6 +410,22 @@ class Plan:
             graph, state.vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
             self.turns(given or (), dims), frozenset() if given is None else self.counted,
         )  # fmt: skip
+
+    def _lost_values(self, state: State) -> Iterator[tuple[int, Flags]]:
+        """Couplings that have no value at some poses though what they follow has, in the order of solution."""
+        for group in self.structure.groups:
+            if group.form == "coupled" and not np.isfinite(state.given[group.conditions[0]]).all():
+                number = self.coupling_of(group)
+                values = [state.pose().value(part) for part in leaves(self.structure.functions[number])]
+                known = [np.isfinite(value) for value in values]
+                yield (
+                    number,
+                    np.all(np.broadcast_arrays(~np.isfinite(state.given[group.conditions[0]]), *known), axis=0),
+                )
+
+    def coupling_of(self, group: Group) -> int:
+        """Number of the coupling whose value a coupled group is."""
+        return group.conditions[0] - len(self.structure.given)
 
     def judge(self, configuration: Configuration) -> None:
         """Set the reason of solved poses that are outside the study's limits."""

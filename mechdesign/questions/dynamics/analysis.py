@@ -31,7 +31,7 @@ from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, solve_rows, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
@@ -152,6 +152,18 @@ def _group(passage: Passage) -> Group:
     return Group(np.arange(poses.designs), result, ends)
 
 
+def _undefined(study: Study, poses: Poses, row: int) -> str:
+    """What leaves the forces at a row without a value: the slope of a coupling, or else a load."""
+    configuration = solve_rows(study, poses, np.array([row]))
+    for coupling in study.mechanism.couplings:
+        function = coupling.function
+        if function.expression is not None:
+            slopes = function.expression.derivatives(configuration.user_values(function)).values()
+            if not all(np.isfinite(slope).all() for slope in slopes):
+                return f"the slope of coupling '{coupling.name}' is infinite"
+    return "an expression of the loads has no value"
+
+
 def _end(passage: Passage, along: Along | None, k: int) -> End:
     """How design `k` was answered."""
     poses, study = passage.question.poses, passage.question.study
@@ -170,7 +182,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         ))  # fmt: skip
     mark = passage.marks[k]["undefined"]
     if mark.number:
-        message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
+        message = f"{_undefined(study, poses, mark.first)} at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     for name, mark in passage.marks[k].items():
         if name.startswith(_LIFTED) and mark.number:
@@ -178,7 +190,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
-    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
+    missing = [invalid_in_words(study, reason), along.missing(k) if along is not None else ""]
     if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
         settled = "beams or bearings with 'moment' in 'stiffness' settle it"
         if friction is not None:

@@ -107,7 +107,7 @@ def _end(passage: Passage, events: _Events, k: int) -> End:
         warnings, failed = _warnings(own, passage, events, k, reason == 0)
     except AssemblyError as error:
         return End(counts=counts, error=error)
-    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
+    missing = [invalid_in_words(question.study, reason), along.missing(k) if along is not None else ""]
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
 
 
