@@ -77,12 +77,12 @@ def test_forces_without_a_value_are_told_as_the_coupling_s(law: str, words: str)
 
 def test_a_pose_that_a_coupling_does_not_give_is_an_error_with_its_name() -> None:
     study = study_of(valve(TABLE, 30))
-    with pytest.raises(AssemblyError, match="'lift' has no value: 'cam' is outside of its table, -10 to 118.25"):
+    with pytest.raises(AssemblyError, match="'lift' has no value: 'cam' is outside of its table"):
         study.mechanism.solve({"cam": 130})
     with pytest.raises(AssemblyError, match="no pose is valid; cam = 130 deg: coupling 'lift' has no value"):
         kinematics(study_of(valve(TABLE, 30, 130, 190)))
     forward = "{forward: {start: {cam: 130}, duration: 1}}"
-    with pytest.raises(AssemblyError, match="the start of dynamics.forward: coupling 'lift' has no value"):
+    with pytest.raises(AssemblyError, match=r"the start of dynamics\.forward: coupling 'lift' has"):
         dynamics(study_of(valve(TABLE, 30), f"dynamics={forward}"))
 
 
