@@ -28,7 +28,7 @@ requirements:
   - {result: kinematics.F.y.max, at_most: 1000, unassembled: allowed}
 """
 TABLE = "of: cam, table: [[-10, 10], [30, 12], [60, 14], [118.25, 9]]"
-SLIT = "to: 12 + sqrt(abs(cam - 97.3) - 5.1)"
+SLIT = "to: 12 + sqrt(abs(cam - 97.3) - 0.4)"
 
 
 def valve(law: str, step: float, begin: float = 0, end: float = 180, unit: str = "deg") -> str:
@@ -39,8 +39,8 @@ def valve(law: str, step: float, begin: float = 0, end: float = 180, unit: str =
 @pytest.mark.parametrize(
     ("law", "ends"),
     [
-        (TABLE, [118.25]), ("to: 12 + sqrt(100.7 - cam)", [100.7]), ("to: 12 - log(2 - cam/66.25)", [132.5]),
-        (SLIT, [92.2, 102.4]),
+        (TABLE, [118.25]), ("to: 12 + sqrt(100.7 - cam)", [100.7]), ("to: 12 + log(2 - cam/66.25)", [132.5]),
+        (SLIT, [96.9, 97.7]),
     ],
 )  # fmt: skip
 def test_a_motion_ends_where_a_coupling_has_its_last_value(law: str, ends: list[float], step: float) -> None:
