@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
@@ -31,6 +31,7 @@ from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, solve_rows, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
@@ -191,6 +192,10 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
     missing = [invalid_in_words(study, reason), along.missing(k) if along is not None else ""]
+    jumps = velocity_jumps(passage.question, study.mechanism.description.masses, k)
+    if len(jumps):
+        warnings.append(jumps_in_words(passage.question, jumps, "dynamics", k))
+        missing.append(f"the impulses of {counted(len(jumps), 'velocity jump')} are missing")
     if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
         settled = "beams or bearings with 'moment' in 'stiffness' settle it"
         if friction is not None:

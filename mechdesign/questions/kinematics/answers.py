@@ -25,6 +25,7 @@ from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, without_centre
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
+from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import invalid_in_words, judge_failures
 from mechdesign.questions.together import End, Group
 from mechdesign.results import Result, Scope
@@ -125,6 +126,9 @@ def _warnings(
     reason = passage.reason.reshape(-1, len(valid))[k]
     warnings, failed = judge_failures(question.study, question.poses, reason, table="motion")
     warnings += remarks(question, marks)
+    jumps = velocity_jumps(passage.question, question.study.mechanism.description.links, k)
+    if len(jumps):
+        warnings.append(jumps_in_words(passage.question, jumps, "motion", k))
     if along is None:
         warnings += unfollowed(question.poses)
     else:
