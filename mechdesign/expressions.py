@@ -202,9 +202,28 @@ class Tabulated:
         return (self._at(x, 1),)
 
 
-# What an expression calls: a function by its name, or a table.
-Called = str | Tabulated
-Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated]
+@dataclass(frozen=True)
+class Repeated:
+    """A number less whole periods, from `first` on: what follows from it repeats."""
+
+    first: float
+    period: float
+    angles: Literal[""] = ""
+
+    def value(self, x: Any) -> Any:
+        """The number within the first period."""
+        if isinstance(x, Dual):
+            return Dual(self.value(x.value), x.slope)
+        return self.first + np.mod(np.subtract(x, self.first), self.period)
+
+    def partials(self, x: Any) -> tuple[Any]:
+        """Its derivative."""
+        return (1.0,)
+
+
+# What an expression calls: a function by its name, a table, or what makes it repeat.
+Called = str | Tabulated | Repeated
+Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated | Repeated]
 
 
 @dataclass(frozen=True)
@@ -265,6 +284,12 @@ class Expression:
     def table(self) -> Tabulated | None:
         """The table that it calls; None where it calls none."""
         return next((step for _, step in self.program if isinstance(step, Tabulated)), None)
+
+    def repeated(self, name: str, first: float, period: float) -> Expression:
+        """The expression with its values in a period of a variable, from `first` on, again in every other period."""
+        again: Step = ("call", Repeated(first, period))
+        program = [part for step in self.program for part in ((step, again) if step == ("name", name) else (step,))]
+        return replace(self, program=tuple(program))
 
     def is_linear(self) -> bool:
         """Whether the expression is linear in its variables, judged by its form."""
@@ -365,7 +390,7 @@ class Expression:
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if isinstance(item, Tabulated):
+                if isinstance(item, Tabulated | Repeated):
                     stack[-1:] = [call(item, stack[-1:])]
                 elif kind == "call":
                     count = arity(str(item))
@@ -410,7 +435,7 @@ class Expression:
                 total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
         return function.value(*values) * outer, total
 
-    def _angle_factors(self, function: _Function | Tabulated) -> tuple[float, float]:
+    def _angle_factors(self, function: _Function | Tabulated | Repeated) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
@@ -436,6 +461,8 @@ def _corners(
     """Programs, levels and periods of the corners of a call, and whether it has peaks; see `Corner`."""
     if isinstance(function, Tabulated):
         yield inner[0], tuple(place for place, _ in function.rows), function.period, False
+    elif isinstance(function, Repeated):
+        yield inner[0], (function.first,), function.period, False
     elif function in ("min", "max"):
         yield _call_steps("-", inner), (0.0,), 0.0, False
     elif function in ("abs", "sqrt", "log"):
@@ -462,8 +489,8 @@ def _corners(
             yield inner[0], (), 0.0, True
 
 
-def _function(called: Called) -> _Function | Tabulated:
-    return called if isinstance(called, Tabulated) else _FUNCTIONS[called]
+def _function(called: Called) -> _Function | Tabulated | Repeated:
+    return _FUNCTIONS[called] if isinstance(called, str) else called
 
 
 def _constant_step(value: float) -> tuple[Step, ...]:

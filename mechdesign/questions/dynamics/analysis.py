@@ -26,6 +26,7 @@ from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.cams import beyond_profile, outside
 from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
@@ -109,7 +110,7 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
         marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
         unknown &= ~friction.jammed(motion.arrays)
     singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
-    return {"singular": singular, "undefined": undefined, **marks} | {
+    return {"singular": singular, "undefined": undefined, **marks, **outside(motion)} | {
         f"{_LIFTED}{coupling}": where for coupling, where in lift_off.lifted(motion)
     }  # fmt: skip
 
@@ -185,6 +186,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if mark.number:
         message = f"{_undefined(study, poses, mark.first)} at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    warnings += beyond_profile(study, poses, passage.marks[k], "dynamics", k)
     for name, mark in passage.marks[k].items():
         if name.startswith(_LIFTED) and mark.number:
             warnings.append(lift_off.caution(study, poses, name.removeprefix(_LIFTED), mark, k))

@@ -10,6 +10,7 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics import targets
+from mechdesign.questions.kinematics.cams import beyond_profile, outside
 from mechdesign.questions.kinematics.instant_centres import REST, TRANSLATION
 from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
 from mechdesign.questions.kinematics.passage import Mark
@@ -38,6 +39,7 @@ def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution
     cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
     if question.friction is not None:
         cautions += question.friction.cautions(question.study, question.poses, marks, _TABLE)
+    cautions += beyond_profile(question.study, question.poses, marks, _TABLE)
     return cautions + _untargeted(question, marks)
 
 
@@ -96,6 +98,7 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
         marks[_NEAR] = valid & steady & _near(motion)
     if question.friction is not None:
         marks |= {name: valid & where for name, where in question.friction.marks(arrays).items()}
+    marks |= outside(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
     for centre in question.centres:
