@@ -204,17 +204,18 @@ class Tabulated:
 
 @dataclass(frozen=True)
 class Repeated:
-    """A number less whole periods, from `first` on: what follows from it repeats."""
+    """A number within a period from `first` on, whole periods aside: what follows from it repeats."""
 
     first: float
     period: float
     angles: Literal[""] = ""
 
     def value(self, x: Any) -> Any:
-        """The number within the first period."""
+        """The number within the first period, both ends of which are kept."""
         if isinstance(x, Dual):
             return Dual(self.value(x.value), x.slope)
-        return self.first + np.mod(np.subtract(x, self.first), self.period)
+        away = np.subtract(x, self.first)
+        return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
 
     def partials(self, x: Any) -> tuple[Any]:
         """Its derivative."""

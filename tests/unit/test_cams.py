@@ -210,7 +210,7 @@ def test_what_is_wrong_with_a_cam_is_said() -> None:
     assert "the profile is undercut" in cut
     (opened,) = warnings_of(study_of(SLIDING % "to: 40 + cam/40, cam: {link: disc, roller: F, radius: 5}"))
     assert "does not close after a turn" in opened
-    (broken,) = warnings_of(study_of(SLIDING % "to: 40 + 2*abs(sin(cam)), cam: {link: disc, roller: F, radius: 5}"))
+    broken, _ = warnings_of(study_of(SLIDING % "to: 40 + 2*abs(sin(cam)), cam: {link: disc, roller: F, radius: 5}"))
     assert "the law of the follower has a corner (0, 180)" in broken
 
 
