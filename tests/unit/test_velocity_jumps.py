@@ -75,7 +75,7 @@ def test_a_corner_of_a_path_takes_an_impulse(path: str, corners: int) -> None:
     ("to", "places"),
     [
         ("40 + 10*abs(sin(theta))", ["theta = 180 deg"]), ("max(0, theta - 123.4)", ["theta = 123.4 deg"]),
-        ("40 + 10*sin(theta)", []), ("abs(theta - 123.4)*(theta - 123.4)/50", []),
+        ("40 + 10*sin(theta)", []), ("theta + max(0, theta - 123.4)**2/200", []),
     ],
 )  # fmt: skip
 def test_a_corner_of_a_coupling_takes_an_impulse(to: str, places: list[str], step: int) -> None:
