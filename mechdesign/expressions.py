@@ -26,6 +26,8 @@ Number = float | Floats
 
 # Powers up to this have no narrow peaks.
 MILD_POWER = 4
+# Beyond its ends a table holds for this part of its length, by which angles in degrees are rounded.
+TABLE_ROUNDING = 1e-12
 # Longest text accepted, in characters, and its deepest nesting of parentheses.
 MAX_TEXT = 1000
 MAX_NESTING = 50
@@ -184,8 +186,12 @@ class Tabulated:
     def _at(self, x: Any, order: int) -> Any:
         if isinstance(x, Dual):
             return Dual(self._at(x.value, order), self._at(x.value, order + 1) * x.slope)
-        first = self.rows[0][0]
-        return self._spline(first + np.mod(np.subtract(x, first), self.period) if self.period else x, order)
+        first, last = self.rows[0][0], self.rows[-1][0]
+        if self.period:
+            return self._spline(first + np.mod(np.subtract(x, first), self.period), order)
+        # At an end of the table rounding of what is looked up must not lose its value.
+        inside = np.clip(x, first, last)
+        return self._spline(np.where(np.abs(inside - x) <= TABLE_ROUNDING * (last - first), inside, x), order)
 
     def value(self, x: Any) -> Any:
         """Value of the spline."""
@@ -196,9 +202,29 @@ class Tabulated:
         return (self._at(x, 1),)
 
 
-# What an expression calls: a function by its name, or a table.
-Called = str | Tabulated
-Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated]
+@dataclass(frozen=True)
+class Repeated:
+    """A number within a period from `first` on, whole periods aside: what follows from it repeats."""
+
+    first: float
+    period: float
+    angles: Literal[""] = ""
+
+    def value(self, x: Any) -> Any:
+        """The number within the first period, both ends of which are kept."""
+        if isinstance(x, Dual):
+            return Dual(self.value(x.value), x.slope)
+        away = np.subtract(x, self.first)
+        return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
+
+    def partials(self, x: Any) -> tuple[Any]:
+        """Its derivative."""
+        return (1.0,)
+
+
+# What an expression calls: a function by its name, a table, or what makes it repeat.
+Called = str | Tabulated | Repeated
+Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated | Repeated]
 
 
 @dataclass(frozen=True)
@@ -259,6 +285,12 @@ class Expression:
     def table(self) -> Tabulated | None:
         """The table that it calls; None where it calls none."""
         return next((step for _, step in self.program if isinstance(step, Tabulated)), None)
+
+    def repeated(self, name: str, first: float, period: float) -> Expression:
+        """The expression with its values in a period of a variable, from `first` on, again in every other period."""
+        again: Step = ("call", Repeated(first, period))
+        program = [part for step in self.program for part in ((step, again) if step == ("name", name) else (step,))]
+        return replace(self, program=tuple(program))
 
     def is_linear(self) -> bool:
         """Whether the expression is linear in its variables, judged by its form."""
@@ -371,7 +403,7 @@ class Expression:
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if isinstance(item, Tabulated):
+                if isinstance(item, Tabulated | Repeated):
                     stack[-1:] = [call(item, stack[-1:])]
                 elif kind == "call":
                     count = arity(str(item))
@@ -416,7 +448,7 @@ class Expression:
                 total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
         return function.value(*values) * outer, total
 
-    def _angle_factors(self, function: _Function | Tabulated) -> tuple[float, float]:
+    def _angle_factors(self, function: _Function | Tabulated | Repeated) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
@@ -442,6 +474,8 @@ def _corners(
     """Programs, levels and periods of the corners of a call, and whether it has peaks; see `Corner`."""
     if isinstance(function, Tabulated):
         yield inner[0], tuple(place for place, _ in function.rows), function.period, False
+    elif isinstance(function, Repeated):
+        yield inner[0], (function.first,), function.period, False
     elif function in ("min", "max"):
         yield _call_steps("-", inner), (0.0,), 0.0, False
     elif function in ("abs", "sqrt", "log"):
@@ -468,8 +502,8 @@ def _corners(
             yield inner[0], (), 0.0, True
 
 
-def _function(called: Called) -> _Function | Tabulated:
-    return called if isinstance(called, Tabulated) else _FUNCTIONS[called]
+def _function(called: Called) -> _Function | Tabulated | Repeated:
+    return _FUNCTIONS[called] if isinstance(called, str) else called
 
 
 def _constant_step(value: float) -> tuple[Step, ...]:

@@ -180,5 +180,9 @@ class Course(Spread, Protocol):
     def shown(self, place: float) -> str:
         """A place of the first design's motion in words."""
 
+    @property
+    def means_over(self) -> str:
+        """What means are over, in words; empty where it is time, or there is none."""
+
     def of(self, design: int) -> Course | None:
         """The column along the motion of one of the designs; None where it is not followed."""

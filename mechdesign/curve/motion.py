@@ -12,17 +12,16 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.curve.anchors import Anchors, inputs, steps_of
 from mechdesign.curve.pieces import Pieces, Search
 from mechdesign.expressions import Corner
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
-from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
-from mechdesign.mechanism.mechanism import begun
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -30,10 +29,6 @@ from mechdesign.study.poses import Poses
 BUDGET = 1 << 18
 # Poses solved at once: their arrays stay within some megabytes.
 AT_ONCE = 65536
-# Largest change of a given angle, and of a given length as a part of the mechanism's size, in one of the first pieces.
-FIRST_TURN, FIRST_LENGTH = np.pi / 4, 0.25
-# Largest number of poses of a motion from which groups without a closed form are continued.
-ANCHORS = 721
 # A motion ends at its first or last pose if it cannot go on this far beyond, as a part of the motion. The causes of
 # other ends are evaluated as far beyond these.
 BEYOND = 1e-9
@@ -41,13 +36,10 @@ BEYOND = 1e-9
 ON_THE_CUT = 1e-9
 # Number of neighbouring floating-point numbers around a dead centre among which the last valid pose is sought.
 STRAIGHT = 128
+# Places by which an interval is divided to find the last one at which a coupling has a value.
+SECTIONS = 33
 # Distance inside a motion at which its ends are evaluated, as a part of the motion.
 INSET = 1e-9
-
-
-def units_of(study: Study, coordinates: Sequence[Coordinate]) -> list[float]:
-    """The study's unit of each coordinate, in radians or as 1 for a length."""
-    return [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in coordinates]
 
 
 class Curve:
@@ -82,7 +74,7 @@ class Curve:
         self.mechanism: Mechanism = study.mechanism
         (group,) = poses.groups
         self.plan = self.mechanism.plan(group.names)
-        self._units = units_of(study, self.plan.structure.given)
+        self.anchors = Anchors(study, poses, self.plan) if self.plan.continued else None
         self.lines = poses.count // poses.line
         self.spent = np.zeros(self.lines, dtype=bool)
         self.margins = Margins(self.mechanism, self.plan)
@@ -107,9 +99,7 @@ class Curve:
 
     def inputs(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
         """Poses at places of lines, and what they give (radians, lengths)."""
-        poses = self.poses.along(line, s)
-        columns = zip(poses.groups[0].columns(), self._units, strict=True)
-        return poses, [np.asarray(column * unit, dtype=float) for column, unit in columns]
+        return inputs(self.study, self.plan, self.poses, line, s)
 
     def solve(
         self, line: Ints, s: Floats, *, judged: bool = True, turning: bool = True
@@ -202,20 +192,9 @@ class Curve:
 
     def _begin(self) -> Pieces:
         """Pieces between the corners of each line, so short that given coordinates change little in each."""
-        poses, end = self.poses, float(self.poses.end)
-        if not end > 0:
+        if not self.poses.end > 0:
             return Pieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
-        marks = np.unique(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
-        count = np.ones((self.lines, len(marks) - 1))
-        (group,) = poses.groups
-        for coordinate, column, unit in zip(self.plan.structure.given, group.columns(), self._units, strict=True):
-            size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * (self.mechanism.size or 1.0)
-            rows = column.reshape(self.lines, -1)
-            rows = np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows
-            way = np.concatenate([np.zeros((self.lines, 1)), np.cumsum(np.abs(np.diff(rows, axis=1)), axis=1)], axis=1)
-            at = np.clip(np.floor(marks), 0, rows.shape[1] - 2).astype(np.intp)
-            moved = np.diff(way[:, at] + (marks - at) * (way[:, at + 1] - way[:, at]), axis=1)
-            count = np.maximum(count, np.ceil(moved * unit / size - BEYOND))
+        marks, count = steps_of(self.study, self.plan, self.poses)
         self.spent |= count.sum(axis=1) * chebyshev.COUNT > BUDGET
         numbers: Ints = np.where(self.spent[:, None], 0, count).astype(np.intp)
         line, segment = (np.repeat(part.ravel(), numbers.ravel()) for part in np.indices(numbers.shape))
@@ -226,7 +205,7 @@ class Curve:
         return Pieces.of(line, begin, np.where(number + 1 == parts, high, stop))
 
     def _solved(self, line: Ints, s: Floats, poses: Poses, values: Sequence[Floats]) -> Configuration:
-        start = None if self._anchors is None else self._anchors.take(self._anchor_of(line, s))
+        start = None if self.anchors is None else self.anchors.at(line, s)
         vectors = self._vectors.take(line) if poses.places else None
         return self.plan.solve(values, poses.places, vectors=vectors, start=start, limits=False)
 
@@ -235,47 +214,6 @@ class Curve:
         """Edges of the mechanism, of each line."""
         first = self.poses.line * np.arange(self.lines)
         return self.mechanism.geometry.vectors({name: place[first] for name, place in self.poses.places.items()})
-
-    @cached_property
-    def _anchors(self) -> Configuration | None:
-        """Poses from which groups without a closed form are continued: some of each line, then the sketches."""
-        if not self.plan.iterative:
-            return None
-        rows = evenly(self.poses.line, ANCHORS)
-        line, s = (part.ravel() for part in np.meshgrid(np.arange(self.lines), rows.astype(float), indexing="ij"))
-        poses, values = self.inputs(line, s)
-        sketch = begun(self.mechanism, {name: v[:: len(rows)] for name, v in poses.places.items()})
-        start = sketch.take(line) if sketch.shape else sketch
-        solved = self.plan.solve(values, poses.places, start=start, limits=False)
-        if not sketch.shape:
-            sketch = replace(sketch, shape=(1,), reason=sketch.reason.reshape(1))
-        own = [np.broadcast_to(np.arange(sketch.shape[0]), (self.lines,))]
-        sketch = sketch.take(own[0])
-        places = {name: np.concatenate([v, v[:: len(rows)]]) for name, v in poses.places.items()}
-        # The sketch was solved by another plan, whose closures are others.
-        parts = [replace(part, closures=()) for part in (solved, sketch)]
-        anchors = joined(parts, (len(line) + self.lines,), self.mechanism.geometry.vectors(places), places)
-        near = {
-            angle.name: np.concatenate([np.broadcast_to(part.value(angle), part.shape) for part in parts])
-            for angle in self.plan.angles
-        }
-        anchors = replace(anchors, near=near)
-        # For each line and anchor the nearest valid anchor, or the sketch if the line has none.
-        valid = np.asarray(solved.valid).reshape(self.lines, -1)
-        numbers = np.arange(valid.shape[1])
-        away = np.where(valid[:, None, :], np.abs(numbers[:, None] - numbers), len(numbers))
-        nearest = away.argmin(axis=2) + len(numbers) * np.arange(self.lines)[:, None]
-        lost = np.broadcast_to(~valid.any(axis=1, keepdims=True), nearest.shape)
-        nearest = np.where(lost, len(line) + np.arange(self.lines)[:, None], nearest)
-        self._anchor_rows, self._nearest = rows, nearest
-        return anchors
-
-    def _anchor_of(self, line: Ints, s: Floats) -> Ints:
-        rows = self._anchor_rows
-        beside = np.clip(np.searchsorted(rows, s), 1, max(len(rows) - 1, 1))
-        before = np.minimum(beside, len(rows) - 1) - (len(rows) > 1)
-        nearer = np.where(s - rows[before] <= rows[np.minimum(beside, len(rows) - 1)] - s, before, beside)
-        return np.asarray(self._nearest[line, np.minimum(nearer, len(rows) - 1)])
 
     def _look(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         margins, angles = [], []
@@ -344,8 +282,16 @@ class Curve:
                 turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
             row[:, 0] += TURN * turns[rank]
 
-    def _fold(self, line: int, good: float, bad: float) -> float | None:
-        """Place at which a group without a closed form turns back, between `good`, where it closes, and `bad`."""
+    def _fold(self, number: int, line: int, good: float, bad: float) -> float | None:
+        """Where a group without a closed form turns back, or a coupling its last value, between `good` and `bad`."""
+        if self.margins.causes[number].role == "value":
+            while abs(bad - good) > np.spacing(max(abs(good), abs(bad))):
+                places = np.linspace(good, bad, SECTIONS)
+                valued = self._look(np.full(SECTIONS, line), places)[0][number] >= 0
+                valued[0], valued[-1] = True, False
+                last = int(valued.argmin()) - 1
+                good, bad = float(places[last]), float(places[last + 1])
+            return good
         fold = self.turning_point(line, good, abs(bad - good))
         return None if fold is None else fold[0]
 

@@ -117,8 +117,9 @@ def largest(best: Floats, line: Ints, values: Floats) -> None:
 # Margins of shape (causes, n), nan where an earlier one is negative, and angles of shape (angles, n), at places s of
 # some lines.
 Look = Callable[[Ints, Floats], tuple[Floats, Floats]]
-# Place on a line at which a group without a closed form turns back, between one where it closes and one where not.
-Fold = Callable[[int, float, float], float | None]
+# Place on a line at which a group without a closed form turns back, or a coupling loses its value, by the number of the
+# cause, between one where it does not and one where it does.
+Fold = Callable[[int, int, float, float], float | None]
 
 
 @dataclass
@@ -177,9 +178,9 @@ class Search:
             alike = np.isfinite(values).all(axis=1) & (positive.all(axis=1) | ~positive.any(axis=1))
             if not len(which):
                 break
-            if cause.role == "reached":
+            if cause.role in ("reached", "value"):
                 sure = alike
-                folded = self._folded(pieces.take(which), positive, alike)
+                folded = self._folded(pieces.take(which), positive, alike, number)
                 some, divided = np.flatnonzero([part is not None for part in folded]), [p for p in folded if p]
             else:
                 coefficients = chebyshev.series(values)
@@ -198,14 +199,14 @@ class Search:
             left[which[unsure | ~positive.any(axis=1) | (last & ~positive.all(axis=1))]] = False
         return left, halved, parts
 
-    def _folded(self, pieces: Pieces, positive: Flags, alike: Flags) -> list[Pieces | None]:
-        """The part of each piece up to the place where a group without a closed form turns back; None if not found."""
+    def _folded(self, pieces: Pieces, positive: Flags, alike: Flags, number: int) -> list[Pieces | None]:
+        """The part of each piece up to the place of a `fold`; None if not found."""
         parts: list[Pieces | None] = [None] * len(alike)
         for k in np.flatnonzero(~alike & (np.count_nonzero(np.diff(positive, axis=1), axis=1) == 1)).tolist():
             piece, node = pieces.take(np.array([k])), int(np.flatnonzero(np.diff(positive[k]))[0])
             good, bad = (node, node + 1) if positive[k, node] else (node + 1, node)
             places = piece.nodes[0]
-            place = self.fold(int(piece.line[0]), float(places[good]), float(places[bad]))
+            place = self.fold(number, int(piece.line[0]), float(places[good]), float(places[bad]))
             if place is None or not min(places[good], places[bad]) <= place <= max(places[good], places[bad]):
                 continue
             x, before = piece.within(np.array([place])), np.array([bad > good])

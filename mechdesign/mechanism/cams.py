@@ -24,7 +24,7 @@ import numpy as np
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import model
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet, rotation
+from mechdesign.mechanism.algebra import TURN, Value, Vector, cross, dot, norm2, quiet, rotation, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.derivatives import Linearization
@@ -41,6 +41,8 @@ UNMOVED = 1e-9
 MOST_PARTS = 100_000
 # The ends of a profile that closes meet within this part of its size, as do both sides of each place without a corner.
 CLOSED = 1e-6
+# Poses lie on the profile up to this part of its range beyond its ends.
+SLACK = 1e-9
 # Halvings by which a step over a smooth profile becomes shorter than half of itself, and those that find a corner.
 HALVINGS = (2, 30)
 
@@ -150,6 +152,26 @@ class Cam:
         drawn = self.plan.core.sketch_configuration
         given = [values if c.name == self.followed.name else drawn.value(c) for c in self.plan.structure.given]
         return self.plan.solve(given, places, limits=False)
+
+    def outside(self, configuration: Configuration) -> Flags:
+        """Poses at which what is followed lies beyond the profile; whole turns aside where the law repeats."""
+        first, last = self.given.span
+        slack = SLACK * (last - first)
+        away = np.asarray(configuration.value(self.followed)) - first + slack
+        away = np.mod(away, TURN) if self._repeats else away
+        return np.asarray((away < 0) | (away > last - first + 2 * slack))
+
+    @cached_property
+    def _repeats(self) -> bool:
+        """Whether the law is the same a turn of the cam later."""
+        if self.followed.quantity != "angle":
+            return False
+        one, other = (self.along(self.values + shift) for shift in (0.0, TURN))
+        lift, later = (np.broadcast_to(np.asarray(part.value(self.follower)), part.shape) for part in (one, other))
+        away = later - lift
+        if self.follower.quantity == "angle":
+            away = wrap(away)
+        return bool(np.abs(away).max() <= CLOSED * np.ptp(lift))
 
     @property
     def values(self) -> Floats:

@@ -19,13 +19,19 @@ from mechdesign.numerics.arrays import Complexes, Flags, Ints
 
 
 class Reason(IntEnum):
-    """Why a pose is not valid."""
+    """Why a pose is not valid. Numbers from `NO_VALUE` on are this reason too, of the first coupling and the next."""
 
     OK = 0
     NOT_CLOSED = 1
     OTHER_ASSEMBLY = 2
     LIMIT = 3
     NOT_HELD = 4
+    NO_VALUE = 5
+
+    @classmethod
+    def of(cls, number: int) -> Reason:
+        """The reason that a number stands for."""
+        return cls(min(number, cls.NO_VALUE))
 
     @property
     def text(self) -> str:
@@ -39,6 +45,8 @@ REASONS = {
     "other assembly": "the pose is not reached from the sketch without a singularity; draw the assembly that is meant",
     "limit": "a stated limit is passed; widen it, or leave the pose out",
     "does not hold its load": "a motion is free under the load; add a drive or a link",
+    "coupling without a value": "what it follows is outside of its table, or its expression has no value there; extend "
+    "it, or leave the pose out",
 }
 
 

@@ -6,12 +6,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity, play
 
+# The law of a cam closes after a turn where it misses its begin by less than this part of its lift.
+CLOSED = 1e-6
+# A span of so nearly a turn, as a part of it, is one: 2 pi is written 6.283.
+LIKE_A_TURN = 1e-3
 Kind = Literal["x", "y", "angle", "slide", "distance", "expression", "parameter"]
 
 
@@ -160,7 +166,8 @@ def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupl
     """Coordinates of a coupling; its function, with the play, and its gap have the unit of the one that follows."""
     follower = resolve(coupling.sets, description, graph)
     name = play(coupling.name).removeprefix(MEASURED)
-    with_play = replace(coupling.of, program=(*coupling.of.program, ("name", name), ("call", "+")))
+    law = _cam_law(coupling, description, graph)
+    with_play = replace(law, program=(*law.program, ("name", name), ("call", "+")))
     parts = _parts(with_play, description, graph)
     gap = replace(with_play, program=(("name", follower.name), *with_play.program, ("call", "-")))
     function, gap_of = (
@@ -168,6 +175,33 @@ def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupl
         for expression, own in ((with_play, {}), (gap, {follower.name: follower}))
     )
     return Coupled(coupling.name, follower, function, gap_of)
+
+
+def _cam_law(coupling: Coupling, description: Description, graph: Graph) -> Expression:
+    """What a coupling gives; the law of a cam that ends after a turn as it begins, with every turn of the cam again."""
+    law, cam = coupling.of, coupling.cam
+    if cam is None or abs(cam.span[1] - cam.span[0] - TURN) > LIKE_A_TURN * TURN or law.table is not None:
+        return law
+    parts, unit = _parts(law, description, graph), law.angle_unit
+    (followed,) = (part for part in parts.values() if part.kind != "parameter")
+    if followed.quantity != "angle":
+        return law
+    first, turn = cam.span[0] / unit, TURN / unit
+    places = [
+        description.places.get(MEASURED + name) or description.places[name] for name in parts if name != followed.name
+    ]
+    fixed = {
+        place.name.removeprefix(MEASURED): place.nominal / (unit if place.quantity == "angle" else 1.0)
+        for place in places
+    }
+    at = np.linspace(first, first + turn, cam.steps + 1)
+    values, later = (np.asarray(law.evaluate({**fixed, followed.name: at + shift})) for shift in (0.0, turn))
+    size = np.ptp(values)
+    if not abs(values[-1] - values[0]) <= CLOSED * size:
+        return law
+    if np.abs(later - values).max() <= CLOSED * size and not law.corners():
+        return law
+    return law.repeated(followed.name, first, turn)
 
 
 def _parts(expression: Expression, description: Description, graph: Graph) -> dict[str, Coordinate]:

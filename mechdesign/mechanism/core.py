@@ -13,7 +13,7 @@ import numpy as np
 
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import TURN, Value, Vector, norm2, wrap
-from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
@@ -114,6 +114,20 @@ class Core:
         self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+
+    def why(self, number: int) -> str:
+        """A reason of poses in words, see `Reason`; of a coupling without a value with its name."""
+        reason = Reason.of(number)
+        if reason != Reason.NO_VALUE:
+            return reason.text
+        coupling = self.couplings[number - Reason.NO_VALUE]
+        expression, parts = coupling.function.expression, coupling.function.parts
+        words = f"coupling '{coupling.name}' has no value"
+        if expression is None or expression.table is None:
+            return words
+        followed = next(part.name for part in parts if part.kind != "parameter")
+        first, last = (row[0] for row in (expression.table.rows[0], expression.table.rows[-1]))
+        return f"{words}: '{followed}' is outside of its table, {first:g} to {last:g}"
 
     @cached_property
     def meshes(self) -> list[Mesh]:

@@ -18,6 +18,7 @@ from mechdesign.mechanism.solve import State, run, solve_linear
 from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
+NO_VALUE = Reason.NO_VALUE.text
 # Largest residuals of a fold: of its equations (parts of the mechanism's size) and of the determinant (parts of the
 # determinant at the last pose).
 FOLD_SOLVED = 1e-9
@@ -31,14 +32,16 @@ class Cause:
     ----------
     kind : str
         ``dead centre``: a group of links is stretched or folded. ``singularity``: a group without a closed form turns
-        back, or the motion goes to infinity. ``leg at zero length``. ``limit``: a limit that the study states.
+        back, or the motion goes to infinity. ``leg at zero length``. ``coupling without a value``. ``limit``: a limit
+        that the study states.
     name, joint : str
         The links of the group and how they lie, and its joints; for legs and limits their names.
     group : int
         Index of the group among the plan's, -1 for legs and stated limits.
     role : str
         Which margin it has: ``closure`` of a group; ``across``, the sine between two slides (the motion goes to
-        infinity where its sign changes); ``reached``, 1 or -1, of a group without a closed form; ``leg``; ``limit``.
+        infinity where its sign changes); ``reached``, 1 or -1, of a group without a closed form; ``value``, the same of
+        a coupling; ``leg``; ``limit``.
     """
 
     kind: str
@@ -67,6 +70,9 @@ def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]
             listed.append(Cause(SINGULARITY, joint, joint, index, "across"))
         elif group.form == "newton":
             listed.append(Cause(SINGULARITY, joint, joint, index, "reached"))
+        elif group.form == "coupled":
+            name = mechanism.couplings[plan.coupling_of(group)].name
+            listed.append(Cause(NO_VALUE, name, name, index, "value"))
     listed += [Cause(ZERO_LENGTH, f"{leg} length", leg, -1, "leg") for leg in legs]
     stated = mechanism.margins(mechanism.sketch_configuration)
     return listed + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
@@ -100,6 +106,11 @@ class Margins:
             if cause.role == "reached":
                 row[:] = np.where(good, 1.0, np.where(ended, np.nan, -1.0))
                 lost, ended = ~good, ended | ~good
+            elif cause.role == "value":
+                number = self.plan.coupling_of(self.plan.structure.groups[cause.group])
+                without = configuration.reason == Reason.NO_VALUE + number
+                row[:] = np.where(without, -1.0, np.where(ended, np.nan, 1.0))
+                ended = ended | without
             elif cause.role == "across":
                 row[:] = np.where(lost, np.nan, self._across(configuration, cause.group))
             else:
@@ -118,7 +129,8 @@ class Margins:
         slides: Sequence[Value] = configuration.slides
         if self.legs and not self.plan.iterative:
             # Solved again, as lengths of poses that are not valid are nan.
-            slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given)).slides
+            turns = self.plan.near_of(configuration)
+            slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given), turns=turns).slides
         return [*(slides[slide] for slide in self.legs), *(given[k] for _, k in self.plan.structure.spans)]
 
     def _across(self, configuration: Configuration, index: int) -> Value:
@@ -222,15 +234,14 @@ def _fold(
     """The place of a fold of group `index`, and the state there."""
     from scipy.optimize import root
 
-    group, size = plan.structure.groups[index], plan.core.size
+    group, size, turns = plan.structure.groups[index], plan.core.size, plan.near_of(near)
     own = np.array(guess[plan.structure.unknowns[index]], dtype=float)
     weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
 
     def state_at(unknowns: Floats) -> State:
         """The mechanism up to the group, for the group's unknowns and the place, each in its own scale."""
         values = [np.asarray(value) for value in given(place + reach * unknowns[-1])]
-        state = State.start(plan.core.graph, plan.structure, near.vectors, values)
-        state.size = size
+        state = plan.begin(values, near.vectors, turns)
         run(state, plan.modes_at(values)[:index], guess)
         state.put(group, unknowns[:-1] * weights)
         return state

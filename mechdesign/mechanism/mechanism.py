@@ -13,7 +13,7 @@ from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.cams import cams
-from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Linearization
@@ -161,7 +161,7 @@ class Mechanism(Core):
             given.append(0.0 if value is None else value)
         guess = self.sketch.unknowns(plan.structure) if plan.iterative else None
         values = [np.asarray(g) for g in given]
-        state = plan.run(values, self.geometry.nominal, guess)
+        state = plan.run(values, self.geometry.nominal, guess, turns=())
         reached = state.solved(()) if plan.iterative else None
         configuration = plan.configuration(state, (), {}, reached)
         if not configuration.valid:
@@ -216,7 +216,7 @@ class Mechanism(Core):
         configuration = plan.solve(given, dims, jobs=None)
         if configuration.shape == () and not configuration.valid:
             where = ", ".join(f"{name} = {float(np.asarray(value)):g}" for name, value in pose.items())
-            raise AssemblyError(f"pose {where}: {Reason(int(configuration.reason)).text}")
+            raise AssemblyError(f"pose {where}: {self.why(int(configuration.reason))}")
         return Pose(self, configuration)
 
 
@@ -288,7 +288,7 @@ class Variant(Mechanism):
 
     def _assemble_sketch(self) -> Configuration:
         before, changed = self.original.nominal, self._changed
-        if self.forward.iterative:
+        if self.forward.continued:
             pose = begun(self.original, changed)
             return replace(pose, places={name: v for name, v in pose.places.items() if v == before[name]})
         pose = drawn(self.original, changed)

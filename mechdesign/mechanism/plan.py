@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,12 +13,12 @@ from mechdesign.mechanism.algebra import TURN, Value, angle_of, nearest, picked,
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
-from mechdesign.mechanism.coordinates import angles_of
+from mechdesign.mechanism.coordinates import Coordinate, angles_of, leaves
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
 from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
-from mechdesign.mechanism.structure import Structure
+from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.threads import keep_freed_memory
@@ -49,20 +49,34 @@ class Plan:
         solved = angles_of(structure.values[k] for k in linear).values()
         #: Angles of which linear couplings give the turns.
         self.solved = tuple(angle.name for angle in solved if structure.counted(angle, core.graph) is None)
-        # Angles in given expressions and in couplings; their turns are counted on the way from the sketch, unless they
-        # follow from values.
-        inner = angles_of(c for c in structure.values if c.kind == "expression")
-        left = [
-            angle for name, angle in inner.items()
-            if name not in self.counted.union(self.solved) and structure.counted(angle, core.graph) is None
-        ]  # fmt: skip
         self.iterative = any(group.form == "newton" for group in structure.groups)
-        if structure.functions and left and not self.iterative:
-            # Turns are those of a motion of the drives; in the plane of outputs they would depend on the way.
-            self.iterative = {c.name for c in structure.given} == core.description.drives.keys()
-        self.angles = tuple(left) if self.iterative or not structure.functions else ()
-        self.unfollowed = tuple(left) if not self.angles else ()
+        #: Angles in given expressions and in couplings whose turns are counted on the way from a start, as they do not
+        #: follow from values.
+        self.angles = self._counted_on_the_way()
         self.followers = tuple(coupling.follower for coupling in core.couplings)
+        # Given and coupled values that move these angles.
+        behind = frozenset[int]().union(*(structure.behind(angle, core.graph) for angle in self.angles))
+        moving = structure.coupled & {k for index in behind for k in structure.groups[index].conditions}
+        self._pacing = [*range(len(structure.given)), *sorted(moving)] if self.angles else []
+
+    @cached_property
+    def _within_given(self) -> tuple[str, ...]:
+        """Angles in given expressions, which keep their turns as the expressions do."""
+        within = angles_of(c for c in self.structure.given if c.kind == "expression").values()
+        return tuple(angle.name for angle in within if self.structure.counted(angle, self.core.graph) is not None)
+
+    @property
+    def continued(self) -> bool:
+        """Whether poses are continued from a start: for groups without a closed form, or to count turns."""
+        return self.iterative or bool(self.angles)
+
+    def _counted_on_the_way(self) -> tuple[Coordinate, ...]:
+        structure, graph = self.structure, self.core.graph
+        inner = angles_of(c for c in structure.values if c.kind == "expression")
+        return tuple(
+            angle for name, angle in inner.items()
+            if name not in self.counted.union(self.solved) and structure.counted(angle, graph) is None
+        )  # fmt: skip
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -92,16 +106,30 @@ class Plan:
         enough: float = CONVERGED,
         *,
         beyond: bool = False,
-        turns: Sequence[Value] | Floats = (),
+        turns: Sequence[Value] | Floats | None = None,
     ) -> State:
-        """Solve all groups, in the assembly as drawn or that of `modes`; `turns` has values near to the `angles`."""
-        state = State.start(self.core.graph, self.structure, vectors, given)
+        """Solve all groups, in the assembly as drawn or that of `modes`; `turns` as in `begin`."""
+        state = self.begin(given, vectors, turns)
         state.steps, state.enough, state.beyond = steps, enough, beyond
+        return run(state, self.modes if modes is None else modes, guess)
+
+    def begin(self, given: Sequence[Value], vectors: Vectors, turns: Sequence[Value] | Floats | None = None) -> State:
+        """The state before the first group; `turns` has values near to the `angles`, else these are near the sketch."""
+        state = State.start(self.core.graph, self.structure, vectors, given)
         state.size = self.core.size if self.iterative else 1.0
         state.whole, state.drawn = self._whole_turns, self._drawn_offsets
-        state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
-        state.near = {**state.near, **self._given_angles(given), **self._drawn_turns}
-        return run(state, self.modes if modes is None else modes, guess)
+        near = self._drawn_turns if turns is None else turns
+        state.near = {
+            **{angle.name: value for angle, value in zip(self.angles, near, strict=False)},
+            **self._given_angles(given),
+        }
+        return state
+
+    def near_of(self, configuration: Configuration) -> list[Value] | None:
+        """What `begin` takes to count the turns as in solved poses; None where it has none."""
+        names = [angle.name for angle in self.angles]
+        known = all(name in configuration.near for name in names)
+        return [configuration.near[name] for name in names] if known else None
 
     def start(self, at: Configuration | None) -> Start:
         """A solved pose to continue from; the sketch where left out."""
@@ -110,7 +138,8 @@ class Plan:
         guess = self.unknowns(at, given)
         turns = [at.value(angle) for angle in self.angles]
         state = self.run(given, at.vectors, guess, turns=turns)
-        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants], turns)
+        moving = [state.given[k] for k in self._pacing]
+        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants], turns + moving)
 
     def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
         """Unknowns of the groups without a closed form in a solved pose; `given` are its given coordinates."""
@@ -167,7 +196,7 @@ class Plan:
         if self.change_points is not None:
             self.change_points.cover(values[0])
         flat, sizes = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
-        length = CHUNK if self.iterative or worker_count(jobs) == 1 else THREAD_CHUNK
+        length = CHUNK if self.continued or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
             starts = np.broadcast_to(np.arange(start.reason.size).reshape(start.shape), shape).reshape(-1)
@@ -182,7 +211,7 @@ class Plan:
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
-        counted = sorted({*(angle.name for angle in self.angles), *self.coupled})
+        counted = sorted({*(angle.name for angle in self.angles), *self._within_given, *self.coupled})
         parts = [*parts] if counted else parts
         whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
@@ -205,21 +234,24 @@ class Plan:
         reached: Flags | None = None
         guess: Unknowns | None = None
         turns: Floats = np.empty((0, *shape))
-        if self.iterative:
+        if self.continued:
             begin = self.start(start)
             guess, reached, turns = self._follow(values, dims, shape, begin)
         vectors = vectors or self.core.geometry.vectors(dims)
         state = self.run(values, vectors, guess, self.modes_at(values), turns=turns)
-        if reached is not None:
+        if self.iterative and reached is not None:
             # The end of a path must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
+        else:
+            # What has closed forms needs no way; where there is none an angle is nearest to where the way ended.
+            reached = None
         poses = self.configuration(state, shape, dims, reached, values)
         if self.angles:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
             poses = replace(poses, near={**poses.near, **near})
-        if self.followers:
-            near = {**state.counted(self.followers), **{name: state.near[name] for name in self.solved}}
-            poses = replace(poses, near={**poses.near, **near})
+        near = {name: state.near[name] for name in (*self._within_given, *self.solved)}
+        if near or self.followers:
+            poses = replace(poses, near={**poses.near, **near, **state.counted(self.followers)})
         if limits:
             self.judge(poses)
         return poses
@@ -253,9 +285,9 @@ class Plan:
         }
 
     @cached_property
-    def _drawn_turns(self) -> dict[str, Value]:
-        """Angles in couplings whose turns are not counted, in the sketch."""
-        return {angle.name: self.core.sketch_configuration.value(angle) for angle in self.unfollowed}
+    def _drawn_turns(self) -> list[Value]:
+        """The `angles` in the sketch."""
+        return [self.core.sketch_configuration.value(angle) for angle in self.angles]
 
     @cached_property
     def _drawn_angles(self) -> dict[str, float]:
@@ -294,8 +326,9 @@ class Plan:
         ) -> tuple[State, Floats]:
             state = self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION, turns=near)
             there = state.pose()
-            turned = [np.broadcast_to(there.value(angle), near.shape[1:]) for angle in self.angles]
-            return state, np.array(turned).reshape(near.shape)
+            turned = [*(there.value(angle) for angle in self.angles), *(state.given[k] for k in self._pacing)]
+            shape = near.shape[1:]
+            return state, np.array([np.broadcast_to(value, shape) for value in turned]).reshape(near.shape)
 
         def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags, Floats]:
             def some(value: Value) -> Value:
@@ -310,8 +343,14 @@ class Plan:
                 self.core.nominal,
                 self.core.size,
                 count if rows is None else len(rows),
+                units,
             )
 
+        pacing = [self.structure.values[k] for k in self._pacing]
+        units = np.array([
+            *(angle.turn / TURN for angle in self.angles),
+            *(1.0 if c.quantity == "angle" else self.core.size or 1.0 for c in pacing),
+        ])  # fmt: skip
         given = [_flat(v, shape) for v in values]
         unknowns, reached, near = solve(given, None)
         # Where the given turns are not reached, the pose is the same with its angles less than half a turn away.
@@ -320,11 +359,12 @@ class Plan:
             for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
         ]
         other = np.any([np.broadcast_to(one != two, (count,)) for one, two in zip(given, turned, strict=True)], axis=0)
-        rows = np.flatnonzero(other & ~reached)
+        rows = np.flatnonzero(other & ~reached & np.isfinite(near).all(axis=0))
         if len(rows):
             better, there, turns = solve(turned, rows)
             unknowns[:, rows[there]], reached[rows] = better[:, there], there
             near[:, rows[there]] = turns[:, there]
+        near = near[: len(self.angles)]
         return unknowns.reshape(len(unknowns), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
 
     def configuration(
@@ -357,6 +397,9 @@ class Plan:
             solved = state.solved(shape)
             reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
             reason[~reached & ~solved] = Reason.NOT_CLOSED
+        for number, lost in self._lost_values(state):
+            first = lost & (reason < Reason.NO_VALUE)
+            reason[np.broadcast_to(first, shape)] = Reason.NO_VALUE + number
         nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
         if (reason != Reason.OK).any():
             lost = reason != Reason.OK
@@ -367,6 +410,22 @@ class Plan:
             graph, state.vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
             self.turns(given or (), dims), frozenset() if given is None else self.counted,
         )  # fmt: skip
+
+    def _lost_values(self, state: State) -> Iterator[tuple[int, Flags]]:
+        """Couplings that have no value at some poses though what they follow has, in the order of solution."""
+        for group in self.structure.groups:
+            if group.form == "coupled" and not np.isfinite(state.given[group.conditions[0]]).all():
+                number = self.coupling_of(group)
+                values = [state.pose().value(part) for part in leaves(self.structure.functions[number])]
+                known = [np.isfinite(value) for value in values]
+                yield (
+                    number,
+                    np.all(np.broadcast_arrays(~np.isfinite(state.given[group.conditions[0]]), *known), axis=0),
+                )
+
+    def coupling_of(self, group: Group) -> int:
+        """Number of the coupling whose value a coupled group is."""
+        return group.conditions[0] - len(self.structure.given)
 
     def judge(self, configuration: Configuration) -> None:
         """Set the reason of solved poses that are outside the study's limits."""

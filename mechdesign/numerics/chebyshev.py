@@ -56,8 +56,9 @@ _DERIVATIVE = _slope_basis(NODES).T @ _TO_SERIES
 
 
 def series(values: Floats) -> Floats:
-    """Coefficients of the polynomials through values at the nodes, shape (..., COUNT)."""
-    return np.asarray(values @ _TO_SERIES)
+    """Coefficients of the polynomials through values at the nodes, shape (..., COUNT); nan through infinite ones."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(values @ _TO_SERIES)
 
 
 def remainder(coefficients: Floats) -> Floats:

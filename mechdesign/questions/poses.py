@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.curve.anchors import Anchors
 from mechdesign.curve.corners import curve_of
 from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
@@ -141,12 +142,16 @@ def _solve_group(
     if angles and curve is None:
         curve = curve_of(study, poses, angles)
 
+    anchors = anchors_of(study, poses, plan, curve)
+
     def at(piece: slice) -> Configuration:
         """Poses of some rows, not yet judged by the limits."""
         rows = group.rows[piece]
         columns = zip(plan.structure.given, group.columns(), strict=True)
         values = [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
-        start = starts(mechanism, poses, rows) if plan.iterative else None
+        start = starts(mechanism, poses, rows) if plan.continued else None
+        if plan.angles and anchors is not None:
+            start = anchors.at(*np.divmod(rows, poses.line))
         return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
 
     turns = _Turns(study, poses, angles, curve)
@@ -223,6 +228,13 @@ class _Turns:
         return np.nan_to_num(table)
 
 
+def anchors_of(study: Study, poses: Poses, plan: Plan, curve: Curve | None = None) -> Anchors | None:
+    """Poses that count turns along the motions that some poses are; None where turns do not count, and of places."""
+    if not plan.angles or poses.listed or poses.regions:
+        return None
+    return Anchors(study, poses, plan) if curve is None else curve.anchors
+
+
 def dimensions(poses: Poses, rows: Ints) -> dict[str, Value]:
     """Dimensions of the designs that some poses belong to, where they differ from the nominal ones; shape of `rows`."""
     return {name: values[rows] for name, values in poses.places.items()}
@@ -273,51 +285,30 @@ def judge_failures(
     bad = np.flatnonzero(reason)
     if not len(bad):
         return [], ""
-    invalid = invalid_in_words(reason) + _without_value(study, poses, begin + bad)
-    named = [f"{pose_in_words(study, poses, begin + int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
+    invalid = invalid_in_words(study, reason)
+    named = [
+        f"{pose_in_words(study, poses, begin + int(row))}: {study.mechanism.why(int(reason[row]))}" for row in bad[:5]
+    ]
     if len(bad) == len(reason):
         more = "; ..." if len(bad) > len(named) else ""
-        lost = _without_value(study, poses, begin + bad)
-        raise AssemblyError(f"no pose is valid{lost}; {'; '.join(named)}{more}")
+        raise AssemblyError(f"no pose is valid; {'; '.join(named)}{more}")
     place = (table, int(bad[0]) if table else None, pose_in_words(study, poses, begin + int(bad[0])))
     if poses.listed:
         return [Caution("unassembled", invalid, *place)], f"pose {'; pose '.join(named)}"
     return [Caution("unassembled", f"{invalid}; the first: {named[0]}", *place)], ""
 
 
-def _without_value(study: Study, poses: Poses, rows: Ints) -> str:
-    """What says that couplings of given coordinates have no value at some of the rows; empty where they have."""
-    words = ""
-    for coupling in study.mechanism.couplings:
-        function = coupling.function
-        followed = [part.name for part in function.parts if part.kind != "parameter"]
-        if function.expression is None or not all(name in poses.values for name in followed):
-            continue
-        given = study.mechanism.sketch_configuration.user_values(function)
-        given |= {name: poses.values[name][rows] for name in followed}
-        with np.errstate(all="ignore"):
-            lost = np.count_nonzero(~np.isfinite(function.expression.evaluate(given)))
-        table = function.expression.table
-        if lost and table is not None:
-            ends = f"{table.rows[0][0]:g} to {table.rows[-1][0]:g}"
-            words += (
-                f"; at {lost} of them '{followed[0]}' is outside of the table of coupling '{coupling.name}', {ends}"
-            )
-        elif lost:
-            words += f"; at {lost} of them coupling '{coupling.name}' has no value"
-    return words
-
-
-def invalid_in_words(reason: NDArray[np.int8]) -> str:
+def invalid_in_words(study: Study, reason: NDArray[np.int8]) -> str:
     """How many poses are not valid, and why; empty where all are."""
-    counts = [f"{np.count_nonzero(reason == kind)} {kind.text}" for kind in Reason if kind and (reason == kind).any()]
-    bad = np.count_nonzero(reason)
-    return f"{bad} of {len(reason)} poses are not valid ({', '.join(counts)})" if bad else ""
+    numbers, counts = np.unique(reason[reason != Reason.OK], return_counts=True)
+    whys = [study.mechanism.why(number).partition(":")[0] for number in numbers.tolist()]
+    words = [f"{count} {why}" for why, count in zip(whys, counts.tolist(), strict=True)]
+    return f"{sum(counts)} of {len(reason)} poses are not valid ({', '.join(words)})" if words else ""
 
 
-def of_poses(tables: Iterable[Table], reason: NDArray[np.int8]) -> dict[str, Table]:
+def of_poses(study: Study, tables: Iterable[Table], reason: NDArray[np.int8]) -> dict[str, Table]:
     """Tables by their names, whose rows speak of the poses alone and not of the motion between them."""
-    scope = Scope(poses_only=True, missing=invalid_in_words(reason))
+    scope = Scope(poses_only=True, missing=invalid_in_words(study, reason))
     return {table.name: replace(table, scope=scope) for table in tables}
 
 
@@ -394,7 +385,8 @@ def solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
     names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
     values = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
-    return plan.solve(values)
+    anchors = anchors_of(study, poses, plan)
+    return plan.solve(values, start=None if anchors is None else anchors.at(*np.divmod(rows, poses.line)))
 
 
 def _rows(poses: Poses, most: int) -> Ints:

@@ -279,6 +279,8 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
         for chosen, scope in scoped
     )
     notes = [POSES_ONLY] if isolated else []
+    means = [chosen.course for chosen in terms.parts if chosen.course is not None and chosen.request.integral]
+    notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in means if course.means_over)
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
 
 

@@ -203,19 +203,26 @@ class Poses:
         columns = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
         return [name for name, values in columns.items() if (np.ptp(values, axis=1) > 0).any()]
 
-    def pace(self, line: Ints, s: Floats) -> Floats:
+    @property
+    def path(self) -> str | None:
+        """The point along the length of whose path means are; None where there is no one such point."""
+        moving = with_length(self.paths)
+        return moving[0][0] if len(moving) == 1 and self.program is None else None
+
+    def pace(self, line: Ints, s: Floats, of: str | None = None) -> Floats:
         """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
 
-        Means along the motion are by these; where several coordinates move without a path they are by rows.
+        Means along the motion are by these; where several coordinates move without a path they are by rows, unless `of`
+        says which of them counts.
         """
+        swept = self.swept or of
         if self.program is not None:
             return self.program.pace(line, s)
-        moving = with_length(self.paths)
-        if len(moving) == 1:
-            return moving[0][1].course(line, s)[2]
-        if self.swept is None:
+        if self.path is not None:
+            return self.paths[self.path].course(line, s)[2]
+        if swept is None:
             return np.ones(len(s))
-        rows = self.groups[0].values[self.swept].reshape(-1, self.line)
+        rows = self.groups[0].values[swept].reshape(-1, self.line)
         return np.asarray(np.abs(np.diff(rows, axis=1))[line, np.clip(np.floor(s), 0, self.line - 2).astype(np.intp)])
 
     @property

@@ -292,7 +292,7 @@ mechanism:
     [
         (
             "of: g1, table: [[-90, 10], [0, 40], [60, 80], [120, 60]]",
-            "'g1' is outside of the table of coupling 'mesh', -90 to 120",
+            "g1 = 150 deg: coupling 'mesh' has no value: 'g1' is outside of its table, -90 to 120",
         ),
         ("to: 60 + sqrt(40 - g1)", "coupling 'mesh' has no value"),
     ],

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
@@ -26,12 +26,14 @@ from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.cams import beyond_profile, outside
 from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, solve_rows, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
@@ -108,7 +110,7 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
         marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
         unknown &= ~friction.jammed(motion.arrays)
     singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
-    return {"singular": singular, "undefined": undefined, **marks} | {
+    return {"singular": singular, "undefined": undefined, **marks, **outside(motion)} | {
         f"{_LIFTED}{coupling}": where for coupling, where in lift_off.lifted(motion)
     }  # fmt: skip
 
@@ -152,6 +154,18 @@ def _group(passage: Passage) -> Group:
     return Group(np.arange(poses.designs), result, ends)
 
 
+def _undefined(study: Study, poses: Poses, row: int) -> str:
+    """What leaves the forces at a row without a value: the slope of a coupling, or else a load."""
+    configuration = solve_rows(study, poses, np.array([row]))
+    for coupling in study.mechanism.couplings:
+        function = coupling.function
+        if function.expression is not None:
+            slopes = function.expression.derivatives(configuration.user_values(function)).values()
+            if not all(np.isfinite(slope).all() for slope in slopes):
+                return f"the slope of coupling '{coupling.name}' is infinite"
+    return "an expression of the loads has no value"
+
+
 def _end(passage: Passage, along: Along | None, k: int) -> End:
     """How design `k` was answered."""
     poses, study = passage.question.poses, passage.question.study
@@ -170,15 +184,20 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         ))  # fmt: skip
     mark = passage.marks[k]["undefined"]
     if mark.number:
-        message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
+        message = f"{_undefined(study, poses, mark.first)} at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    warnings += beyond_profile(study, poses, passage.marks[k], "dynamics", k)
     for name, mark in passage.marks[k].items():
         if name.startswith(_LIFTED) and mark.number:
             warnings.append(lift_off.caution(study, poses, name.removeprefix(_LIFTED), mark, k))
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
-    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
+    missing = [invalid_in_words(study, reason), along.missing(k) if along is not None else ""]
+    jumps = velocity_jumps(passage.question, study.mechanism.description.masses, k)
+    if len(jumps):
+        warnings.append(jumps_in_words(passage.question, jumps, "dynamics", k))
+        missing.append(f"the impulses of {counted(len(jumps), 'velocity jump')} are missing")
     if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
         settled = "beams or bearings with 'moment' in 'stiffness' settle it"
         if friction is not None:

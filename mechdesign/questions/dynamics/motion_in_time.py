@@ -22,7 +22,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from mechdesign.errors import AssemblyError, MechanismError
-from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.charts import Atlas, Chart, Positions, regularity
 from mechdesign.mechanism.configuration import joined
@@ -188,8 +188,8 @@ class EquationsOfMotion:
             speeds.append(float(radians(study, drive, given.get(f"{name}{VELOCITY}", 0.0))))
         pose = mechanism.forward.solve(values)
         if not pose.valid:
-            reason = Reason(int(pose.reason))
-            raise AssemblyError(f"the start of dynamics.forward: {reason.text}{self._beyond_limits(pose)}")
+            reason = mechanism.why(int(pose.reason))
+            raise AssemblyError(f"the start of dynamics.forward: {reason}{self._beyond_limits(pose)}")
         linear = mechanism.linearize(pose)
         if regularity_of_drives(linear) < STALLED:
             raise AssemblyError(

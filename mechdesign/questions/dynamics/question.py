@@ -295,6 +295,7 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
     section, rated = DynamicsSection.of(study), pace(study)
     rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
+    rates["means"] = section.means or rated.means
     if section.forward is not None:
         # What efforts bring about is a motion over time, whose poses are there already.
         rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}

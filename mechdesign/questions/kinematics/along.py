@@ -16,8 +16,10 @@ from mechdesign.curve.series import Evaluate
 from mechdesign.curve.through import Through
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
+from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
+from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.columns import GIVEN
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
@@ -26,11 +28,12 @@ from mechdesign.questions.kinematics import corners, targets
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.motion import Motion, pole
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.kinematics.rates import unitless
-from mechdesign.questions.poses import SolvedPoses, unit_of
+from mechdesign.questions.kinematics.rates import moving_at, unitless
+from mechdesign.questions.poses import SolvedPoses, in_study_units, unit_of
 from mechdesign.results import POSES_ONLY, Column, TableKind
 from mechdesign.statistics import Part, Request
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
@@ -172,7 +175,7 @@ class Along:
         arrays: dict[str, Value] = dict(motion.arrays)
         whole = self.question.poses
         if _PACE in self._names:
-            arrays[_PACE] = whole.pace(line, s)
+            arrays[_PACE] = self._pace(line, s, poses, linear)
         if self._errors:
             rows = line * whole.line
             for error in targets.errors(self.question.study, whole, motion.arrays, rows, between=True):
@@ -199,6 +202,28 @@ class Along:
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
         return table, np.minimum(motion.arrays["conditioning"], motion.arrays.get(APART, 1.0))
+
+    def _pace(self, line: Ints, s: Floats, poses: Poses, linear: Linearization) -> Value:
+        """What means are over, by row: time where the study says so, else that of `Poses.pace`."""
+        question, study, whole = self.question, self.question.study, self.question.poses
+        if question.section.means is None or question.section.clocked(whole.swept):
+            return whole.pace(line, s)
+        solved = SolvedPoses(np.arange(poses.count), whole.groups[0].names, linear.configuration)
+        velocity = moving_at(study, question.section, poses, solved, linear).velocity
+        assert velocity is not None
+        if whole.path is not None:
+            return whole.pace(line, s) / np.abs(velocity.nodes[study.mechanism.graph.node(whole.path)])
+        coordinate = study.mechanism.coordinate(whole.swept or whole.moving[0])
+        speed = in_study_units(study, coordinate, first(linear.configuration, coordinate, velocity))
+        return whole.pace(line, s, coordinate.name) / np.abs(speed)
+
+    @property
+    def means_over(self) -> str:
+        """What means are over, in words, where it is not what changes evenly with time though velocities are given."""
+        section, poses = self.question.section, self.question.poses
+        if not section.rated or section.means is not None or section.clocked(poses.swept):
+            return ""
+        return f"the length of the path of {poses.path}" if poses.path is not None else poses.swept or "the poses"
 
     @cached_property
     def present(self) -> Floats:
@@ -370,7 +395,8 @@ def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:
     if along is None or along.curve.spent.any() or along.functions.unresolved.any():
         return {OVER: POSES_ONLY}
     poses = [name for name in names if name not in along.functions.names]
-    return {OVER: "over the motion" + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")}
+    means = f", means over {along.means_over} and not time" if along.means_over else ""
+    return {OVER: "over the motion" + means + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")}
 
 
 def of_swept(study: Study, swept: str | None, otherwise: str) -> dict[str, str]:

@@ -25,6 +25,7 @@ from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, without_centre
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
+from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import invalid_in_words, judge_failures
 from mechdesign.questions.together import End, Group
 from mechdesign.results import Result, Scope
@@ -107,7 +108,7 @@ def _end(passage: Passage, events: _Events, k: int) -> End:
         warnings, failed = _warnings(own, passage, events, k, reason == 0)
     except AssemblyError as error:
         return End(counts=counts, error=error)
-    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
+    missing = [invalid_in_words(question.study, reason), along.missing(k) if along is not None else ""]
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
 
 
@@ -125,6 +126,9 @@ def _warnings(
     reason = passage.reason.reshape(-1, len(valid))[k]
     warnings, failed = judge_failures(question.study, question.poses, reason, table="motion")
     warnings += remarks(question, marks)
+    jumps = velocity_jumps(passage.question, question.study.mechanism.description.links, k)
+    if len(jumps):
+        warnings.append(jumps_in_words(passage.question, jumps, "motion", k))
     if along is None:
         warnings += unfollowed(question.poses)
     else:

@@ -14,7 +14,9 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import Cam
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM
-from mechdesign.questions.poses import in_study_units
+from mechdesign.questions.kinematics.motion import OUTSIDE, Motion
+from mechdesign.questions.kinematics.passage import Mark
+from mechdesign.questions.poses import in_study_units, pose_in_words
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -73,6 +75,30 @@ def profiles(study: Study, poses: Poses) -> list[Profile]:
             undercut = cam.undercuts(columns["curvature_radius"], cam.roller(configuration))
             sides.append(Profile(cam, side, coordinates, columns, undercut))
     return sides
+
+
+def outside(motion: Motion) -> dict[str, Flags]:
+    """Valid poses beyond the profile of a cam, by the name of the mark."""
+    marks = (f"{OUTSIDE}{cam.coupling}" for cam in motion.question.study.mechanism.cams)
+    return {name: motion.valid & (motion.arrays[name] == 1.0) for name in marks}
+
+
+def beyond_profile(
+    study: Study, poses: Poses, marks: Mapping[str, Mark], table: str, design: int = 0
+) -> list[Caution]:  # fmt: skip
+    """Warnings of a design's poses beyond the profile of a cam."""
+    warnings, count = [], poses.count // poses.designs
+    for cam in study.mechanism.cams:
+        number, row = marks.get(f"{OUTSIDE}{cam.coupling}", Mark(0, 0))
+        if number:
+            low, high = (float(in_study_units(study, cam.followed, end)) for end in cam.given.span)
+            pose = pose_in_words(study, poses, row + design * count)
+            words = (
+                f"cam {cam.coupling}: {number} of {count} poses lie outside of its range, {cam.followed.name} from "
+                f"{low:g} to {high:g}, where it has no profile; the first: {pose}"
+            )
+            warnings.append(Caution("cam", words, table, row, pose))
+    return warnings
 
 
 def cam_table(study: Study, sides: Sequence[Profile]) -> Table:

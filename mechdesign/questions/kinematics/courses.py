@@ -92,6 +92,11 @@ class Followed:
         """Mean of the absolute values; infinite where they have no integral."""
         return self.along.mean(self.name, absolute=True)[self._designs]
 
+    @property
+    def means_over(self) -> str:
+        """What means are over, in words; empty where it is time, or there is none."""
+        return self.along.means_over
+
     def of(self, design: int) -> Followed | None:
         """The column over the motion of one of the designs; None where it is not followed."""
         return replace(self, design=(self.design or 0) + design) if self.followed[design] else None

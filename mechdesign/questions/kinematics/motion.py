@@ -43,6 +43,8 @@ STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
 STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
 # Whether an output stands still as a coupling has it: 1 or 0, by pose.
 RESTS = "rests"
+# Whether what a cam follows lies beyond its profile: 1 or 0, by pose; followed by the name of the coupling.
+OUTSIDE = "outside of cam "
 # An output that moves less than this part of its input (lengths in sizes of the mechanism) stands still: at a toggle.
 STANDS_STILL = 1e-12
 
@@ -100,6 +102,8 @@ class Motion:
             self._centres(linear, rows, linear.velocity([1.0]) if one else moving.velocity)
         if self.question.square or section.loads or section.mechanical_advantage or self.question.cams:
             self._statics(linear, rows, regular, moving)
+        for cam in study.mechanism.cams:
+            self.put(f"{OUTSIDE}{cam.coupling}", rows, cam.outside(configuration))
         if self.question.borne is not None:
             borne = self.question.borne.columns(self.question.poses, linear, rows, moving)
             for name, values in borne.items():

@@ -7,16 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.errors import counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics import targets
+from mechdesign.questions.kinematics.cams import beyond_profile, outside
 from mechdesign.questions.kinematics.instant_centres import REST, TRANSLATION
 from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
-from mechdesign.study.motion_program import MotionProgram
 from mechdesign.study.poses import Poses
 
 _TABLE = "motion"  # whose rows are the poses
@@ -33,15 +32,14 @@ _CENTRELESS = {
 }
 # How far a step of a motion may deviate from the direction of its rates, as a part of it.
 ASTRAY = 1e-3
-# A path has a corner where its direction (of length one) differs by more from that so many rows before.
-TURNED, BEFORE_CORNER = 1e-6, 1e-9
 
 
 def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """Warnings about the poses of one design, and about its rates."""
-    cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
+    cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
     if question.friction is not None:
         cautions += question.friction.cautions(question.study, question.poses, marks, _TABLE)
+    cautions += beyond_profile(question.study, question.poses, marks, _TABLE)
     return cautions + _untargeted(question, marks)
 
 
@@ -100,6 +98,7 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
         marks[_NEAR] = valid & steady & _near(motion)
     if question.friction is not None:
         marks |= {name: valid & where for name, where in question.friction.marks(arrays).items()}
+    marks |= outside(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
     for centre in question.centres:
@@ -165,54 +164,6 @@ def _astray(question: MotionQuestion) -> list[Caution]:
         f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
         "drawn; 'speed' gives those of a point along its path",
         _TABLE,
-    )]  # fmt: skip
-
-
-def _corners(question: MotionQuestion) -> list[Caution]:
-    """A warning where the velocity jumps: at corners of a path that is passed with a speed, and in a motion over time.
-
-    Rates there are those behind.
-    """
-    poses = question.poses
-    if poses.program is not None:
-        return _jumps(question, poses.program)
-    if question.section.speed is None or not poses.motion:
-        return []
-    rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
-    turned = np.zeros(len(rows), dtype=bool)
-    for path in poses.paths.values():
-        behind, before = (path.course(np.zeros(len(at), dtype=np.intp), at)[0] for at in (rows, rows - BEFORE_CORNER))
-        turned |= np.abs(behind - before) > TURNED
-    rows = rows[turned]
-    if not len(rows):
-        return []
-    row = int(rows[0])
-    first = pose_in_words(question.study, poses, row)
-    return [Caution(
-        "incomplete",
-        f"the path has corners at {counted(len(rows), 'pose')}, the first: "
-        f"{first}; velocities there are those of the segment that begins, "
-        "and the acceleration that a corner takes is in no row; 'spline: true' has no corners",
-        _TABLE, row, first,
-    )]  # fmt: skip
-
-
-def _jumps(question: MotionQuestion, program: MotionProgram) -> list[Caution]:
-    """A warning where a motion over time has velocities that jump; those with which it begins and ends do not count."""
-    places = program.corners[(program.corners > 0) & (program.corners < question.poses.end)]
-    line, jumps = np.zeros(len(places), dtype=np.intp), np.zeros(len(places), dtype=bool)
-    for name in program.courses:
-        behind, before = (program.at(name, line, s, 1) for s in (places, np.nextafter(places, -1.0)))
-        jumps |= np.abs(behind - before) > TURNED * np.abs(question.poses.slopes[name]).max()
-    if not jumps.any():
-        return []
-    row = int(places[jumps][0])
-    first = pose_in_words(question.study, question.poses, row)
-    return [Caution(
-        "incomplete",
-        f"the velocity jumps at {counted(int(np.count_nonzero(jumps)), 'instant')}, the first: {first}; the "
-        "acceleration that a jump takes is in no row; of the laws only 'constant' jumps",
-        _TABLE, row, first,
     )]  # fmt: skip
 
 

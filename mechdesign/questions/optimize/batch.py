@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.mechanism import Reason
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.results import Result
@@ -24,6 +25,7 @@ FAILED = np.array([
     "a pose is reached in another assembly only",
     "a pose is outside the limits",
     "a pose does not hold its load",
+    "a coupling has no value at a pose",
 ], dtype=object)  # fmt: skip
 
 
@@ -96,6 +98,7 @@ class Batch:
 
 def first_reason(reason: NDArray[np.int8]) -> Ints:
     """The first reason of each design's poses, shape (designs,); 0 where none fails."""
+    reason = np.minimum(reason, Reason.NO_VALUE)
     worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
     return np.where(worst == len(FAILED), 0, worst).astype(np.intp)
 

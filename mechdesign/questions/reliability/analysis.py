@@ -108,7 +108,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     sampled = next((part.sums for part in results if part.sums), {})
     built += tables.of_drawn(task, sampled)
     result = Result(
-        "reliability", of_poses(built, task.reason) | dict(allocated.tables),
+        "reliability", of_poses(study, built, task.reason) | dict(allocated.tables),
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
         tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,

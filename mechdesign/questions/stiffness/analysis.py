@@ -94,7 +94,7 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
             ends.append(End(counts=counts, error=error))
             continue
         warnings += cautions.of(slice(k * count, (k + 1) * count))
-        ends.append(End(warnings, failed, invalid_in_words(reason), counts))
+        ends.append(End(warnings, failed, invalid_in_words(study, reason), counts))
     all_tables = tables(study, body, poses, solved).values()
     if designs > 1:
         scoped = {table.name: replace(table, scope=Scope(poses_only=True)) for table in all_tables}
@@ -103,7 +103,7 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
     (end,) = ends
     first, loose = (_drawn_pose(body, poses, solved, pose) for pose in (solved.first, solved.loose))
     result = Result(
-        "stiffness", of_poses(all_tables, solved.reason), end.warnings, end.counts, end.failed,
+        "stiffness", of_poses(study, all_tables, solved.reason), end.warnings, end.counts, end.failed,
         drawn=DrawnStiffness(solved.shown, first, loose),
     )  # fmt: skip
     return Group(np.arange(1), result, ends)

@@ -18,7 +18,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Slot, Spring
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
-from mechdesign.questions.poses import Shown, pose_in_words, radians
+from mechdesign.questions.poses import Shown, anchors_of, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
 from mechdesign.study import Study
 
@@ -282,7 +282,10 @@ class Sweep(Shown):
         parts = -(-_TRACE_POSES // count)
         values = [radians(self.study, coordinate, self._between(name, parts))
                  for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
-        solved = plan.solve(values)
+        anchors = anchors_of(self.study, self.poses, plan)
+        ends = np.append(self.rows, self.poses.line) if self.poses.closed else self.rows
+        s = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
+        solved = plan.solve(values, start=None if anchors is None else anchors.at(np.zeros(len(s), dtype=np.intp), s))
         return {name: np.where(solved.valid, solved.point(name), complex(np.nan, np.nan)) for name in self.places}
 
     def _between(self, name: str, parts: int) -> Floats:

@@ -54,6 +54,7 @@ _WHY = {
     Reason.OTHER_ASSEMBLY: "in another assembly only",
     Reason.LIMIT: "beyond a limit",
     Reason.NOT_HELD: "does not hold its load here",
+    Reason.NO_VALUE: "a coupling has no value here",
 }
 _RATES = ("velocity", "acceleration")
 
@@ -154,7 +155,7 @@ def gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
     reason = sweep.configuration.reason
     ends = np.flatnonzero(np.diff(reason)) + 1
     runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
-    return [(begin, end - 1, _WHY[Reason(int(reason[begin]))]) for begin, end in runs if reason[begin]]
+    return [(begin, end - 1, _WHY[Reason.of(int(reason[begin]))]) for begin, end in runs if reason[begin]]
 
 
 def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from decimal import Decimal
 from typing import Literal, NoReturn
 
 import numpy as np
@@ -47,6 +48,9 @@ from mechdesign.study.text.units import Amount
 PRESSURE_ANGLE = np.radians(20.0)
 # Rows from which a cubic spline is told.
 FEWEST_ROWS = 4
+# A table spans a turn where it misses one by less than this in its last decimal, and by less than this part of a turn:
+# 2 pi is written 6.283, or cut off as 6.2831.
+LAST_DIGIT, LIKE_A_TURN = 0.9, 1e-3
 
 
 def build(builder: Builder) -> Description:
@@ -563,10 +567,17 @@ def _table(
         return None
     turn, span = 2 * np.pi / builder.units.angle_factor, rows[-1] - rows[0]
     size = np.ptp(rows[:, 1])
-    repeats = kind == "angle" and abs(span[0] - turn) <= 1e-9 * turn and abs(span[1]) <= 1e-9 * size
+    typed = max(_last_digit(float(x)) for x in rows[[0, -1], 0])
+    near = abs(span[0] - turn) <= max(1e-9 * turn, min(LAST_DIGIT * typed, LIKE_A_TURN * turn))
+    repeats = kind == "angle" and near and abs(span[1]) <= 1e-9 * size
     if repeats:
-        rows[-1, 1] = rows[0, 1]
-    return Tabulated(tuple((float(x), float(y)) for x, y in rows), float(span[0]) if repeats else 0.0)
+        rows[-1] = rows[0, 0] + turn, rows[0, 1]
+    return Tabulated(tuple((float(x), float(y)) for x, y in rows), float(turn) if repeats else 0.0)
+
+
+def _last_digit(number: float) -> float:
+    """One in the last decimal with which a number is written; 0 of a whole number, which is exact."""
+    return 0.0 if number.is_integer() else 10.0 ** -len(f"{Decimal(repr(number)):f}".partition(".")[2])
 
 
 def _with_phases(builder: Builder, description: Description) -> Description:

@@ -158,6 +158,9 @@ class PoseSection(Section):
         return self
 
 
+_MEANS = {"time": "by the velocities of the poses"}
+
+
 class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
 
@@ -176,6 +179,10 @@ class MotionSection(PoseSection):
     speed: Speed | None = None
     """Constant speed of the path's point along it, instead of ``rates``; those of the drives follow from the path's
     direction and curvature. On a polyline each segment is passed without acceleration. Example: 100 mm/s
+    """
+    means: Annotated[str, fields.choice(_MEANS, "variable of means")] | None = None
+    """What means, rms and evenness of the motion are over. Left out: what is swept, or the length of a path; in a
+    ``motion`` time. Example: time
     """
     motion: dict[fields.CoordinateName, Course] | None = None
     """What drives or other coordinates do over time, as many as the mobility, in place of poses and rates: moves by a
@@ -205,6 +212,10 @@ class MotionSection(PoseSection):
         """Check rates, accelerations and the speed as well."""
         checker.coordinates(self.rates, (self.command, "rates"), 1)
         checker.coordinates(self.accelerations, (self.command, "accelerations"), 2)
+        of_kinematics = checker.parts.get("kinematics")
+        if self.means is not None and not (self.rated or (of_kinematics is not None and of_kinematics.rated)):
+            message = "means over time need velocities: give 'rates', a 'speed' or a 'motion'"
+            checker.report((self.command, "means"), message, at_key=True)
         if _motion(source_of(checker, self)):
             _check_motion(checker, self)
         elif self.speed is not None:
@@ -212,6 +223,11 @@ class MotionSection(PoseSection):
         else:
             _check_rates(checker, self)
         return super().checked(checker)
+
+    def clocked(self, name: str | None) -> bool:
+        """Whether a coordinate, or the way along a path, changes evenly with time, and so do means over it."""
+        even = name in self.rates and not self.accelerations.get(name)
+        return even or self.speed is not None or self.motion is not None
 
     def inverse(self, drives: Collection[str]) -> bool:
         """Whether its rates are those of the coordinates that the poses give rather than of the drives."""
