@@ -61,6 +61,8 @@ class Curve:
         Whether limits count the turns of given and followed angles; else an angle and the same with a turn are alike.
     marks : pair of ndarray, shape (n,)
         Lines and places, in rows, at which pieces end besides.
+    drawn : bool
+        Whether the motions begin in the sketch.
 
     Attributes
     ----------
@@ -76,9 +78,9 @@ class Curve:
 
     def __init__(
         self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True,
-        marks: tuple[Ints, Floats] | None = None,
+        marks: tuple[Ints, Floats] | None = None, drawn: bool = False,
     ) -> None:  # fmt: skip
-        self.study, self.poses, self.angles, self._turning = study, poses, tuple(angles), turning
+        self.study, self.poses, self.angles, self._turning, self._drawn = study, poses, tuple(angles), turning, drawn
         self.mechanism: Mechanism = study.mechanism
         (group,) = poses.groups
         self.plan = self.mechanism.plan(group.names)
@@ -209,7 +211,7 @@ class Curve:
         count = np.ones((self.lines, len(marks) - 1))
         (group,) = poses.groups
         for coordinate, column, unit in zip(self.plan.structure.given, group.columns(), self._units, strict=True):
-            size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * (self.mechanism.size or 1.0)
+            size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * self.mechanism.size
             rows = column.reshape(self.lines, -1)
             rows = np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows
             way = np.concatenate([np.zeros((self.lines, 1)), np.cumsum(np.abs(np.diff(rows, axis=1)), axis=1)], axis=1)
@@ -324,7 +326,10 @@ class Curve:
         return chebyshev.at_nodes(self._turns)
 
     def _begin_turns(self, pieces: Pieces, coefficients: Floats) -> None:
-        """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it."""
+        """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it.
+
+        Angles of torsion springs have their turns from the sketch on.
+        """
         lines, first = np.unique(pieces.line, return_index=True)
         rows = np.ceil(pieces.begin)
         inside = np.flatnonzero(rows <= pieces.end)
@@ -333,6 +338,9 @@ class Curve:
         place = np.minimum(rows[first], pieces.end[first])
         x = pieces.take(first).within(place)
         rank = np.searchsorted(lines, pieces.line)
+        near: Mapping[str, Value] = self.mechanism.drawn_windings
+        if not self._drawn and len(lines) and not near.keys().isdisjoint(angle.name for angle in self.angles):
+            near = from_sketch(self.study, self.inputs(lines, place)[0])
         for angle, row in zip(self.angles, coefficients, strict=True):
             begin = chebyshev.value(row[first], x)
             turns = -np.ceil((begin - np.pi) / TURN - ON_THE_CUT)
@@ -342,6 +350,8 @@ class Curve:
                                for f, g in ((np.minimum, np.min), (np.maximum, np.max)))  # fmt: skip
                 sizes = {name: place[lines * self.poses.line] for name, place in self.poses.places.items()}
                 turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
+            if angle.name in near:
+                turns = np.round((near[angle.name] - begin) / TURN)
             row[:, 0] += TURN * turns[rank]
 
     def _fold(self, line: int, good: float, bad: float) -> float | None:
@@ -365,6 +375,17 @@ class Curve:
         if self.margins.limited:
             rows.append(self._look_at_limits(line, s)[0])
         return np.concatenate(rows)
+
+
+def from_sketch(study: Study, poses: Poses) -> dict[str, Floats]:
+    """Angles of torsion springs at a batch of poses (radians), with the turns of the straight way from the sketch."""
+    mechanism, sketch = study.mechanism, study.mechanism.sketch_configuration
+    given = mechanism.plan(poses.names).structure.given
+    begin = {c.name: float(sketch.value(c)) / unit for c, unit in zip(given, units_of(study, given), strict=True)}
+    curve = Curve(study, poses.ways(begin), [*mechanism.windings.values()], drawn=True)
+    turned = curve.turned(np.arange(poses.count), np.ones(poses.count))
+    return {name: np.where(curve.spent, drawn, angles)
+            for (name, drawn), angles in zip(mechanism.drawn_windings.items(), turned, strict=True)}  # fmt: skip
 
 
 def drive_turns(

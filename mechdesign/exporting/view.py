@@ -82,7 +82,7 @@ class View:
     def plates(self) -> Plates:
         """The plates of the study, else such of a width that fits its size."""
         given = self.mechanism.description.plates
-        width = float(f"{WIDTH * (self.mechanism.size or 1.0):.1g}")
+        width = float(f"{WIDTH * self.mechanism.size:.1g}")
         return given if given is not None else Plates(width)
 
     @property

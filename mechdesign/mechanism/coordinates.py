@@ -10,7 +10,17 @@ from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity, play
+from mechdesign.mechanism.model import (
+    MEASURED,
+    WOUND,
+    Coupling,
+    Description,
+    Drive,
+    Measure,
+    Quantity,
+    Spring,
+    play,
+)
 
 Kind = Literal["x", "y", "angle", "slide", "distance", "expression", "parameter"]
 
@@ -184,6 +194,12 @@ def _parts(expression: Expression, description: Description, graph: Graph) -> di
 
 def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:
     return Coordinate(name, "angle", "angle", body=body, reference=reference, turn=TURN)
+
+
+def winding(spring: Spring) -> Coordinate:
+    """The angle by which a torsion spring is wound: of its second link from its first."""
+    one, other = spring.between
+    return _angle(f"{WOUND}{spring.name}", other, one)
 
 
 def _expression(name: str, expression: Expression, parts: Mapping[str, Coordinate], turn: float = 0.0) -> Coordinate:

@@ -144,14 +144,30 @@ class Core:
 
     @cached_property
     def size(self) -> float:
-        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
+        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only.
+
+        Of slides that are drawn at the origin it is the largest of their other lengths, or else a unit.
+        """
         vectors = [*self.geometry.nominal.w, *(node for node in self.sketch.nodes if node is not None)]
-        return max((abs(complex(vector)) for vector in vectors), default=0.0)
+        places = [place.nominal for place in self.description.places.values() if place.quantity == "length"]
+        lengths = (max((abs(complex(length)) for length in some), default=0.0) for some in (vectors, places))
+        return next(filter(None, lengths), 1.0)
+
+    @cached_property
+    def windings(self) -> dict[str, Coordinate]:
+        """Angles of torsion springs by name, whose turns count from the sketch."""
+        springs = [spring for spring in self.description.springs.values() if spring.turning]
+        return {angle.name: angle for angle in map(names.winding, springs)}
+
+    @property
+    def drawn_windings(self) -> dict[str, float]:
+        """These angles in the sketch (radians)."""
+        return {name: float(self.sketch_configuration.value(angle)) for name, angle in self.windings.items()}
 
     @property
     def equations(self) -> Equations:
         """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size or 1.0, tuple(c.gap for c in self.couplings))
+        return Equations(self.graph, self.geometry, self.size, tuple(c.gap for c in self.couplings))
 
     def coordinate(self, name: str) -> Coordinate:
         """Look a coordinate up by name.

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Mass, Spring
@@ -228,7 +228,7 @@ def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
 def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moving: Moving) -> Energy:
     """Add the forces of springs and dampers; those of no length pull in no direction.
 
-    The angle between two links counts within half a turn of the spring's free angle.
+    Of the angle between two links its turns count as the configuration has them.
     """
     configuration, places = forces.configuration, forces.configuration.places
     potential: Value = 0.0
@@ -242,8 +242,7 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
         rate: Value = 0.0
         if spring.turning:
             one, other = spring.between
-            turn = configuration.body_rotation(other) * np.conj(configuration.body_rotation(one))
-            stretch = wrap(np.angle(turn) - free)
+            stretch = configuration.value(winding(spring)) - free
             if moving.velocity is not None:
                 frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
                 rate = frames[0] - frames[1]

@@ -24,6 +24,8 @@ Physical = Literal[
 # Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
 # in a study has a colon.
 MEASURED = "measures:"
+# Prefix of the angles of torsion springs.
+WOUND = "wound:"
 
 
 def play(coupling: str) -> str:

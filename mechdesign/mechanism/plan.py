@@ -70,7 +70,7 @@ class Plan:
         if not self.follows or len(self.structure.given) != 1 or not any(self.modes):
             return None
         (coordinate,) = self.structure.given
-        period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)
+        period = 2 * np.pi if coordinate.quantity == "angle" else self.core.size
         sketch = float(self.core.sketch_configuration.value(coordinate))
         return ChangePoints(self.structure.groups, self.modes, sketch, period, self._closures)
 

@@ -203,6 +203,14 @@ class Poses:
         columns = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
         return [name for name, values in columns.items() if (np.ptp(values, axis=1) > 0).any()]
 
+    def ways(self, begin: Mapping[str, float]) -> Poses:
+        """A straight motion to each pose of a batch from the same values, in the study's units."""
+        (group,) = self.groups
+        values = {name: np.stack([np.full(self.count, begin[name]), column], axis=1).ravel()
+                  for name, column in group.values.items()}  # fmt: skip
+        places = {name: np.repeat(column, 2) for name, column in self.places.items()}
+        return replace(Poses.single(values, (2,)), designs=self.count, places=places)
+
     def pace(self, line: Ints, s: Floats) -> Floats:
         """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
 

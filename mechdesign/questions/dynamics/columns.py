@@ -62,8 +62,8 @@ FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of th
      "surplus / (fluctuation omega^2) - inertia, at least 0"))  # fmt: skip
 MODES = TableKind.of("modes", "natural frequencies of small motion about each pose, without friction", DRIVE,
     ("mode", "number of the mode, the slowest first"),
-    ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable", "1/time",
-     "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
+    ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable or singular, "
+     "or without inertia", "1/time", "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
     ("<drive>_shape", "share of <drive> in the mode, the largest 1; lengths in sizes of the mechanism"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),

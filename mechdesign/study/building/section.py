@@ -263,7 +263,9 @@ class Spring(fields.Model):
     free_length: fields.NonNegativeLengthPlace | None = None
     """Distance of the points at which the stiffness pulls with no force; 0 is allowed. Example: 60"""
     free_angle: fields.AnglePlace | None = None
-    """Angle from the first link's x axis to the second's at which it turns with no moment. Example: 20 deg"""
+    """Angle from the first link's x axis to the second's at which it turns with no moment. Its whole turns count, and
+    those of the links from the sketch on. Example: 20 deg Example: -250 deg
+    """
     preload: fields.AnyPlace | None = None
     """Pull, or moment, at the free length or angle. Left out: 0. Example: 5 N"""
     damping: fields.NonNegativePlace | None = None
