@@ -7,6 +7,7 @@ last coordinate are such curves, of one design or several; each has a line of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -102,6 +103,12 @@ class Curve:
                 self._look_at_limits, self._fold, self.margins.causes[closed:], BUDGET, crossing, self.spent
             )
             self.pieces, _ = search.pieces(self._closed)
+
+    def unlimited(self) -> Curve:
+        """The same motions with the parts that the stated limits forbid."""
+        curve = copy(self)
+        curve.pieces = self._closed
+        return curve
 
     def grid(self, s: Floats) -> tuple[Ints, Floats]:
         """The same places on every line, line by line, for `solve`."""

@@ -138,7 +138,8 @@ def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
     answers, along = tables(passage.motion, question, TABLES)
-    answers |= further_tables(passage.motion)
+    further, warnings = further_tables(passage.motion, along)
+    answers |= further
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
@@ -148,7 +149,7 @@ def _group(passage: Passage) -> Group:
     if poses.designs == 1:
         (end,) = ends
         drawn = DrawnForces(passage.shown, passage.motion, along)
-        result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
+        result = replace(result, warnings=[*end.warnings, *warnings], counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
 
 

@@ -6,19 +6,20 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
 
-from mechdesign.mechanism.algebra import TURN, Value, quiet
+from mechdesign.cautions import Caution
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import DRIVE
-from mechdesign.questions.dynamics.columns import FLYWHEEL, MODES
+from mechdesign.questions.dynamics.columns import MODES
+from mechdesign.questions.dynamics.flywheel import flywheel_table
 from mechdesign.questions.dynamics.question import ForceQuestion
-from mechdesign.questions.dynamics.schema import Flywheel
 from mechdesign.questions.dynamics.tables import question_of
+from mechdesign.questions.kinematics.along import Along
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.poses import radians
 from mechdesign.results import Column, Table
@@ -35,56 +36,16 @@ ROUNDING = 1e-11
 NO_INERTIA = 1e-13
 
 
-def further_tables(motion: Motion) -> dict[str, Table]:
-    """Tables that the study asks for, of a single design."""
-    section, tables = question_of(motion).section, dict[str, Table]()
+def further_tables(motion: Motion, along: Along | None) -> tuple[dict[str, Table], list[Caution]]:
+    """Tables that the study asks for, of a single design, and warnings about them; `along` is the motion."""
+    section, tables, warnings = question_of(motion).section, dict[str, Table](), list[Caution]()
     if motion.question.poses.designs > 1:
-        return tables
+        return tables, warnings
     if section.flywheel is not None:
-        tables["flywheel"] = _flywheel_table(motion, section.flywheel)
+        tables["flywheel"], warnings = flywheel_table(motion, along, section.flywheel)
     if section.modes:
         tables["modes"] = _modes_table(motion)
-    return tables
-
-
-@quiet
-def _flywheel_table(motion: Motion, wheel: Flywheel) -> Table:
-    """The flywheel of a cycle; nan where the poses are no motion of the drive in one sense at one speed.
-
-    At constant speed the effort less its mean takes up and gives back the energy that a flywheel must bear.
-    """
-    study = motion.question.study
-    (drive,) = motion.question.drives
-    numbers = np.full(6, np.nan)
-    angle = np.asarray(radians(study, drive, motion.arrays[drive.name]), dtype=float)
-    rate = motion.question.section.rates.get(drive.name, 0.0)
-    speed, effort = float(radians(study, drive, rate)), motion.arrays[f"{drive.name}_effort"]
-    if speed and motion.question.poses.motion and motion.valid.all() and np.isfinite(effort).all():
-        forwards = angle if angle[-1] > angle[0] else -angle
-        if (np.diff(forwards) > 0).all():
-            sign = 1.0 if angle[-1] > angle[0] else -1.0
-            whole = np.isclose((forwards[-1] - forwards[0]) / TURN, np.round((forwards[-1] - forwards[0]) / TURN))
-
-            def curve(values: Floats) -> PPoly:
-                if whole:
-                    return CubicSpline(forwards, np.append(values[:-1], values[0]), bc_type="periodic")
-                return CubicSpline(forwards, values)
-
-            way, torque = forwards[-1] - forwards[0], curve(sign * effort)
-            mean = float(torque.integrate(forwards[0], forwards[-1])) / way
-            # Energy is largest and smallest where the torque passes its mean.
-            places = np.append(forwards[[0, -1]], torque.solve(mean, extrapolate=False))
-            surplus = float(np.ptp(torque.antiderivative()(places) - mean * (places - forwards[0])))
-            energy = float(curve(motion.arrays["kinetic_energy"]).integrate(forwards[0], forwards[-1])) / way
-            mass = study.units.inertia_factor * speed**2
-            own = 2 * energy / mass
-            added = max(surplus / (wheel.fluctuation * mass) - own, 0.0)
-            numbers = np.array([rate, sign * mean, surplus, own, np.divide(surplus / mass, own), added])
-    label = study.units.label
-    speed_column = FLYWHEEL["mean_speed"].column(numbers[:1], label("angular_velocity"))
-    names = ("mean_effort", "surplus", "inertia", "fluctuation", "added_inertia")
-    columns = FLYWHEEL.columns(study.units.labels, **{n: numbers[k + 1 : k + 2] for k, n in enumerate(names)})
-    return FLYWHEEL.table([FLYWHEEL["drive"].column(np.array([drive.name])), speed_column, *columns])
+    return tables, warnings
 
 
 @quiet
