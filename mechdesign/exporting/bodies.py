@@ -22,7 +22,7 @@ from mechdesign.exporting.view import View
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
-from mechdesign.mechanism.forces import Forces, center
+from mechdesign.mechanism.forces import Forces, center, inertia_about_center
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed, Mass, Prismatic, Spring
 from mechdesign.mechanism.outputs import pulled
@@ -283,7 +283,7 @@ class Bodies:
         middle = sum(points.values()) / max(len(points), 1)
         if given is not None:
             middle = (length * complex(center(Forces(pose), geometry, body, given)) - origin) * turn.conjugate()
-        moment = 0.0 if given is None else mass * length**2 * float(geometry.term(given.inertia, {}))
+        moment = 0.0 if given is None else mass * length**2 * float(inertia_about_center(geometry, body, given, {}))
         inertia = moment or (weight or self.small_mass) * gyration
         if weight and not moment:
             inertia = min(inertia, SMALL_MASS * weight * gyration)

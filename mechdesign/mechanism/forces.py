@@ -177,7 +177,7 @@ def inertia(
     potential: Value = 0.0
     for body, given in masses.items():
         mass = factor * geometry.term(given.mass, places)
-        moment = factor * geometry.term(given.inertia, places)
+        moment = factor * inertia_about_center(geometry, body, given, places)
         base = forces.bases[body]
         arm = _arm(forces, geometry, body, given) * configuration.body_rotation(body)
         frame = configuration.graph.bodies[body][0]
@@ -211,17 +211,28 @@ def center(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector
     return forces.configuration.nodes[forces.bases[body]] + arm
 
 
+def inertia_about_center(geometry: Geometry, body: str, given: Mass, places: Mapping[str, Value]) -> Value:
+    """Moment of inertia of a body about its centre of mass, in units of mass times length squared."""
+    if not given.slender:
+        return geometry.term(given.inertia, places)
+    one, other = (geometry.place(body, point, places) for point in given.points)
+    return geometry.term(given.mass, places) * norm2(other - one) / 12
+
+
+def local_center(geometry: Geometry, body: str, given: Mass, places: Mapping[str, Value]) -> Vector:
+    """Centre of mass of a body in its frame."""
+    if given.center is None:
+        middle: Vector = sum(geometry.place(body, point, places) for point in given.points) / len(given.points)
+        return middle
+    x, y = (geometry.term(term, places) for term in given.center)
+    return x + 1j * y
+
+
 def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
     """From the base of a body to its centre of mass, in its frame."""
     places = forces.configuration.places
-    own = [point for owner, point in geometry.graph.points if owner == body and ":" not in point]
-    base = geometry.local(body, own[0], places)
-    if given.center is None:
-        center: Vector = sum(geometry.place(body, point, places) for point in own) / len(own)
-    else:
-        x, y = (geometry.term(term, places) for term in given.center)
-        center = x + 1j * y
-    return center - base
+    base = next(point for owner, point in geometry.graph.points if owner == body)
+    return local_center(geometry, body, given, places) - geometry.local(body, base, places)
 
 
 @quiet

@@ -19,6 +19,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics import lift_off
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
@@ -187,6 +188,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         shares = "equilibrium leaves open how a chain of slides and clamps shares them"
         message = f"moments of {chains} are nan: {shares}; {settled}"
         warnings.append(Caution("undefined", message, "joint_forces"))
+    warnings += assumed(study)
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
 
 

@@ -22,6 +22,9 @@ DIGITS = 6e-4
 # An angle above so many turns, in radians, is likely meant in degrees if it is a multiple of the step.
 MOST_TURNS = 4
 STEP = 5
+# Gravity on the earth, how far from it that of a place may be, as a part of it, and units in which it is known.
+EARTH, ON_EARTH = "9.80665 m/s^2", 0.01
+ACCELERATIONS = ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2")
 # Ratio of the largest link to the smallest from which their units likely differ.
 APART = 1000
 
@@ -31,6 +34,8 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
     for part in parts.values():
         if isinstance(part, PoseSection):
             _angles(checker, part)
+    if (dynamics := parts.get("dynamics")) is not None:
+        _gravity(checker, dynamics.gravity)
     _lengths(checker, description)
     _pivots(checker, description.links[GROUND], description)
     _wheels(checker)
@@ -60,6 +65,20 @@ def _angles(checker: Checker, section: PoseSection) -> None:
         if slips and other != checker.units.angle:
             unit = checker.units.label("angle")
             checker.doubt(path, f"{slips[0]:g} is in {unit} here; if {other} is meant, say so: {slips[0]:g} {other}")
+
+
+def _gravity(checker: Checker, gravity: tuple[float, float]) -> None:
+    """Warn of a gravity without a unit that is that of the earth in another one, as 9.81 in a study in mm."""
+    units, size = checker.units, math.hypot(*gravity)
+    if units.length == "dimensionless" or any(map(text_of, gravity)):
+        return
+    earth = units.convert(EARTH)
+    if size and abs(size / earth - 1) > ON_EARTH:
+        for other in ACCELERATIONS:
+            if abs(size * units.convert(f"1 {other}") / earth - 1) < ON_EARTH:
+                unit = units.label("acceleration")
+                message = f"{size:g} is in {unit} here; if {other} is meant, say so: {size:g} {other}"
+                checker.doubt(("dynamics", "gravity"), message)
 
 
 def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
