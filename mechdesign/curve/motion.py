@@ -19,6 +19,7 @@ from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import ON_THE_CUT
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.mechanism.mechanism import begun
@@ -38,8 +39,6 @@ ANCHORS = 721
 # A motion ends at its first or last pose if it cannot go on this far beyond, as a part of the motion. The causes of
 # other ends are evaluated as far beyond these.
 BEYOND = 1e-9
-# An angle that begins within this distance of half a turn (radians) is half a turn, not minus half a turn.
-ON_THE_CUT = 1e-9
 # Number of neighbouring floating-point numbers around a dead centre among which the last valid pose is sought.
 STRAIGHT = 128
 # Distance inside a motion at which its ends are evaluated, as a part of the motion.

@@ -169,13 +169,17 @@ class View:
         """
         if self.question is None:
             still = self.mechanism.sketch_configuration
-            still = replace(still, shape=(1,), reason=still.reason.reshape(1))
+            near = {**still.near, **self.mechanism.drawn_windings}
+            still = replace(still, shape=(1,), reason=still.reason.reshape(1), near=near)
             return Track(still, np.zeros(0, dtype=bool), np.zeros(1))
         poses, curve = self.question.poses, self.question.curve
         if curve is None or curve.spent.any():
             parts = [*solve_poses(self.study, poses, self.question.watched)]
             configurations = [part.configuration for part in parts]
             whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
+            wound = {name: np.concatenate([part.near[name] for part in configurations])
+                     for name in self.mechanism.windings}  # fmt: skip
+            whole = replace(whole, near=wound)
             places, follows = np.concatenate([part.rows for part in parts]) * 1.0, np.zeros(poses.count - 1, dtype=bool)
         else:
             finer = -(-(LOOKS - 1) // max(poses.end, 1))

@@ -22,6 +22,9 @@ from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, locate
 from mechdesign.mechanism.wheels import Mesh, meshes
 
+# An angle that begins within this distance of half a turn (radians) is half a turn, not minus half a turn.
+ON_THE_CUT = 1e-9
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -161,8 +164,9 @@ class Core:
 
     @property
     def drawn_windings(self) -> dict[str, float]:
-        """These angles in the sketch (radians)."""
-        return {name: float(self.sketch_configuration.value(angle)) for name, angle in self.windings.items()}
+        """These angles in the sketch (radians), from minus half a turn to half a turn."""
+        drawn = {name: float(self.sketch_configuration.value(angle)) for name, angle in self.windings.items()}
+        return {name: angle + TURN * (angle < ON_THE_CUT - np.pi) for name, angle in drawn.items()}
 
     @property
     def equations(self) -> Equations:

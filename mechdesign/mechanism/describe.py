@@ -124,7 +124,7 @@ def _wound(mechanism: Mechanism, spring: Spring) -> str:
     """How far a torsion spring is wound where the mechanism is drawn."""
     if not spring.turning:
         return ""
-    angle = mechanism.sketch_configuration.value(winding(spring)) - mechanism.geometry.term(spring.free, {})
+    angle = mechanism.drawn_windings[winding(spring).name] - mechanism.geometry.term(spring.free, {})
     return f", wound by {float(angle) / mechanism.description.angle_unit:.6g} in the sketch"
 
 

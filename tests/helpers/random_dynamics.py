@@ -287,6 +287,7 @@ class Loaded:
             angle = self.bodies.angle(other, one)
             # Within half a turn of the sketch.
             drawn = cmath.phase(self.layout.bodies[other].turn / self.layout.bodies[one].turn)
+            drawn += 2 * math.pi * (drawn < 1e-9 - math.pi)
             wound = drawn + np.angle(np.exp(1j * (angle.value - drawn)))
             way, rate = wound - self.degree * spring["free_angle"], angle.rate
         else:
