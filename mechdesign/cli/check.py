@@ -18,6 +18,7 @@ from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.question import weighed_beams
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.names import MECHANISM
@@ -41,7 +42,9 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
                 terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, *_massless(study), ""]))
-            doubts = sketch_doubts(study.mechanism)
+            doubts = [*sketch_doubts(study.mechanism), *(cautions := assumed(study))]
+            for caution in cautions:
+                terminal.say(f"{label}: warning: {caution} [{caution.kind}]", quiet=options.quiet)
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning} [suspect]", quiet=options.quiet)
             annotate("warning", study.warnings)

@@ -48,7 +48,7 @@ def steps_of(study: Study, plan: Plan, poses: Poses) -> tuple[Floats, Floats]:
     count = np.ones((lines, len(marks) - 1))
     (group,), units = poses.groups, units_of(study, plan.structure.given)
     for coordinate, column, unit in zip(plan.structure.given, group.columns(), units, strict=True):
-        size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * (mechanism.size or 1.0)
+        size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * mechanism.size
         rows = column.reshape(lines, -1)
         rows = np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows
         way = np.concatenate([np.zeros((lines, 1)), np.cumsum(np.abs(np.diff(rows, axis=1)), axis=1)], axis=1)

@@ -7,17 +7,19 @@ last coordinate are such curves, of one design or several; each has a line of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from mechdesign.curve.anchors import Anchors, inputs, steps_of
+from mechdesign.curve.anchors import Anchors, inputs, steps_of, units_of
 from mechdesign.curve.pieces import Pieces, Search
 from mechdesign.expressions import Corner
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import ON_THE_CUT
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.numerics import chebyshev
@@ -32,8 +34,6 @@ AT_ONCE = 65536
 # A motion ends at its first or last pose if it cannot go on this far beyond, as a part of the motion. The causes of
 # other ends are evaluated as far beyond these.
 BEYOND = 1e-9
-# An angle that begins within this distance of half a turn (radians) is half a turn, not minus half a turn.
-ON_THE_CUT = 1e-9
 # Number of neighbouring floating-point numbers around a dead centre among which the last valid pose is sought.
 STRAIGHT = 128
 # Places by which an interval is divided to find the last one at which a coupling has a value.
@@ -53,6 +53,8 @@ class Curve:
         Whether limits count the turns of given and followed angles; else an angle and the same with a turn are alike.
     marks : pair of ndarray, shape (n,)
         Lines and places, in rows, at which pieces end besides.
+    drawn : bool
+        Whether the motions begin in the sketch.
 
     Attributes
     ----------
@@ -68,9 +70,9 @@ class Curve:
 
     def __init__(
         self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True,
-        marks: tuple[Ints, Floats] | None = None,
+        marks: tuple[Ints, Floats] | None = None, drawn: bool = False,
     ) -> None:  # fmt: skip
-        self.study, self.poses, self.angles, self._turning = study, poses, tuple(angles), turning
+        self.study, self.poses, self.angles, self._turning, self._drawn = study, poses, tuple(angles), turning, drawn
         self.mechanism: Mechanism = study.mechanism
         (group,) = poses.groups
         self.plan = self.mechanism.plan(group.names)
@@ -92,6 +94,12 @@ class Curve:
                 self._look_at_limits, self._fold, self.margins.causes[closed:], BUDGET, crossing, self.spent
             )
             self.pieces, _ = search.pieces(self._closed)
+
+    def unlimited(self) -> Curve:
+        """The same motions with the parts that the stated limits forbid."""
+        curve = copy(self)
+        curve.pieces = self._closed
+        return curve
 
     def grid(self, s: Floats) -> tuple[Ints, Floats]:
         """The same places on every line, line by line, for `solve`."""
@@ -262,7 +270,10 @@ class Curve:
         return chebyshev.at_nodes(self._turns)
 
     def _begin_turns(self, pieces: Pieces, coefficients: Floats) -> None:
-        """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it."""
+        """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it.
+
+        Angles of torsion springs have their turns from the sketch on.
+        """
         lines, first = np.unique(pieces.line, return_index=True)
         rows = np.ceil(pieces.begin)
         inside = np.flatnonzero(rows <= pieces.end)
@@ -271,6 +282,9 @@ class Curve:
         place = np.minimum(rows[first], pieces.end[first])
         x = pieces.take(first).within(place)
         rank = np.searchsorted(lines, pieces.line)
+        near: Mapping[str, Value] = self.mechanism.drawn_windings
+        if not self._drawn and len(lines) and not near.keys().isdisjoint(angle.name for angle in self.angles):
+            near = from_sketch(self.study, self.inputs(lines, place)[0])
         for angle, row in zip(self.angles, coefficients, strict=True):
             begin = chebyshev.value(row[first], x)
             turns = -np.ceil((begin - np.pi) / TURN - ON_THE_CUT)
@@ -280,6 +294,8 @@ class Curve:
                                for f, g in ((np.minimum, np.min), (np.maximum, np.max)))  # fmt: skip
                 sizes = {name: place[lines * self.poses.line] for name, place in self.poses.places.items()}
                 turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
+            if angle.name in near:
+                turns = np.round((near[angle.name] - begin) / TURN)
             row[:, 0] += TURN * turns[rank]
 
     def _fold(self, number: int, line: int, good: float, bad: float) -> float | None:
@@ -311,6 +327,17 @@ class Curve:
         if self.margins.limited:
             rows.append(self._look_at_limits(line, s)[0])
         return np.concatenate(rows)
+
+
+def from_sketch(study: Study, poses: Poses) -> dict[str, Floats]:
+    """Angles of torsion springs at a batch of poses (radians), with the turns of the straight way from the sketch."""
+    mechanism, sketch = study.mechanism, study.mechanism.sketch_configuration
+    given = mechanism.plan(poses.names).structure.given
+    begin = {c.name: float(sketch.value(c)) / unit for c, unit in zip(given, units_of(study, given), strict=True)}
+    curve = Curve(study, poses.ways(begin), [*mechanism.windings.values()], drawn=True)
+    turned = curve.turned(np.arange(poses.count), np.ones(poses.count))
+    return {name: np.where(curve.spent, drawn, angles)
+            for (name, drawn), angles in zip(mechanism.drawn_windings.items(), turned, strict=True)}  # fmt: skip
 
 
 def drive_turns(

@@ -9,7 +9,6 @@ parent, or the displacement of its slide, so that every angle of a link is a sum
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +20,9 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.exporting.view import View
 from mechdesign.mechanism.algebra import TURN
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
-from mechdesign.mechanism.forces import Forces, center
+from mechdesign.mechanism.forces import Forces, center, inertia_about_center
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed, Mass, Prismatic, Spring
 from mechdesign.mechanism.outputs import pulled
@@ -167,7 +166,7 @@ class Bodies:
     @cached_property
     def size(self) -> float:
         """Size of the mechanism (m)."""
-        return self.scales.length * (self.mechanism.size or 1.0)
+        return self.scales.length * self.mechanism.size
 
     @cached_property
     def small_mass(self) -> float:
@@ -245,8 +244,7 @@ class Bodies:
             one, other = (self.angle(link) for link in spring.between)
             terms = {name: other.get(name, 0.0) - one.get(name, 0.0) for name in {**other, **one}}
             terms = {name: rate for name, rate in terms.items() if rate}
-            before, behind = (complex(self.view.pose.body_rotation(link)) for link in spring.between)
-            rest = self.value(terms) - math.remainder(cmath.phase(behind * before.conjugate()) - free, TURN)
+            rest = self.value(terms) - (float(self.view.pose.value(winding(spring))) - free)
         if stiffness:
             rest, pull = rest - pull / stiffness, 0.0
         return Pull(terms, stiffness, rest, damping, pull)
@@ -285,7 +283,7 @@ class Bodies:
         middle = sum(points.values()) / max(len(points), 1)
         if given is not None:
             middle = (length * complex(center(Forces(pose), geometry, body, given)) - origin) * turn.conjugate()
-        moment = 0.0 if given is None else mass * length**2 * float(geometry.term(given.inertia, {}))
+        moment = 0.0 if given is None else mass * length**2 * float(inertia_about_center(geometry, body, given, {}))
         inertia = moment or (weight or self.small_mass) * gyration
         if weight and not moment:
             inertia = min(inertia, SMALL_MASS * weight * gyration)

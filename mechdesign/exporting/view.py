@@ -82,7 +82,7 @@ class View:
     def plates(self) -> Plates:
         """The plates of the study, else such of a width that fits its size."""
         given = self.mechanism.description.plates
-        width = float(f"{WIDTH * (self.mechanism.size or 1.0):.1g}")
+        width = float(f"{WIDTH * self.mechanism.size:.1g}")
         return given if given is not None else Plates(width)
 
     @property
@@ -169,13 +169,17 @@ class View:
         """
         if self.question is None:
             still = self.mechanism.sketch_configuration
-            still = replace(still, shape=(1,), reason=still.reason.reshape(1))
+            near = {**still.near, **self.mechanism.drawn_windings}
+            still = replace(still, shape=(1,), reason=still.reason.reshape(1), near=near)
             return Track(still, np.zeros(0, dtype=bool), np.zeros(1))
         poses, curve = self.question.poses, self.question.curve
         if curve is None or curve.spent.any():
             parts = [*solve_poses(self.study, poses, self.question.watched)]
             configurations = [part.configuration for part in parts]
             whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
+            wound = {name: np.concatenate([part.near[name] for part in configurations])
+                     for name in self.mechanism.windings}  # fmt: skip
+            whole = replace(whole, near=wound)
             places, follows = np.concatenate([part.rows for part in parts]) * 1.0, np.zeros(poses.count - 1, dtype=bool)
         else:
             finer = -(-(LOOKS - 1) // max(poses.end, 1))

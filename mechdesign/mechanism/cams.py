@@ -408,7 +408,7 @@ def _plan_with(followed: Coordinate, drives: Sequence[str], plan: Callable[[Sequ
 def _check_follower(cam: Cam) -> None:
     """The follower moves against the cam by the one coordinate alone, and the cam can push it."""
     core = cam.forward.core
-    drawn, size = core.sketch_configuration, core.size or 1.0
+    drawn, size = core.sketch_configuration, core.size
     linear = Linearization(cam.forward.structure, core.geometry, drawn)
     slopes = [float(first(drawn, cam.followed, rates)) for rates in linear.by_drives]
     largest = max(range(len(slopes)), key=lambda k: abs(slopes[k]))

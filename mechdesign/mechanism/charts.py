@@ -37,7 +37,7 @@ class Positions:
     coordinates : tuple of Coordinate
         What the rows of `x` are.
     scales : Floats, shape (m,)
-        A radian for angles, for slides the size of the mechanism; a unit where it has none.
+        A radian for angles, for slides the size of the mechanism.
     """
 
     def __init__(self, mechanism: Mechanism, at: Configuration, coordinates: Iterable[Coordinate] = ()) -> None:
@@ -50,7 +50,7 @@ class Positions:
         slides = [Coordinate(f"{name}.slide", "slide", "length", slide=k) for k, name in enumerate(graph.slides)]
         self.coordinates = (*angles, *slides)
         #: A length that counts as a radian.
-        self.size = mechanism.size or 1.0
+        self.size = mechanism.size
         self.scales = np.array([1.0] * len(angles) + [self.size] * len(slides))
         offsets = mechanism.geometry.nominal.offsets
         self._bases = np.array([float(np.angle(offsets[angle.body])) for angle in angles])

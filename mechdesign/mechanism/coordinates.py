@@ -12,7 +12,17 @@ from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity, play
+from mechdesign.mechanism.model import (
+    MEASURED,
+    WOUND,
+    Coupling,
+    Description,
+    Drive,
+    Measure,
+    Quantity,
+    Spring,
+    play,
+)
 
 # The law of a cam closes after a turn where it misses its begin by less than this part of its lift.
 CLOSED = 1e-6
@@ -218,6 +228,12 @@ def _parts(expression: Expression, description: Description, graph: Graph) -> di
 
 def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:
     return Coordinate(name, "angle", "angle", body=body, reference=reference, turn=TURN)
+
+
+def winding(spring: Spring) -> Coordinate:
+    """The angle by which a torsion spring is wound: of its second link from its first."""
+    one, other = spring.between
+    return _angle(f"{WOUND}{spring.name}", other, one)
 
 
 def _expression(name: str, expression: Expression, parts: Mapping[str, Coordinate], turn: float = 0.0) -> Coordinate:

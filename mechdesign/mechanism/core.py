@@ -22,6 +22,9 @@ from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, locate
 from mechdesign.mechanism.wheels import Mesh, meshes
 
+# An angle that begins within this distance of half a turn (radians) is half a turn, not minus half a turn.
+ON_THE_CUT = 1e-9
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -158,14 +161,31 @@ class Core:
 
     @cached_property
     def size(self) -> float:
-        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
+        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only.
+
+        Of slides that are drawn at the origin it is the largest of their other lengths, or else a unit.
+        """
         vectors = [*self.geometry.nominal.w, *(node for node in self.sketch.nodes if node is not None)]
-        return max((abs(complex(vector)) for vector in vectors), default=0.0)
+        places = [place.nominal for place in self.description.places.values() if place.quantity == "length"]
+        lengths = (max((abs(complex(length)) for length in some), default=0.0) for some in (vectors, places))
+        return next(filter(None, lengths), 1.0)
+
+    @cached_property
+    def windings(self) -> dict[str, Coordinate]:
+        """Angles of torsion springs by name, whose turns count from the sketch."""
+        springs = [spring for spring in self.description.springs.values() if spring.turning]
+        return {angle.name: angle for angle in map(names.winding, springs)}
+
+    @property
+    def drawn_windings(self) -> dict[str, float]:
+        """These angles in the sketch (radians), from minus half a turn to half a turn."""
+        drawn = {name: float(self.sketch_configuration.value(angle)) for name, angle in self.windings.items()}
+        return {name: angle + TURN * (angle < ON_THE_CUT - np.pi) for name, angle in drawn.items()}
 
     @property
     def equations(self) -> Equations:
         """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size or 1.0, tuple(c.gap for c in self.couplings))
+        return Equations(self.graph, self.geometry, self.size, tuple(c.gap for c in self.couplings))
 
     def coordinate(self, name: str) -> Coordinate:
         """Look a coordinate up by name.

@@ -8,12 +8,13 @@ from typing import NamedTuple
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.coordinates import winding
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.diagnosis import joints_in_words, near_singular
 from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
+from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Spring, Term
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
@@ -86,7 +87,8 @@ def describe(mechanism: Mechanism) -> str:
     lines += [
         f"coupling: {name} ({coupling.sets} = {coupling.of.text})" for name, coupling in description.couplings.items()
     ]
-    lines += [f"spring: {name} ({', '.join(spring.between)})" for name, spring in description.springs.items()]
+    lines += [f"spring: {name} ({', '.join(spring.between)}){_wound(mechanism, spring)}"
+              for name, spring in description.springs.items()]  # fmt: skip
     return "\n".join([*lines, *(f"warning: {doubt}" for doubt in sketch_doubts(mechanism))])
 
 
@@ -116,6 +118,14 @@ def _measure(measure: Measure) -> str:
     first, second = measure.items or ("", "")
     between = f"from {first} to {second}" if measure.kind == "angle" else f"of {first} and {second}"
     return f"{measure.name}, {measure.kind} {between}"
+
+
+def _wound(mechanism: Mechanism, spring: Spring) -> str:
+    """How far a torsion spring is wound where the mechanism is drawn."""
+    if not spring.turning:
+        return ""
+    angle = mechanism.drawn_windings[winding(spring).name] - mechanism.geometry.term(spring.free, {})
+    return f", wound by {float(angle) / mechanism.description.angle_unit:.6g} in the sketch"
 
 
 def _limit(mechanism: Mechanism, limit: Limit) -> str:

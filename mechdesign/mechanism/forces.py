@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Mass, Spring
@@ -177,7 +177,7 @@ def inertia(
     potential: Value = 0.0
     for body, given in masses.items():
         mass = factor * geometry.term(given.mass, places)
-        moment = factor * geometry.term(given.inertia, places)
+        moment = factor * inertia_about_center(geometry, body, given, places)
         base = forces.bases[body]
         arm = _arm(forces, geometry, body, given) * configuration.body_rotation(body)
         frame = configuration.graph.bodies[body][0]
@@ -211,24 +211,35 @@ def center(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector
     return forces.configuration.nodes[forces.bases[body]] + arm
 
 
+def inertia_about_center(geometry: Geometry, body: str, given: Mass, places: Mapping[str, Value]) -> Value:
+    """Moment of inertia of a body about its centre of mass, in units of mass times length squared."""
+    if not given.slender:
+        return geometry.term(given.inertia, places)
+    one, other = (geometry.place(body, point, places) for point in given.points)
+    return geometry.term(given.mass, places) * norm2(other - one) / 12
+
+
+def local_center(geometry: Geometry, body: str, given: Mass, places: Mapping[str, Value]) -> Vector:
+    """Centre of mass of a body in its frame."""
+    if given.center is None:
+        middle: Vector = sum(geometry.place(body, point, places) for point in given.points) / len(given.points)
+        return middle
+    x, y = (geometry.term(term, places) for term in given.center)
+    return x + 1j * y
+
+
 def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
     """From the base of a body to its centre of mass, in its frame."""
     places = forces.configuration.places
-    own = [point for owner, point in geometry.graph.points if owner == body and ":" not in point]
-    base = geometry.local(body, own[0], places)
-    if given.center is None:
-        center: Vector = sum(geometry.place(body, point, places) for point in own) / len(own)
-    else:
-        x, y = (geometry.term(term, places) for term in given.center)
-        center = x + 1j * y
-    return center - base
+    base = next(point for owner, point in geometry.graph.points if owner == body)
+    return local_center(geometry, body, given, places) - geometry.local(body, base, places)
 
 
 @quiet
 def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moving: Moving) -> Energy:
     """Add the forces of springs and dampers; those of no length pull in no direction.
 
-    The angle between two links counts within half a turn of the spring's free angle.
+    Of the angle between two links its turns count as the configuration has them.
     """
     configuration, places = forces.configuration, forces.configuration.places
     potential: Value = 0.0
@@ -242,8 +253,7 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
         rate: Value = 0.0
         if spring.turning:
             one, other = spring.between
-            turn = configuration.body_rotation(other) * np.conj(configuration.body_rotation(one))
-            stretch = wrap(np.angle(turn) - free)
+            stretch = configuration.value(winding(spring)) - free
             if moving.velocity is not None:
                 frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
                 rate = frames[0] - frames[1]

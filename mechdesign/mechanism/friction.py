@@ -125,7 +125,7 @@ class Rubs:
         engaged: Sequence[Engagement], size: float,
     ) -> None:  # fmt: skip
         self.joints, self.contacts, self.linear, self.forces, self.engaged = joints, contacts, linear, forces, engaged
-        self.size, geometry = size or 1.0, linear.geometry
+        self.size, geometry = size, linear.geometry
         self.shape = linear.configuration.shape
         places = linear.configuration.places
         self.coefficients = np.stack([self._flat(geometry.term(c.friction.coefficient, places)) for c in contacts])

@@ -24,6 +24,8 @@ Physical = Literal[
 # Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
 # in a study has a colon.
 MEASURED = "measures:"
+# Prefix of the angles of torsion springs.
+WOUND = "wound:"
 
 
 def play(coupling: str) -> str:
@@ -75,12 +77,16 @@ class Link:
 class Mass:
     """Mass of a body, its centre in the body's frame, and its moment of inertia about this centre.
 
-    Without a centre it is the middle of the body's points.
+    Without a centre it is the middle of some `points` of the body, its joints. A `slender` one is a bar between these,
+    two, whose inertia follows; one that is `left_out` is 0, of a point mass.
     """
 
     mass: Term | Value
     center: tuple[Term | Value, Term | Value] | None = None
     inertia: Term | Value = 0.0
+    points: tuple[str, ...] = ()
+    slender: bool = False
+    left_out: bool = False
 
 
 @dataclass(frozen=True)

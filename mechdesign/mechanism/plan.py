@@ -84,7 +84,7 @@ class Plan:
         if not self.follows or len(self.structure.given) != 1 or not any(self.modes):
             return None
         (coordinate,) = self.structure.given
-        period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)
+        period = 2 * np.pi if coordinate.quantity == "angle" else self.core.size
         sketch = float(self.core.sketch_configuration.value(coordinate))
         return ChangePoints(self.structure.groups, self.modes, sketch, period, self._closures)
 
@@ -349,7 +349,7 @@ class Plan:
         pacing = [self.structure.values[k] for k in self._pacing]
         units = np.array([
             *(angle.turn / TURN for angle in self.angles),
-            *(1.0 if c.quantity == "angle" else self.core.size or 1.0 for c in pacing),
+            *(1.0 if c.quantity == "angle" else self.core.size for c in pacing),
         ])  # fmt: skip
         given = [_flat(v, shape) for v in values]
         unknowns, reached, near = solve(given, None)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mechdesign.cautions import Caution
 from mechdesign.curve.anchors import Anchors
 from mechdesign.curve.corners import curve_of
-from mechdesign.curve.motion import Curve, drive_turns
+from mechdesign.curve.motion import Curve, drive_turns, from_sketch
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
@@ -118,8 +118,9 @@ def solve_poses(
     What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
     motion or a grid, the other angles of the `coordinates` and of the study's limits, in expressions too, are
     followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
-    (-180, 180] deg. The result is the same for any number of threads, `jobs`. `curve` is the motion of the poses, with
-    these angles, where it is there already.
+    (-180, 180] deg. Those of torsion springs have in all of them the turns of the way from the sketch. The result is
+    the same for any number of threads, `jobs`. `curve` is the motion of the poses, with these angles, where it is there
+    already.
 
     Raises
     ------
@@ -157,6 +158,10 @@ def _solve_group(
     turns = _Turns(study, poses, angles, curve)
     for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
         near = turns.near(group.rows[piece], configuration)
+        if poses.listed and mechanism.windings:
+            values = {name: column[piece] for name, column in group.values.items()}
+            places = {name: column[group.rows[piece]] for name, column in poses.places.items()}
+            near = from_sketch(study, replace(Poses.single(values), places=places))
         configuration = replace(
             configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys()
         )
@@ -165,10 +170,13 @@ def _solve_group(
 
 
 def followed_angles(mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
-    """Angles whose turns only the motion gives: not those given, coupled, nor drives whose limits leave one turn."""
+    """Angles whose turns only the motion gives: not those given, coupled, nor drives whose limits leave one turn.
+
+    Those of torsion springs are among them.
+    """
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
-    angles = angles_of([*coordinates, *mechanism.counting])
+    angles = angles_of([*coordinates, *mechanism.counting, *mechanism.windings.values()])
     return [angle for name, angle in angles.items() if name not in plan.counted | plan.coupled | settled]
 
 

@@ -131,3 +131,18 @@ def test_checking_imports_no_solver_of_scipy(folder, arguments):
     modules = set(json.loads((folder / "modules.json").read_text()))
     assert ("matplotlib" in modules) == (not arguments)
     assert not modules & {"scipy", "rich", "pint"}
+
+
+def test_centres_and_inertias_that_are_left_out_are_said(folder, invoke):
+    (folder / "flap.yaml").write_text("""
+units: {length: m}
+mechanism:
+  links: {ground: {O: [0, 0]}, flap: {from: O, to: P, length: 0.8, mass: 2 kg}}
+  drives: [flap]
+dynamics: {gravity: [0, -9.81], forward: {duration: 2 s}}
+fail_on: [assumed]
+""")
+    done = invoke("check", "flap.yaml", "--no-plots")
+    assert done.exit_code == 1
+    assert "flap [0.4, 0] m between O and P; give 'center' [assumed]" in done.stderr
+    assert "flap (inertia: rod would be 0.106667 kg*m^2) [assumed]" in done.stderr

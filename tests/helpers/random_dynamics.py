@@ -123,8 +123,12 @@ class Loaded:
         kind = rng.choice(["linear", "zero", "gas", "turning", "damper"])
         if kind == "turning":
             one, other = rng.sample(list(self.layout.bodies), 2)
-            # Within half a turn, and from there no further than the poses go.
-            near = cmath.phase(self.layout.bodies[other].turn / self.layout.bodies[one].turn) + rng.uniform(-1, 1)
+            # By turns and a part of one.
+            near = (
+                2 * math.pi * rng.randint(-1, 1)
+                + cmath.phase(self.layout.bodies[other].turn / self.layout.bodies[one].turn)
+                + rng.uniform(-1, 1)
+            )
             return told | {"between": [one, other], "stiffness": rng.uniform(0, 5), "free_angle": near / self.degree}
         told["between"] = list(self._ends())
         if kind == "damper":
@@ -250,11 +254,16 @@ class Loaded:
         return acting
 
     def middle(self, body: str) -> complex:
-        """The middle of a body's points, in its frame."""
+        """The middle of a body's joints, in its frame; with a single joint of its two ends, or of all its points."""
         if body.endswith(":rod"):
             return 0j
-        link = self.layout.bodies[body]
-        return sum((self.layout.places[point] - link.origin) / link.turn for point in link.points) / len(link.points)
+        link, layout = self.layout.bodies[body], self.layout
+        sliding = {point for guide in layout.guides.values() for point in (guide.point, guide.through, guide.toward)}
+        points = [point for point in link.points if len(layout.owners(point)) > 1 or point in sliding]
+        if len(points) < 2:
+            ends = link.points[:2] if link.style.endswith("pair") or link.style == "binary" else []
+            points = ends if len(ends) == 2 else link.points
+        return sum((layout.places[point] - link.origin) / link.turn for point in points) / len(points)
 
     def _point(self, end: str) -> Jet:
         link, _, point = end.rpartition(".")
@@ -276,8 +285,11 @@ class Loaded:
         stiffness, damping = spring.get("rise", spring.get("stiffness", 0.0)), spring.get("damping", 0.0)
         if turning := one in self.layout.bodies:
             angle = self.bodies.angle(other, one)
-            way, rate = angle.value - self.degree * spring["free_angle"], angle.rate
-            way = np.angle(np.exp(1j * way))
+            # Within half a turn of the sketch.
+            drawn = cmath.phase(self.layout.bodies[other].turn / self.layout.bodies[one].turn)
+            drawn += 2 * math.pi * (drawn < 1e-9 - math.pi)
+            wound = drawn + np.angle(np.exp(1j * (angle.value - drawn)))
+            way, rate = wound - self.degree * spring["free_angle"], angle.rate
         else:
             span = self._point(other) - self._point(one)
             length = np.abs(span.value)

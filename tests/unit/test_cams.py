@@ -266,7 +266,8 @@ def test_a_follower_that_is_pulled_lifts_off() -> None:
     groove = text.replace("radius: r", "radius: r, side: groove")
     forward = "{forward: {duration: 0.01 s, rows: 3}, loads"
     moving = text.replace("{sweep: {cam: {from: 0, to: 350, step: 10}}, loads", forward)
-    moving = moving.replace("disc: [O, N, 40]", "disc: {from: O, to: N, length: 40, mass: 1}")
+    disc = "disc: {from: O, to: N, length: 40, mass: 1, center: [20, 0], inertia: 0}"
+    moving = moving.replace("disc: [O, N, 40]", disc)
     (caution,) = dynamics(study_of(moving)).warnings
     assert "the follower lifts off at 3 of 3 poses" in str(caution)
     assert not any(w.kind == "cam" for w in dynamics(study_of(groove)).warnings)

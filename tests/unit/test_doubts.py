@@ -140,3 +140,41 @@ def test_no_shipped_study_is_doubted():
     files = [*CONFIGS.glob("*.yaml"), *(CONFIGS / "gallery").glob("*.yaml")]
     assert files
     assert {file.name: mechdesign.load(file).warnings for file in files} == {file.name: () for file in files}
+
+
+PLANETARY = """
+units: {{length: mm}}
+mechanism:
+  parameters: {{zs: {sun}, zp: {planet}, zr: {ring}}}
+  links:
+    ground: {{O: [0, 0]}}
+    sun: [O, S, 12]
+    arm: [O, A, (zs + zp)/2]
+    planet: [A, P, 12]
+  drives: [sun]
+  couplings:
+    sun_mesh: {{set: planet, to: arm.angle - zs/zp*(sun.angle - arm.angle)}}
+    ring_mesh: {{set: planet, to: arm.angle - zr/zp*arm.angle{wheels}}}
+  sketch: {{S: [0, 12], A: [27.7, 11.5], P: [36.2, 3]}}
+"""
+
+
+def test_a_planet_that_needs_two_pitch_radii_is_refused_with_both() -> None:
+    """The planet's radius is e zp/(zs + zp) at its sun and e zp/(zr - zp) at its ring, e the distance of the axes."""
+    for sun, planet, ring in ((20, 30, 70), (24, 18, 50)):
+        with pytest.raises(StudyError) as refused:
+            mechdesign.load(text=PLANETARY.format(sun=sun, planet=planet, ring=ring, wheels=""))
+        apart = (sun + planet) / 2
+        for number in (apart * planet / (sun + planet), apart * planet / (ring - planet), apart):
+            assert f"{number:.6g} mm" in str(refused.value)
+        assert not mechdesign.load(
+            text=PLANETARY.format(sun=sun, planet=planet, ring=ring, wheels=", wheels: none")
+        ).warnings
+        assert not mechdesign.load(
+            text=PLANETARY.format(sun=sun, planet=planet, ring=sun + 2 * planet, wheels="")
+        ).warnings
+
+
+def test_pitch_radii_that_a_profile_shift_makes_one_are_only_suspect() -> None:
+    (doubt,) = mechdesign.load(text=PLANETARY.format(sun=20, planet=30, ring=81, wheels="")).warnings
+    assert "14.7059 mm" in str(doubt)

@@ -19,6 +19,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics import lift_off
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
@@ -140,7 +141,8 @@ def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
     answers, along = tables(passage.motion, question, TABLES)
-    answers |= further_tables(passage.motion)
+    further, warnings = further_tables(passage.motion, along)
+    answers |= further
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
@@ -150,7 +152,7 @@ def _group(passage: Passage) -> Group:
     if poses.designs == 1:
         (end,) = ends
         drawn = DrawnForces(passage.shown, passage.motion, along)
-        result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
+        result = replace(result, warnings=[*end.warnings, *warnings], counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
 
 
@@ -205,6 +207,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         shares = "equilibrium leaves open how a chain of slides and clamps shares them"
         message = f"moments of {chains} are nan: {shares}; {settled}"
         warnings.append(Caution("undefined", message, "joint_forces"))
+    warnings += assumed(study)
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
 
 

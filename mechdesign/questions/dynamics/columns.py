@@ -50,7 +50,7 @@ EVENTS = TableKind.of("events", "limits reached, values passed and standstills i
     ("event", "name of the crossing or limit; 'standstill' where friction holds the whole mechanism from then on"),
     ("time", "when; nan if never", "time"),
     ("direction", "up where the value rises through it, else down; at a limit and a standstill down"))  # fmt: skip
-FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of the drive over a cycle",
+FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the drive's speed over a cycle; nan where it is none",
     ("drive", "drive"), ("mean_speed", "mean velocity of the drive", "as the drive, per time"),
     ("mean_effort", "mean torque over the cycle: a motor of this torque drives it", "moment"),
     ("surplus", "largest energy that is taken up and given back over the cycle", "moment",
@@ -59,16 +59,19 @@ FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of th
      "2 T / omega^2"),
     ("fluctuation", "coefficient of fluctuation without a flywheel", "", "surplus / (inertia omega^2)"),
     ("added_inertia", "moment of inertia to add on the drive for the fluctuation asked", "moment_of_inertia",
-     "surplus / (fluctuation omega^2) - inertia, at least 0"))  # fmt: skip
+     "surplus / (fluctuation omega^2) - inertia, at least 0"),
+    ("speed_unit", "unit of mean_speed"), ("moment_unit", "unit of mean_effort and surplus"),
+    ("inertia_unit", "unit of inertia and added_inertia"))  # fmt: skip
 MODES = TableKind.of("modes", "natural frequencies of small motion about each pose, without friction", DRIVE,
     ("mode", "number of the mode, the slowest first"),
-    ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable", "1/time",
-     "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
+    ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable or singular, "
+     "or without inertia", "1/time", "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
     ("<drive>_shape", "share of <drive> in the mode, the largest 1; lengths in sizes of the mechanism"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
     KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),
     KeyNumber(DYNAMICS, "efficiency", "smallest efficiency", "smallest"),
     KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
+    KeyNumber(FLYWHEEL, "added_inertia", "moment of inertia that the flywheel adds on {drive}", "first"),
     KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
 )  # fmt: skip

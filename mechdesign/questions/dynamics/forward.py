@@ -13,6 +13,7 @@ from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics import lift_off
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, EquationsOfMotion, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
@@ -62,6 +63,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
         if where.any():
             mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
             warnings.append(lift_off.caution(study, motion.question.poses, coupling, mark))
+    warnings += assumed(study)
     counts = {"instants": len(course.times), "steps": course.steps}
     return Result("dynamics", tables, warnings, counts), motion, shown
 

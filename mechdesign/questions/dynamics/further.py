@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from collections.abc import Mapping
+from dataclasses import replace
 
-from mechdesign.mechanism.algebra import TURN, quiet
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import DRIVE
-from mechdesign.questions.dynamics.columns import FLYWHEEL, MODES
+from mechdesign.questions.dynamics.columns import MODES
+from mechdesign.questions.dynamics.flywheel import flywheel_table
 from mechdesign.questions.dynamics.question import ForceQuestion
-from mechdesign.questions.dynamics.schema import Flywheel
 from mechdesign.questions.dynamics.tables import question_of
+from mechdesign.questions.kinematics.along import Along
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.poses import radians
 from mechdesign.results import Column, Table
@@ -24,60 +29,23 @@ from mechdesign.study.poses import Poses
 # is about 1e-12 of the stiffness.
 STEP = 1e-3
 STENCIL = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
-# An eigenvalue below this part of the stiffness over the mass is rounding.
+# A stiffness below this part of the moments that act, and of the largest stiffness, is rounding: ten times that of the
+# differences.
 ROUNDING = 1e-11
+# A mass below this part of the largest is rounding: there is no inertia along some motion.
+NO_INERTIA = 1e-13
 
 
-def further_tables(motion: Motion) -> dict[str, Table]:
-    """Tables that the study asks for, of a single design."""
-    section, tables = question_of(motion).section, dict[str, Table]()
+def further_tables(motion: Motion, along: Along | None) -> tuple[dict[str, Table], list[Caution]]:
+    """Tables that the study asks for, of a single design, and warnings about them; `along` is the motion."""
+    section, tables, warnings = question_of(motion).section, dict[str, Table](), list[Caution]()
     if motion.question.poses.designs > 1:
-        return tables
+        return tables, warnings
     if section.flywheel is not None:
-        tables["flywheel"] = _flywheel_table(motion, section.flywheel)
+        tables["flywheel"], warnings = flywheel_table(motion, along, section.flywheel)
     if section.modes:
         tables["modes"] = _modes_table(motion)
-    return tables
-
-
-@quiet
-def _flywheel_table(motion: Motion, wheel: Flywheel) -> Table:
-    """The flywheel of a cycle; nan where the poses are no motion of the drive in one sense at one speed.
-
-    At constant speed the effort less its mean takes up and gives back the energy that a flywheel must bear.
-    """
-    study = motion.question.study
-    (drive,) = motion.question.drives
-    numbers = np.full(6, np.nan)
-    angle = np.asarray(radians(study, drive, motion.arrays[drive.name]), dtype=float)
-    rate = motion.question.section.rates.get(drive.name, 0.0)
-    speed, effort = float(radians(study, drive, rate)), motion.arrays[f"{drive.name}_effort"]
-    if speed and motion.question.poses.motion and motion.valid.all() and np.isfinite(effort).all():
-        forwards = angle if angle[-1] > angle[0] else -angle
-        if (np.diff(forwards) > 0).all():
-            sign = 1.0 if angle[-1] > angle[0] else -1.0
-            whole = np.isclose((forwards[-1] - forwards[0]) / TURN, np.round((forwards[-1] - forwards[0]) / TURN))
-
-            def curve(values: Floats) -> PPoly:
-                if whole:
-                    return CubicSpline(forwards, np.append(values[:-1], values[0]), bc_type="periodic")
-                return CubicSpline(forwards, values)
-
-            way, torque = forwards[-1] - forwards[0], curve(sign * effort)
-            mean = float(torque.integrate(forwards[0], forwards[-1])) / way
-            # Energy is largest and smallest where the torque passes its mean.
-            places = np.append(forwards[[0, -1]], torque.solve(mean, extrapolate=False))
-            surplus = float(np.ptp(torque.antiderivative()(places) - mean * (places - forwards[0])))
-            energy = float(curve(motion.arrays["kinetic_energy"]).integrate(forwards[0], forwards[-1])) / way
-            mass = study.units.inertia_factor * speed**2
-            own = 2 * energy / mass
-            added = max(surplus / (wheel.fluctuation * mass) - own, 0.0)
-            numbers = np.array([rate, sign * mean, surplus, own, np.divide(surplus / mass, own), added])
-    label = study.units.label
-    speed_column = FLYWHEEL["mean_speed"].column(numbers[:1], label("angular_velocity"))
-    names = ("mean_effort", "surplus", "inertia", "fluctuation", "added_inertia")
-    columns = FLYWHEEL.columns(study.units.labels, **{n: numbers[k + 1 : k + 2] for k, n in enumerate(names)})
-    return FLYWHEEL.table([FLYWHEEL["drive"].column(np.array([drive.name])), speed_column, *columns])
+    return tables, warnings
 
 
 @quiet
@@ -86,7 +54,9 @@ def _modes_table(motion: Motion) -> Table:
     question, study = question_of(motion), motion.question.study
     drives, poses = motion.question.drives, motion.question.poses
     values = [np.asarray(radians(study, d, motion.arrays[d.name]), dtype=float) for d in drives]
-    squares, shapes = _modes(question, poses, values)
+    angles = angles_of(motion.question.watched).items()
+    near = {name: radians(study, c, motion.arrays[name]) for name, c in angles if name not in study.mechanism.drives}
+    squares, shapes = _modes(question, poses, values, near)
     count = len(drives)
     frequency = np.where(squares >= 0, np.sqrt(np.abs(squares)) / (2 * np.pi), np.nan)
     columns: list[Column] = [
@@ -101,18 +71,23 @@ def _modes_table(motion: Motion) -> Table:
     return MODES.table(columns)
 
 
-def _modes(question: ForceQuestion, poses: Poses, values: list[Floats]) -> tuple[Floats, Floats]:
-    """Squares of circular frequencies, shape (poses, n), and shapes (poses, n drives, n modes), nan at singularities.
+def _modes(
+    question: ForceQuestion, poses: Poses, values: list[Floats], near: Mapping[str, Value]
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Squares of circular frequencies, shape (poses, n), and shapes (poses, n drives, n modes).
 
     Small motion about a pose that constant efforts hold: M q'' + K q = 0, K the derivative of these efforts by the
-    drives. Lengths count in sizes of the mechanism.
+    drives. Lengths count in sizes of the mechanism. With S^2 = M^-1 the squares are the eigenvalues of S K S, the
+    shapes S times its vectors. They are nan at singularities, and where there is no inertia along some motion; squares
+    that rounding of K makes are zero. `near` has angles in their turns.
     """
     mechanism, count = question.study.mechanism, len(values)
     sizes = np.array([mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
 
     def efforts(given: list[Floats], accelerated: bool) -> tuple[Floats, Linearization]:
         """Efforts at rest, shape (n, poses), or with each unit acceleration (n, n + 1, poses)."""
-        linear = mechanism.linearize(mechanism.forward.solve(given, limits=False))
+        solved = mechanism.forward.solve(given, limits=False)
+        linear = mechanism.linearize(replace(solved, near={**solved.near, **near}))
         still = linear.velocity([0.0] * count)
         units = [*np.eye(count + 1)[1:, :, None]] if accelerated else [0.0] * count
         moving = Moving(still, linear.acceleration(still, units))
@@ -129,15 +104,23 @@ def _modes(question: ForceQuestion, poses: Poses, values: list[Floats]) -> tuple
             stiffness[:, :, j] += weight / STEP * sizes * efforts(moved, accelerated=False)[0].T
     good = np.isfinite(mass).all(axis=(1, 2)) & np.isfinite(stiffness).all(axis=(1, 2))
     good &= np.asarray(regularity(linear)) >= STALLED
-    good[good] = np.linalg.det(mass[good]) > 0
+    inertias, axes = np.linalg.eigh(np.where(good[:, None, None], mass + np.swapaxes(mass, 1, 2), np.eye(count)) / 2)
+    good &= inertias[:, 0] > NO_INERTIA * inertias[:, -1]
     squares, shapes = np.full((poses.count, count), np.nan), np.full((poses.count, count, count), np.nan)
     if good.any():
-        roots, vectors = np.linalg.eig(np.linalg.solve(mass[good], stiffness[good]))
+        root = axes[good] / np.sqrt(inertias[good])[:, None, :] @ np.swapaxes(axes[good], 1, 2)
+        largest = question.size * mechanism.size + np.abs(table[:, 0, good] * sizes[:, None]).max(axis=0)
+        rounding = ROUNDING * np.maximum(largest, np.abs(stiffness[good]).max(axis=(1, 2)))
+        skew = (stiffness[good] - np.swapaxes(stiffness[good], 1, 2)) / 2
+        even = stiffness[good] - np.where(np.abs(skew) <= rounding[:, None, None], skew, 0.0)
+        roots, vectors = np.linalg.eig(root @ even @ root)
         order = np.argsort(roots.real, axis=-1)
-        roots = np.take_along_axis(np.where(np.abs(roots.imag) > 0, np.nan, roots.real), order, axis=-1)
-        vectors = np.take_along_axis(vectors.real, order[:, None, :], axis=-1)
-        largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=1)[:, None, :], axis=1)
-        rounding = ROUNDING * np.linalg.norm(stiffness[good], axis=(1, 2)) / np.linalg.norm(mass[good], axis=(1, 2))
-        squares[good] = np.where(np.abs(roots) < rounding[:, None], 0.0, roots)
-        shapes[good] = vectors / largest
+        roots = np.take_along_axis(roots, order, axis=-1)
+        vectors = root @ np.take_along_axis(vectors, order[:, None, :], axis=-1)
+        # A mode of the mass 1 moves by its vector, and so rounding changes its square by that of K times the vector's.
+        rounding = rounding[:, None] * np.sum(np.abs(vectors) ** 2, axis=1)
+        roots = np.where(np.abs(roots.imag) <= rounding, roots.real, np.nan)
+        squares[good] = np.where(np.abs(roots) <= rounding, 0.0, roots)
+        largest = np.take_along_axis(vectors.real, np.abs(vectors.real).argmax(axis=1)[:, None, :], axis=1)
+        shapes[good] = vectors.real / largest
     return squares, shapes

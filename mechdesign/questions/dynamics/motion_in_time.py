@@ -21,6 +21,7 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
+from mechdesign.curve.motion import from_sketch
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value, quiet
@@ -164,6 +165,11 @@ class EquationsOfMotion:
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         self.crossings = [(name, mechanism.coordinate(crossing.of)) for name, crossing in section.events.items()]
         followed = [*drives, *(coordinate for _, coordinate in self.crossings), *mechanism.counting, *outputs]
+        if mechanism.windings:
+            followed += mechanism.windings.values()
+            begin = {drive.name: np.atleast_1d(in_study_units(self.study, drive, at.value(drive))) for drive in drives}
+            wound = from_sketch(self.study, Poses.single(begin))
+            at = replace(at, near={**at.near, **{name: angle[0] for name, angle in wound.items()}})
         self.drives, friction = drives, question.friction
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
         #: Signs of the contacts' velocities, 0 of those at rest.

@@ -77,7 +77,7 @@ class ForceQuestion:
     def statics(self) -> list[Static]:
         """Columns of a row a pose, and of the size of each joint's force."""
         mechanism, label = self.study.mechanism, self.study.units.label
-        moment = self.size * (mechanism.size or 1.0)
+        moment = self.size * mechanism.size
         sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo, "none": 1.0}
         of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
                     for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip
@@ -94,7 +94,7 @@ class ForceQuestion:
 
         What is balanced is the rounding of these.
         """
-        mechanism, length = self.study.mechanism, self.study.mechanism.size or 1.0
+        mechanism, length = self.study.mechanism, self.study.mechanism.size
 
         def size(term: Term | Value) -> float:
             return abs(float(mechanism.geometry.term(term, {})))
@@ -131,7 +131,7 @@ class ForceQuestion:
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
                 self.apply(applied, 0, poses, rows, moving)
                 borne = with_open_moments(
-                    borne, self.joints, applied, section, self.study.mechanism.size or 1.0, held.couplings
+                    borne, self.joints, applied, section, self.study.mechanism.size, held.couplings
                 )  # fmt: skip
             for name, reaction in zip(self.forces, borne, strict=True):
                 force = np.asarray(reaction.force)
@@ -304,5 +304,6 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False, cams=(),
+        watched=[*question.watched, *study.mechanism.windings.values()],
         borne=ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo),
     )  # fmt: skip

@@ -124,8 +124,8 @@ class DynamicsSection(MotionSection):
     start: {theta: 0}, efforts: {theta: "5 - 0.1*theta_velocity"}}
     """
     flywheel: Flywheel | None = None
-    """The flywheel that evens out the speed of the drive over the poses, a cycle at constant speed. Example:
-    {fluctuation: 0.05}
+    """The flywheel that evens out the speed of the drive, which the poses sweep over a cycle at a constant speed.
+    Example: {fluctuation: 0.05}
     """
     modes: bool = False
     """Whether natural frequencies of small motion about each pose are asked, of springs and gravity. Example: true"""

@@ -337,6 +337,15 @@ class Along:
         """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""
         return self.functions.means(self._means.get(name, name), power, _PACE, absolute=absolute)
 
+    def integral(self, name: str, s: Floats) -> Floats:
+        """Integral over rows of a column whose mean is asked, from the begin of the first motion to places in it."""
+        return self.functions.integral(self._means.get(name, name), np.zeros(len(s), dtype=np.intp), s)[0]
+
+    def crossings(self, name: str, level: float) -> Floats:
+        """Places of the first motion at which such a column passes a level."""
+        line, place = self.functions.crossings(self._means.get(name, name), [level], 0.0)
+        return np.asarray(place[line == 0])
+
     def knows(self, names: Collection[str]) -> bool:
         """Whether some columns have values along the motions."""
         pieces = self.curve.pieces

@@ -214,7 +214,7 @@ class MotionQuestion:
     @property
     def tempo(self) -> float:
         """About how fast the mechanism moves: radians, or sizes of it, in a unit of time."""
-        section, mechanism, size = self.section, self.study.mechanism, self.study.mechanism.size or 1.0
+        section, mechanism, size = self.section, self.study.mechanism, self.study.mechanism.size
         units = {"angle": self.study.units.angle_factor, "length": 1 / size}
         tempos = [(section.speed or 0.0) / size]
         for rates, order in ((section.rates, 1), (section.accelerations, 2)):

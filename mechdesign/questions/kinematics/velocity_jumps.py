@@ -39,7 +39,7 @@ def velocity_jumps(question: MotionQuestion, bodies: Collection[str], design: in
     velocity = moving_at(study, question.section, there, solved, linear).velocity
     if velocity is None or not len(places):
         return np.empty(0)
-    graph, size = study.mechanism.graph, study.mechanism.size or 1.0
+    graph, size = study.mechanism.graph, study.mechanism.size
     nodes = {graph.node(point) for body, point in graph.points if body in bodies}
     frames = {graph.bodies[body][0] for body in bodies}
     moves = [*(velocity.nodes[node] for node in nodes), *(size * np.asarray(velocity.angles[k]) for k in frames)]

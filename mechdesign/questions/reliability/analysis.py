@@ -12,6 +12,7 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
 from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
@@ -20,7 +21,7 @@ from mechdesign.questions.reliability.between import between_poses, places_betwe
 from mechdesign.questions.reliability.cycle import with_cycle
 from mechdesign.questions.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.questions.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
-from mechdesign.questions.reliability.forces import force_model, pace
+from mechdesign.questions.reliability.forces import force_model, kinds_of_forces, pace
 from mechdesign.questions.reliability.lengths import model_of
 from mechdesign.questions.reliability.method_warnings import method_warnings
 from mechdesign.questions.reliability.question import ambiguous_points, ask
@@ -57,6 +58,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     closer = places_between(study, task.question, poses) if task.question.limited else None
     if closer is not None:
         warnings += between_poses(task, _first_order(study, closer, sources)[0])
+    if kinds_of_forces(study):
+        warnings += assumed(study)
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,

@@ -105,8 +105,9 @@ class ForceModel:
 
     @property
     def coordinates(self) -> list[Coordinate]:
-        """Coordinates that the loads follow."""
-        return coordinates_in(self.question.study, self.question.section.loads)
+        """Coordinates that the loads and springs follow."""
+        study = self.question.study
+        return [*coordinates_in(study, self.question.section.loads), *study.mechanism.windings.values()]
 
     def take(self, rows: Sequence[int] | Ints) -> ForceModel:
         """The model at some of many poses."""
@@ -179,7 +180,7 @@ class ForceModel:
         if kind == "angle":
             return 1.0
         if kind == "length":
-            return mechanism.size or 1.0
+            return mechanism.size
         return max(abs(place.nominal) for place in places.values() if place.quantity == kind) or 1.0
 
 

@@ -112,7 +112,7 @@ def _quantity(mechanism: Mechanism, name: str) -> str:
 
 def _check_sizes(sources: Sources) -> None:
     """Raise a StudyError for deviations so large that their squares overflow."""
-    study, size = sources.study, sources.study.mechanism.size or 1.0
+    study, size = sources.study, sources.study.mechanism.size
     most = {
         "angle": (MAX_DEVIATION, "a million radians"),
         "length": (MAX_DEVIATION * size, "a million times the size of the mechanism"),

@@ -17,6 +17,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import (
     Keeper,
     Shown,
@@ -94,6 +95,8 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
             ends.append(End(counts=counts, error=error))
             continue
         warnings += cautions.of(slice(k * count, (k + 1) * count))
+        if body.given.dynamics:
+            warnings += assumed(study)
         ends.append(End(warnings, failed, invalid_in_words(study, reason), counts))
     all_tables = tables(study, body, poses, solved).values()
     if designs > 1:

@@ -138,7 +138,7 @@ def ask(study: Study) -> Body:
     carried = build_bodies(mechanism, None if lone else link, point, section, loaded) if lone or loaded else standing
     network = build_network(carried, whole=None in section.wrenches)
     condensed = section.link is None and (lone or link is not None)
-    return Body(study, section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size or 1.0)
+    return Body(study, section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size)
 
 
 def _loaded_points(study: Study, section: StiffnessSection) -> set[str]:

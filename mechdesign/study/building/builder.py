@@ -161,11 +161,25 @@ class Builder:
             if given.center is not None:
                 x, y = (self.place(f"{prefix}.center.{axis}", at) for axis, at in zip("xy", given.center, strict=True))
                 center = x, y
-            inertia = 0.0 if given.inertia is None else given.inertia
-            self.masses[body] = Mass(
-                self.place(f"{prefix}.mass", given.mass, "mass"), center,
-                self.place(f"{prefix}.inertia", inertia, "moment_of_inertia"),
-            )  # fmt: skip
+            mass, points = self.place(f"{prefix}.mass", given.mass, "mass"), self._joined(name, section, body)
+            if given.inertia == "rod":
+                if len(points) != 2:
+                    message = f"a rod runs between two joints, and {name!r} has {len(points)}; give the inertia"
+                    self.report(("links", name, "inertia"), message)
+                self.masses[body] = Mass(mass, center, points=points, slender=True)
+                continue
+            moment = 0.0 if given.inertia is None else given.inertia
+            inertia = self.place(f"{prefix}.inertia", moment, "moment_of_inertia")
+            self.masses[body] = Mass(mass, center, inertia, points, left_out=given.inertia is None)
+
+    def _joined(self, name: str, section: models.Link, body: str) -> tuple[str, ...]:
+        """The joints of a body, or where it has a single one its ends, or all its points."""
+        if body != name:
+            return (section.to or "",)
+        own = [point for point in self.section.points_of(name) if not (section.telescopic and point == section.to)]
+        joints = [point for point in own if point in self.section.joined]
+        ends = [] if section.telescopic or section.from_ is None else own[:2]
+        return tuple(next((some for some in (joints, ends) if len(some) > 1), own))
 
     def nominal(self, term: Term) -> float:
         """Nominal value of a term (angles in radians)."""

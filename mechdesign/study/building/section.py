@@ -98,11 +98,13 @@ class Link(fields.Model):
     ``density``, else massless. Example: 0.5 kg
     """
     center: Point | None = None
-    """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its points. Example: [45,
-    0]
+    """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its joints; of a link
+    with a single joint, of its ends, or of all its points. Example: [45, 0]
     """
-    inertia: fields.NonNegativeInertiaPlace | None = None
-    """Moment of inertia about the centre of mass. Left out: 0, a point mass. Example: 0.002 kg*m^2"""
+    inertia: fields.BarInertiaPlace | None = None
+    """Moment of inertia about the centre of mass; 'rod' is that of a slender bar between its two joints, m l^2/12. Left
+    out: 0, a point mass. Example: 0.002 kg*m^2 Example: rod
+    """
     rod: Rod | None = None
     """Mass of the second body of a telescopic link, the one with ``to``. Example: {mass: 1.2 kg, center: [-100, 0]}"""
     width: fields.PositiveLengthPlace | None = None
@@ -263,7 +265,9 @@ class Spring(fields.Model):
     free_length: fields.NonNegativeLengthPlace | None = None
     """Distance of the points at which the stiffness pulls with no force; 0 is allowed. Example: 60"""
     free_angle: fields.AnglePlace | None = None
-    """Angle from the first link's x axis to the second's at which it turns with no moment. Example: 20 deg"""
+    """Angle from the first link's x axis to the second's at which it turns with no moment. Its whole turns count, and
+    those of the links from the sketch on. Example: 20 deg Example: -250 deg
+    """
     preload: fields.AnyPlace | None = None
     """Pull, or moment, at the free length or angle. Left out: 0. Example: 5 N"""
     damping: fields.NonNegativePlace | None = None
@@ -589,6 +593,13 @@ class MechanismSection(fields.Model):
             for point in self.points_of(link):
                 owners.setdefault(point, []).append(link)
         return owners
+
+    @cached_property
+    def joined(self) -> frozenset[str]:
+        """Points at which links are joined: pins, points that slide, and those that lines of slides go through."""
+        pins = [point for point, links in self.owners.items() if len(links) > 1]
+        sliding = [joint.point for joint in self.joints.values() if joint.point is not None]
+        return frozenset([*pins, *sliding, *(point for joint in self.joints.values() for point in joint.through or ())])
 
     @cached_property
     def ends(self) -> Mapping[str, tuple[str, str]]:

@@ -22,6 +22,11 @@ DIGITS = 6e-4
 # An angle above so many turns, in radians, is likely meant in degrees if it is a multiple of the step.
 MOST_TURNS = 4
 STEP = 5
+# Gravity on the earth, how far from it that of a place may be, as a part of it, and units in which it is known.
+EARTH, ON_EARTH = "9.80665 m/s^2", 0.01
+ACCELERATIONS = ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2")
+# Pitch radii of a wheel that differ by this part or less are one; by more than the second no profile shift makes both.
+ONE_CIRCLE, SHIFTED = 1e-3, 0.05
 # Ratio of the largest link to the smallest from which their units likely differ.
 APART = 1000
 
@@ -31,9 +36,12 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
     for part in parts.values():
         if isinstance(part, PoseSection):
             _angles(checker, part)
+    if (dynamics := parts.get("dynamics")) is not None:
+        _gravity(checker, dynamics.gravity)
     _lengths(checker, description)
     _pivots(checker, description.links[GROUND], description)
     _wheels(checker)
+    _planets(checker)
     reliability = parts.get("reliability")
     if reliability is not None:
         _tolerances(checker, reliability)
@@ -60,6 +68,20 @@ def _angles(checker: Checker, section: PoseSection) -> None:
         if slips and other != checker.units.angle:
             unit = checker.units.label("angle")
             checker.doubt(path, f"{slips[0]:g} is in {unit} here; if {other} is meant, say so: {slips[0]:g} {other}")
+
+
+def _gravity(checker: Checker, gravity: tuple[float, float]) -> None:
+    """Warn of a gravity without a unit that is that of the earth in another one, as 9.81 in a study in mm."""
+    units, size = checker.units, math.hypot(*gravity)
+    if units.length == "dimensionless" or any(map(text_of, gravity)):
+        return
+    earth = units.convert(EARTH)
+    if size and abs(size / earth - 1) > ON_EARTH:
+        for other in ACCELERATIONS:
+            if abs(size * units.convert(f"1 {other}") / earth - 1) < ON_EARTH:
+                unit = units.label("acceleration")
+                message = f"{size:g} is in {unit} here; if {other} is meant, say so: {size:g} {other}"
+                checker.doubt(("dynamics", "gravity"), message)
 
 
 def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
@@ -133,6 +155,29 @@ def _wheels(checker: Checker) -> None:
         noun = "pulleys" if given.wheels == "belt" else "wheels"
         message = f"no {noun} can make coupling {coupling.name!r}, and their forces are left out: {reason}"
         checker.doubt(("mechanism", "couplings", coupling.name, described[0]), message)
+
+
+def _planets(checker: Checker) -> None:
+    """Refuse wheels between coaxial ones that need two pitch circles far apart, and warn of those a little apart."""
+    mechanism = checker.compiled
+    if mechanism is None:
+        return
+    drawn = mechanism.sketch_configuration
+    circles: dict[tuple[str, frozenset[int]], tuple[str, float]] = {}
+    for mesh in (mesh for mesh in mechanism.meshes if mesh.slide < 0 and not mesh.belt):
+        for link, radius in zip(mesh.links, map(float, mesh.radii(drawn)), strict=True):
+            coupling, other = circles.setdefault((link, frozenset(mesh.axes)), (mesh.coupling, radius))
+            if not abs(radius - other) > ONE_CIRCLE * other:
+                continue
+            unit, (one, two) = checker.units.label("length"), (mechanism.graph.nodes[axis] for axis in mesh.axes)
+            apart = abs(complex(drawn.point(one) - drawn.point(two)))
+            message = (
+                f"wheel {link!r} needs a pitch radius of {other:.6g} {unit} for {coupling!r} and of {radius:.6g} "
+                f"{unit} here, on axes {apart:.6g} {unit} apart; mend a ratio (a ring has the teeth of its sun and "
+                "twice those of a planet), clamp two links for a planet of two wheels, or write wheels: none"
+            )
+            say = checker.report if abs(radius - other) > SHIFTED * other else checker.doubt
+            say(("mechanism", "couplings", mesh.coupling), message)
 
 
 def _points(link: Link, description: Description) -> dict[str, complex]:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import islice, pairwise
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
@@ -250,6 +250,15 @@ def number(
         return size
 
     return Read(read, NUMBER_FORM, kind or "")
+
+
+def or_word(size: Read, word: str) -> Read:
+    """Annotation of a number, or of a word in its place; a parameter of that name goes before it."""
+
+    def read(raw: Any, context: Context) -> Amount | str:
+        return word if raw == word and word not in context.parameters else size.function(raw, context)
+
+    return Read(read, {"anyOf": [NUMBER_FORM, {"const": word}]}, size.kind)
 
 
 def positive(minimum: float, *, exclusive: bool) -> str:
@@ -539,6 +548,7 @@ AnglePlace = Annotated[Amount, number("angle", place=True)]
 NonNegativeLengthPlace = Annotated[Amount, number("length", 0.0, place=True)]
 NonNegativeMassPlace = Annotated[Amount, number("mass", 0.0, place=True)]
 NonNegativeInertiaPlace = Annotated[Amount, number("moment_of_inertia", 0.0, place=True)]
+BarInertiaPlace = Annotated[Amount | Literal["rod"], or_word(number("moment_of_inertia", 0.0, place=True), "rod")]
 AnyPlace = Annotated[Amount, number(place=True)]
 NonNegativePurePlace = Annotated[Amount, number("none", 0.0, place=True)]
 NonNegativePlace = Annotated[Amount, number(None, 0.0, place=True)]

@@ -114,7 +114,7 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
 
 def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     """Step of each component, from its standard deviation `sigma` and from how far it moves the mechanism."""
-    length, places = sources.study.mechanism.size or 1.0, sources.study.mechanism.description.places
+    length, places = sources.study.mechanism.size, sources.study.mechanism.description.places
     scale = np.full(len(sigma), length)
     for k, scalar in enumerate(sources.scalars):
         reach = [(1.0 if quantity == "angle" else length) / abs(float(slope))
