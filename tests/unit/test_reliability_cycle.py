@@ -236,6 +236,7 @@ def between(step: float, top: float) -> tuple[list[str], float]:
     return warnings, float(table["failure"][table["scope"] == "pose"].max())
 
 
+@pytest.mark.slow
 def test_a_limit_that_fails_between_the_poses_of_a_sweep_is_told() -> None:
     moved = mechdesign.kinematics(mechdesign.load(text=SWEPT.partition("reliability:")[0] + """
 kinematics: {sweep: {theta: {from: 0, to: 360, step: 0.25}}, outputs: [rocker.angle]}
@@ -265,6 +266,7 @@ def test_poses_between_which_a_motion_cannot_be_assembled_are_told() -> None:
     assert "1, as it cannot be assembled there" in warning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", ["{pulse: {usl: 0.5}}", "{theta_effort: {lsl: -100, usl: 100}}"])
 def test_what_is_narrow_between_the_poses_is_told(limit: str) -> None:
     """A measure and a load that act over a tenth of a degree, between poses of 5 deg."""
