@@ -15,6 +15,7 @@ import numpy as np
 
 from mechdesign.curve.anchors import Anchors, inputs, steps_of, units_of
 from mechdesign.curve.pieces import Pieces, Search
+from mechdesign.curve.turns import drive_turns
 from mechdesign.expressions import Corner
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
@@ -284,7 +285,8 @@ class Curve:
         rank = np.searchsorted(lines, pieces.line)
         near: Mapping[str, Value] = self.mechanism.drawn_windings
         if not self._drawn and len(lines) and not near.keys().isdisjoint(angle.name for angle in self.angles):
-            near = from_sketch(self.study, self.inputs(lines, place)[0])
+            poses = self.inputs(lines, place)[0]
+            near = from_sketch(self.study, poses.groups[0].values, poses.places)
         for angle, row in zip(self.angles, coefficients, strict=True):
             begin = chebyshev.value(row[first], x)
             turns = -np.ceil((begin - np.pi) / TURN - ON_THE_CUT)
@@ -329,37 +331,26 @@ class Curve:
         return np.concatenate(rows)
 
 
-def from_sketch(study: Study, poses: Poses) -> dict[str, Floats]:
-    """Angles of torsion springs at a batch of poses (radians), with the turns of the straight way from the sketch."""
-    mechanism, sketch = study.mechanism, study.mechanism.sketch_configuration
-    given = mechanism.plan(poses.names).structure.given
-    begin = {c.name: float(sketch.value(c)) / unit for c, unit in zip(given, units_of(study, given), strict=True)}
-    curve = Curve(study, poses.ways(begin), [*mechanism.windings.values()], drawn=True)
-    turned = curve.turned(np.arange(poses.count), np.ones(poses.count))
-    return {name: np.where(curve.spent, drawn, angles)
-            for (name, drawn), angles in zip(mechanism.drawn_windings.items(), turned, strict=True)}  # fmt: skip
-
-
-def drive_turns(
-    mechanism: Mechanism, drive: str, begin: Floats, least: Floats, most: Floats, sizes: Mapping[str, Value]
-) -> Floats:
-    """Whole turns to add to a drive's angle, so that its motion is within its limits, or begins near the sketch.
+def from_sketch(study: Study, given: Mapping[str, Floats], places: Mapping[str, Value]) -> dict[str, Floats]:
+    """Angles of torsion springs at poses (radians), with the turns of the straight way there from the sketch.
 
     Parameters
     ----------
-    begin, least, most : ndarray, shape (n,)
-        The drive's angle where each motion begins, and its extremes (radians).
-    sizes : mapping
+    given : mapping
+        What each pose gives, in the study's units, shape (n,).
+    places : mapping
         Places that differ from the nominal ones, of shape (n,).
     """
-    drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
-    turns = np.round((drawn - begin) / TURN)
-    for bound in mechanism.bounds:
-        low, high = bound.ends({**mechanism.nominal, **sizes})
-        own = bound.drive and bound.of_angle and bound.coordinate.name == drive
-        if own and low is not None and high is not None:
-            # The whole motion where it fits within the limits, or else its begin.
-            for smallest, largest in ((begin, begin), (least, most)):
-                fewest, greatest = np.ceil((low - smallest) / TURN), np.floor((high - largest) / TURN)
-                turns = np.where(fewest <= greatest, np.clip(turns, fewest, greatest), turns)
-    return np.asarray(turns)
+    mechanism, sketch = study.mechanism, study.mechanism.sketch_configuration
+    if not mechanism.windings or not given:
+        return {}
+    coordinates, count = mechanism.plan(tuple(given)).structure.given, len(next(iter(given.values())))
+    begin = [float(sketch.value(c)) / unit for c, unit in zip(coordinates, units_of(study, coordinates), strict=True)]
+    ways = {name: np.stack([np.full(count, drawn), column], axis=1).ravel()
+            for (name, column), drawn in zip(given.items(), begin, strict=True)}  # fmt: skip
+    both = {name: np.repeat(column, 2) for name, column in places.items()}
+    poses = replace(Poses.single(ways, (2,)), designs=count, places=both)
+    curve = Curve(study, poses, [*mechanism.windings.values()], drawn=True)
+    turned = curve.turned(np.arange(count), np.ones(count))
+    return {name: np.where(curve.spent, drawn, angles)
+            for (name, drawn), angles in zip(mechanism.drawn_windings.items(), turned, strict=True)}  # fmt: skip

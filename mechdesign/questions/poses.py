@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from mechdesign.cautions import Caution
 from mechdesign.curve.anchors import Anchors
 from mechdesign.curve.corners import curve_of
-from mechdesign.curve.motion import Curve, drive_turns, from_sketch
+from mechdesign.curve.motion import Curve, from_sketch
+from mechdesign.curve.turns import drive_turns
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
@@ -157,11 +158,8 @@ def _solve_group(
 
     turns = _Turns(study, poses, angles, curve)
     for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
-        near = turns.near(group.rows[piece], configuration)
-        if poses.listed and mechanism.windings:
-            values = {name: column[piece] for name, column in group.values.items()}
-            places = {name: column[group.rows[piece]] for name, column in poses.places.items()}
-            near = from_sketch(study, replace(Poses.single(values), places=places))
+        rows, values = group.rows[piece], {name: column[piece] for name, column in group.values.items()}
+        near = from_sketch(study, values, dimensions(poses, rows)) if poses.listed else turns.near(rows, configuration)
         configuration = replace(
             configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys()
         )

@@ -209,14 +209,6 @@ class Poses:
         moving = with_length(self.paths)
         return moving[0][0] if len(moving) == 1 and self.program is None else None
 
-    def ways(self, begin: Mapping[str, float]) -> Poses:
-        """A straight motion to each pose of a batch from the same values, in the study's units."""
-        (group,) = self.groups
-        values = {name: np.stack([np.full(self.count, begin[name]), column], axis=1).ravel()
-                  for name, column in group.values.items()}  # fmt: skip
-        places = {name: np.repeat(column, 2) for name, column in self.places.items()}
-        return replace(Poses.single(values, (2,)), designs=self.count, places=places)
-
     def pace(self, line: Ints, s: Floats, of: str | None = None) -> Floats:
         """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
 

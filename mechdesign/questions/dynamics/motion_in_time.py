@@ -168,7 +168,7 @@ class EquationsOfMotion:
         if mechanism.windings:
             followed += mechanism.windings.values()
             begin = {drive.name: np.atleast_1d(in_study_units(self.study, drive, at.value(drive))) for drive in drives}
-            wound = from_sketch(self.study, Poses.single(begin))
+            wound = from_sketch(self.study, begin, {})
             at = replace(at, near={**at.near, **{name: angle[0] for name, angle in wound.items()}})
         self.drives, friction = drives, question.friction
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
