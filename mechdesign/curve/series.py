@@ -212,8 +212,11 @@ class Series:
         # What is rounding everywhere is nowhere nearly zero.
         sizes[sizes < (NOISE * self._sizes[rows, None]) ** 2] = 0.0
         small = NEARLY_ZERO**2 * sizes[:, pieces.line]
+        most, least = (f(np.nan_to_num(squares), axis=2) for f in (np.max, np.min))
+        # Where a magnitude does not change along a piece, such as zero in a dwell, its least value is rounding's.
+        flat = most - least <= NOISE * np.maximum(most, NOISE * sizes[:, pieces.line])
         with np.errstate(invalid="ignore"):
-            magnitude, piece = np.nonzero(squares.min(axis=2, initial=np.inf) < small)
+            magnitude, piece = np.nonzero((squares.min(axis=2, initial=np.inf) < small) & ~flat)
         series = chebyshev.series(squares[magnitude, piece])
         # A value loses digits by the size of the largest, its square in proportion to both.
         size = np.sqrt(sizes[magnitude, pieces.line[piece]] * np.abs(series).max(axis=1, initial=0.0))

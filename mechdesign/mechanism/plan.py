@@ -9,24 +9,23 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import TURN, Value, angle_of, nearest, picked, quiet
+from mechdesign.mechanism.algebra import TURN, Value, angle_of, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
-from mechdesign.mechanism.continuation import Start, follow
+from mechdesign.mechanism.continuation import Start
 from mechdesign.mechanism.coordinates import Coordinate, angles_of, leaves
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
 from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
 from mechdesign.mechanism.structure import Group, Structure
+from mechdesign.mechanism.way import flat, way_to
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.threads import keep_freed_memory
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
-# Between the start and a pose, corrections this small are enough (radians, or parts of the mechanism's size).
-PATH_PRECISION = 1e-3
 # Poses of a chunk: the fastest of 4,096 to 262,144, measured.
 CHUNK = 32768
 # The same on several threads, which gain only on longer arrays: each operation passes on the interpreter's lock.
@@ -57,7 +56,7 @@ class Plan:
         # Given and coupled values that move these angles.
         behind = frozenset[int]().union(*(structure.behind(angle, core.graph) for angle in self.angles))
         moving = structure.coupled & {k for index in behind for k in structure.groups[index].conditions}
-        self._pacing = [*range(len(structure.given)), *sorted(moving)] if self.angles else []
+        self.pacing = [*range(len(structure.given)), *sorted(moving)] if self.angles else []
 
     @cached_property
     def _within_given(self) -> tuple[str, ...]:
@@ -138,7 +137,7 @@ class Plan:
         guess = self.unknowns(at, given)
         turns = [at.value(angle) for angle in self.angles]
         state = self.run(given, at.vectors, guess, turns=turns)
-        moving = [state.given[k] for k in self._pacing]
+        moving = [state.given[k] for k in self.pacing]
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants], turns + moving)
 
     def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
@@ -195,7 +194,7 @@ class Plan:
         keep_freed_memory()
         if self.change_points is not None:
             self.change_points.cover(values[0])
-        flat, sizes = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
+        columns, sizes = [flat(v, shape) for v in values], {name: flat(v, shape) for name, v in dims.items()}
         length = CHUNK if self.continued or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
@@ -207,7 +206,7 @@ class Plan:
                 begun = start.take(np.unravel_index(starts[rows], start.shape))
             dimensions = {name: picked(v, rows) for name, v in sizes.items()}
             own = None if vectors is None else vectors.take(rows)
-            drives = [picked(v, rows) for v in flat]
+            drives = [picked(v, rows) for v in columns]
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
@@ -236,7 +235,7 @@ class Plan:
         turns: Floats = np.empty((0, *shape))
         if self.continued:
             begin = self.start(start)
-            guess, reached, turns = self._follow(values, dims, shape, begin)
+            guess, reached, turns = way_to(self, values, dims, shape, begin)
         vectors = vectors or self.core.geometry.vectors(dims)
         state = self.run(values, vectors, guess, self.modes_at(values), turns=turns)
         if self.iterative and reached is not None:
@@ -310,63 +309,6 @@ class Plan:
         """Angles whose turns are given."""
         return frozenset(c.name for c in self.structure.given if c.kind == "angle")
 
-    def _follow(
-        self,
-        values: Sequence[Value],
-        dims: Mapping[str, Value],
-        shape: tuple[int, ...],
-        begin: Start,
-    ) -> tuple[Floats, Flags, Floats]:
-        geometry, count = self.core.geometry, int(np.prod(shape))
-        begin = begin.map(lambda value: _flat(value, shape))
-        places = {name: _flat(v, shape) for name, v in dims.items()}
-
-        def stepped(
-            at: Sequence[Value], sizes: Mapping[str, Value], guess: Floats, steps: int, near: Floats
-        ) -> tuple[State, Floats]:
-            state = self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION, turns=near)
-            there = state.pose()
-            turned = [*(there.value(angle) for angle in self.angles), *(state.given[k] for k in self._pacing)]
-            shape = near.shape[1:]
-            return state, np.array([np.broadcast_to(value, shape) for value in turned]).reshape(near.shape)
-
-        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags, Floats]:
-            def some(value: Value) -> Value:
-                return value if rows is None else picked(value, rows)
-
-            return follow(
-                self.structure,
-                stepped,
-                begin.map(some),
-                [some(v) for v in given],
-                {name: some(v) for name, v in places.items()},
-                self.core.nominal,
-                self.core.size,
-                count if rows is None else len(rows),
-                units,
-            )
-
-        pacing = [self.structure.values[k] for k in self._pacing]
-        units = np.array([
-            *(angle.turn / TURN for angle in self.angles),
-            *(1.0 if c.quantity == "angle" else self.core.size for c in pacing),
-        ])  # fmt: skip
-        given = [_flat(v, shape) for v in values]
-        unknowns, reached, near = solve(given, None)
-        # Where the given turns are not reached, the pose is the same with its angles less than half a turn away.
-        turned = [
-            nearest(v, at) if c.quantity == "angle" else v
-            for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
-        ]
-        other = np.any([np.broadcast_to(one != two, (count,)) for one, two in zip(given, turned, strict=True)], axis=0)
-        rows = np.flatnonzero(other & ~reached & np.isfinite(near).all(axis=0))
-        if len(rows):
-            better, there, turns = solve(turned, rows)
-            unknowns[:, rows[there]], reached[rows] = better[:, there], there
-            near[:, rows[there]] = turns[:, there]
-        near = near[: len(self.angles)]
-        return unknowns.reshape(len(unknowns), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
-
     def configuration(
         self,
         state: State,
@@ -436,9 +378,3 @@ class Plan:
                 for _, margin in bound.margins(configuration, places):
                     outside = np.broadcast_to(margin, configuration.shape) < -slack
                     reason[outside & (reason == Reason.OK)] = Reason.LIMIT
-
-
-def _flat(value: Value, shape: tuple[int, ...]) -> Value:
-    """A flat batch; a value that is the same for every pose stays a single number."""
-    value = np.asarray(value)
-    return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)
