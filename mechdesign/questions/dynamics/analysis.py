@@ -146,8 +146,10 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=Courses(question))
-    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
+    # Between poses of which one jams nothing is said.
+    a_pose = whole if along is None else replace(whole, follow=Courses(question))
+    scopes = {**dict.fromkeys(A_ROW_A_POSE, a_pose), "modes": replace(whole, poses_only=True)}
+    scoped = {name: replace(table, scope=scopes.get(name, whole)) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends

@@ -58,7 +58,8 @@ def joint_table(motion: Motion) -> Table:
     }
     pose_columns = [replace(column, values=per_joint(column.values)) for column in motion.pose_columns()]
     columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)
-    return JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
+    bears = JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
+    return replace(bears, strands=question.strands)
 
 
 @quiet

@@ -82,6 +82,7 @@ class Along:
         shown = {*((*columns, *question.rates) if names is None else names), *also}
         judged = dict.fromkeys([*also, *(request.column for request in whole)])
         followed = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
+        columns |= {name: size for name, size in question.parts.items() if name in followed}
         self._others = [name for name in followed if name not in columns]
         columns = {name: size for name, size in columns.items() if name in followed}
         columns |= dict.fromkeys(self._others, 0.0) | {
@@ -146,7 +147,7 @@ class Along:
         """What functions with poles are divided by, and how often."""
         question = self.question
         rates = INVERSE if question.inverse else FORWARD
-        divisors = {static.name: (FORWARD, 1) for static in question.statics}
+        divisors = {name: (FORWARD, 1) for name in (*(static.name for static in question.statics), *question.parts)}
         divisors |= {name: (f"rate of {name}", 1) for name in self._poles}
         for name in self._others:
             output, _, order = name.rpartition("_")

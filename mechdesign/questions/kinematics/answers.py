@@ -85,7 +85,7 @@ def answers_of(passage: Passage) -> list[Group]:
     ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, course=Courses(question))
+    a_pose = replace(whole, follow=Courses(question))
     scoped = {
         name: replace(tables[name], scope=a_pose if name in A_ROW_A_POSE else whole) for name in ORDER if name in tables
     }
