@@ -330,9 +330,9 @@ def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) 
     for column in table.columns:
         if column.numeric:
             freedom -= 1
-            if freedom < 0 or column.name == judged:
+            if column.name == judged or (freedom < 0 and table.strands is None):
                 break
-            parts.append(f"{column.name} {column.values[row]:.6g}")
+            parts += [f"{column.name} {column.values[row]:.6g}"] if freedom >= 0 else []
         else:
             parts.append(f"{column.name} {column.values[row]}")
     return ", ".join(parts) or f"row {begin + row + 1}"

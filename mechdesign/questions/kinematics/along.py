@@ -99,12 +99,13 @@ class Along:
         if passages and set(question.poses.names) != drives:
             structure = mechanism.forward.structure
             self._groups = [k for k, group in enumerate(structure.groups) if group.solved]
-        self._errors = any(name.endswith("_error") for name in columns)
+        needed = {*columns, *(name for request in requests for name in request.columns)}
+        self._errors = any(name.endswith("_error") for name in needed)
         self._poles = [name for name in question.poled if name in columns]
         self._chains: dict[str, tuple[int, ...]] = {}
         divisors = self._divisors()
         # The part of the question that the columns need.
-        self._lean = question.lean({*columns, *(name for request in requests for name in request.columns)})
+        self._lean = question.lean(needed)
         self.curve = curve = corners.divided(self._lean, curve, errors=self._errors)
         angles = {angle.name for angle in curve.angles}
         self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
