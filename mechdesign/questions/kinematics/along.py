@@ -194,7 +194,7 @@ class Along:
             matrix = unitless(mechanism, linear, outputs)[1]
             arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
         for name in self._poles:
-            arrays[f"rate of {name}"] = pole(self._lean, linear, name) * forward
+            arrays[f"rate of {name}"] = pole(motion, linear, name) * forward
         for k, loop in enumerate(self._loops):
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)

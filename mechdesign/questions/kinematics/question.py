@@ -187,7 +187,8 @@ class MotionQuestion:
     def poled(self) -> list[str]:
         """Columns that go to infinity where nothing is singular."""
         advantages = [f"{name}_advantage" for name in self.section.mechanical_advantage]
-        return advantages + [f"{cam.coupling}_curvature_radius" for cam in self.cams]
+        centres = [column for centre in self.centres for column in centre.columns]
+        return [*advantages, *(f"{cam.coupling}_curvature_radius" for cam in self.cams), *centres]
 
     @cached_property
     def friction(self) -> Friction | None:
