@@ -140,7 +140,8 @@ def tables(
 def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
-    answers, along = tables(passage.motion, question, TABLES)
+    normals = [Request(name, end=-1) for name in lift_off.contacts(question_of(passage.motion)).values()]
+    answers, along = tables(passage.motion, question, TABLES, requests=normals)
     further, warnings = further_tables(passage.motion, along)
     answers |= further
     closely = along is not None and not along.functions.unresolved.any()
@@ -192,8 +193,11 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     warnings += beyond_profile(study, poses, passage.marks[k], "dynamics", k)
     for name, mark in passage.marks[k].items():
+        coupling = name.removeprefix(_LIFTED)
         if name.startswith(_LIFTED) and mark.number:
-            warnings.append(lift_off.caution(study, poses, name.removeprefix(_LIFTED), mark, k))
+            warnings.append(lift_off.caution(study, poses, coupling, mark, k))
+        elif name.startswith(_LIFTED) and along is not None:
+            warnings += lift_off.between(question_of(passage.motion), along, coupling, k)
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")

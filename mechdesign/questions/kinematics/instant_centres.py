@@ -65,6 +65,7 @@ class Centre:
         frames = [graph.bodies[name][0] for name in (self.one, self.other)]
         points = [[point for body, point in graph.points if body == name] for name in (self.one, self.other)]
         pins = [point for point in points[0] if point in points[1]]
+
         def full(value: Vector, kind: type) -> np.ndarray:
             return np.broadcast_to(np.asarray(value, dtype=kind), shape)
 
