@@ -113,4 +113,4 @@ def _between(along: Along, name: str, poses: Floats) -> Floats:
     whole = np.stack([*ends, along.mean(name), np.sqrt(np.maximum(square, 0.0))], axis=1)
     # What stands still keeps the place of the first pose.
     whole[constant, 1:6:2] = poses[constant, 1:6:2]
-    return np.where(np.isnan(whole), poses, whole)
+    return np.where(np.isnan(low)[:, None], poses, whole)

@@ -183,7 +183,8 @@ class Along:
             for error in targets.errors(self.question.study, whole, motion.arrays, rows, between=True):
                 arrays[error.name] = error.values
         signed = linear.conditionings
-        arrays[FORWARD] = forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
+        forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
+        arrays[FORWARD] = np.abs(forward) if corners.passes_singularities(self._lean) else forward
         arrays |= {f"group {k}": signed[k] for k in self._groups}
         for chain, groups in self._chains.items():
             arrays[chain] = np.prod(np.broadcast_arrays(np.ones(len(s)), *(signed[k] for k in groups)), axis=0)
