@@ -148,7 +148,7 @@ class Along:
         """What functions with poles are divided by, and how often."""
         question = self.question
         rates = INVERSE if question.inverse else FORWARD
-        divisors = {name: (FORWARD, 1) for name in (*(static.name for static in question.statics), *question.parts)}
+        divisors = dict.fromkeys((*(static.name for static in question.statics), *question.parts), (FORWARD, 1))
         divisors |= {name: (f"rate of {name}", 1) for name in self._poles}
         for name in self._others:
             output, _, order = name.rpartition("_")
