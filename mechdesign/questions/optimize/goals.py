@@ -48,7 +48,7 @@ class Goal:
     outline : Outline, optional
         A shape that the workspace has to contain; the largest scale at which it does is judged.
     gate : bool
-        Whether it is a condition, which has to hold between the poses of a motion, too. Of a goal only the rows count.
+        Whether it is a condition.
     """
 
     name: str
@@ -113,14 +113,13 @@ class Goal:
         for course in chosen.courses.values() if self.requests(chosen) else ():
             between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
             extreme = np.where(lost, np.nan, take(extreme, np.abs(between) if absolute else between))
-            between = np.where(np.isnan(between), extreme, between)
-            rows = None if rows is None else np.column_stack([rows, between])
+            if self.gate and rows is not None:
+                rows = np.column_stack([rows, np.where(np.isnan(between), extreme, between)])
         return Judgement(extreme, rows)
 
     def requests(self, chosen: Chosen) -> list[Request]:
-        """How a column is followed between the poses, for conditions, statistics and parts of a motion."""
-        between = self.gate or chosen.statistic or chosen.part
-        if not between or chosen.picked:
+        """How a column is followed between the poses; not at all where single poses are picked."""
+        if chosen.picked:
             return []
         both = self.absolute or bool(chosen.statistic)
         return [request._replace(end=0 if both else 1 if self.smallest else -1) for request in chosen.requests]
@@ -132,9 +131,10 @@ class Judgement(NamedTuple):
     Parameters
     ----------
     values : ndarray, shape (designs,)
-        The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
+        The worst of the rows and of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
-        The signed rows that count, then of a condition the worst value between them; None where designs do not have the
+        The signed rows that count, then of a condition the worst value between them: that is not smooth in the design,
+        and would mislead a search for the best, but a condition must hold there. None where designs do not have the
         same number of rows. Of a root mean square over targets, where the result has the motion, errors whose squares
         add up to its square.
     squares : bool

@@ -271,10 +271,17 @@ class Judge:
 
     def _points(self, u: Floats, rows: Floats) -> Points:
         values = np.where(rows[:, [self.layout.code]] > 0, np.nan, rows[:, self.layout.values])
+        behind = rows[:, self.layout.head :]
+        # A search is led by the worst rows, which are smooth in the design; what is told is the worst of the motion.
+        for part in self.parts() if behind.shape[1] == self.layout.width - self.layout.head else ():
+            if 0 <= part.column < len(self.goals) and not part.squares:
+                leading = part.sign * part.pieces(behind).max(axis=1)
+                told = values[:, part.column]
+                values[:, part.column] = np.where(np.isnan(leading + told), told, leading)
         margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
         return Points(
-            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
-            rows[:, self.layout.head :], rows[:, self.layout.shortfall],
+            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)), behind,
+            rows[:, self.layout.shortfall],
         )  # fmt: skip
 
     def nearest(self) -> int | None:
