@@ -155,7 +155,7 @@ class Strands(NamedTuple):
     columns : tuple of str
         Columns that each row has of its own; along a motion they are called ``B_force.fx``.
     main : str
-        The column that a name alone means.
+        The column that a name alone means, also along a motion.
     """
 
     names: tuple[str, ...]

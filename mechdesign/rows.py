@@ -85,10 +85,11 @@ class Chosen:
         integral = bool(self.statistic) and STATISTICS[self.statistic].integral
         if self.strands is None or self.table.strands is None:
             return (Request(self.column, self.part, integral),)
-        names, own, _ = self.table.strands
+        names, own, main = self.table.strands
 
         def request(strand: str) -> Request:
-            column, *ends = (f"{strand}.{name}" if name in own else name for name in (self.column, *dict(self.part)))
+            columns = {name: f"{strand}.{name}" for name in own} | {main: strand}
+            column, *ends = (columns.get(name, name) for name in (self.column, *dict(self.part)))
             part = tuple((end, interval) for end, (_, interval) in zip(ends, self.part, strict=True))
             return Request(column, part, integral)
 

@@ -95,8 +95,10 @@ class ForceQuestion:
 
         Directions jump by a turn: they are those of the poses.
         """
-        sizes = dict.fromkeys(PARTS, self.size) | {"moment": self.size * (self.study.mechanism.size or 1.0)}
-        return {f"{name}.{part}": sizes[part] for name in self.strands.names for part in PARTS if part != "angle"}
+        sizes = {"fx": self.size, "fy": self.size, "moment": self.size * (self.study.mechanism.size or 1.0),
+                 "normal": self.size}  # fmt: skip
+        names = self.strands.names
+        return {f"{name}.{part}": size for name in names for part, size in sizes.items()} | dict.fromkeys(names, self.size)
 
     @property
     def strands(self) -> Strands:
