@@ -148,7 +148,9 @@ class Designs:
 
     def score(self, row: Floats) -> Floats:
         """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
-        return np.where(self.feasible, self.score_of(self.values, row), np.nan)
+        score = np.full(len(self), np.nan)
+        score[self.feasible] = self.score_of(self.values[self.feasible], row)
+        return score
 
     def score_of(self, values: Floats, row: Floats) -> Floats:
         """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
@@ -162,7 +164,9 @@ class Designs:
 
     def share(self, k: int) -> Floats:
         """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
-        return np.where(self.feasible, self._normalised(self.values, k), np.nan)
+        share = np.full(len(self), np.nan)
+        share[self.feasible] = self._normalised(self.values[self.feasible], k)
+        return share
 
     def _normalised(self, values: Floats, k: int) -> Floats:
         """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
