@@ -98,7 +98,9 @@ class ForceQuestion:
         sizes = {"fx": self.size, "fy": self.size, "moment": self.size * (self.study.mechanism.size or 1.0),
                  "normal": self.size}  # fmt: skip
         names = self.strands.names
-        return {f"{name}.{part}": size for name in names for part, size in sizes.items()} | dict.fromkeys(names, self.size)
+        return {f"{name}.{part}": size for name in names for part, size in sizes.items()} | dict.fromkeys(
+            names, self.size
+        )
 
     @property
     def strands(self) -> Strands:
