@@ -202,7 +202,9 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
             where[name] = in_unit(value, table, name, counts)
         equal = _equal(table[name], where[name])
         counts = counts & equal
-        picked |= table.strands is None or table.column(name).numeric
+        # Words name rows of each pose, and the poses that are valid are all there are of a motion.
+        whole = name == "valid" and where[name] == 1
+        picked |= not whole and (table.strands is None or table.column(name).numeric)
         worded = worded if table.column(name).numeric else worded & equal
     _one_unit(table, column, counts)
     numbers = values.astype(float)

@@ -78,7 +78,7 @@ def passes_singularities(question: MotionQuestion) -> bool:
 
 def _sign(study: Study, curve: Curve, line: Ints, s: Floats) -> Ints:
     """1 where the determinant of the loop equations is positive."""
-    return (determinant(study, curve)(line, s)[0][0] > 0).astype(np.intp)
+    return np.asarray(determinant(study, curve)(line, s)[0][0] > 0, dtype=np.intp)
 
 
 def determinant(study: Study, curve: Curve) -> Evaluate:

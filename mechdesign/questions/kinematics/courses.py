@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.statistics import Request
@@ -19,7 +20,8 @@ def courses_of(along: Along, requests: Sequence[Request]) -> list[Followed | Non
 
 
 def _course_of(along: Along, request: Request) -> Followed | None:
-    if not along.knows(request.columns):
+    # As in the extremes, efficiencies are those of the poses.
+    if request.column in EFFICIENCIES or not along.knows(request.columns):
         return None
     along = along.part(request.part) if request.part else along
     return Followed(along, request.column) if request.column in along.columns else None
