@@ -247,6 +247,9 @@ class Judge:
         self.rough = bool(question.regional)
         self._squares, self._compute, self._journal = question.squares, compute, journal
         self._chunk = SLOW_DESIGNS_AT_ONCE if question.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
+        # A search is led by the worst rows, which are smooth in the design; what is told is the worst of the motion.
+        objectives = [part for part in self.parts() if 0 <= part.column < len(self.goals) and not part.squares]
+        self._leading = objectives if study.optimize.method == "search" else []
         # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._variables: list[Floats] = []
@@ -276,12 +279,10 @@ class Judge:
     def _points(self, u: Floats, rows: Floats) -> Points:
         values = np.where(rows[:, [self.layout.code]] > 0, np.nan, rows[:, self.layout.values])
         behind = rows[:, self.layout.head :]
-        # A search is led by the worst rows, which are smooth in the design; what is told is the worst of the motion.
-        for part in self.parts() if behind.shape[1] == self.layout.width - self.layout.head else ():
-            if 0 <= part.column < len(self.goals) and not part.squares:
-                leading = part.sign * part.pieces(behind).max(axis=1)
-                told = values[:, part.column]
-                values[:, part.column] = np.where(np.isnan(leading + told), told, leading)
+        for part in self._leading if behind.shape[1] == self.layout.width - self.layout.head else ():
+            leading = part.sign * part.pieces(behind).max(axis=1)
+            told = values[:, part.column]
+            values[:, part.column] = np.where(np.isnan(leading + told), told, leading)
         margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
         return Points(
             u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)), behind,
