@@ -98,13 +98,8 @@ class Linearization(Loops):
         signed: dict[int, Value] = {}
         for (index, group), determinant in zip(groups, determinants(self), strict=True):
             lines, count = self.loop_columns(index, group), group.unknowns
-            metric, sizes = self.structure.metrics[index], list[Value]([0.0] * count)
-            for one, other in zip(*np.nonzero(np.triu(metric)), strict=True):
-                weight = float(metric[one, other]) * (1.0 if one == other else 2.0)
-                for j, (a, b) in enumerate(zip(lines[one], lines[other], strict=True)):
-                    # A loop without the unknown has the number 0.
-                    if not (isinstance(a, float) or isinstance(b, float)):
-                        sizes[j] = sizes[j] + weight * dot(a, b)
+            columns = [[line[j] for line in lines] for j in range(count)]
+            sizes = [inner(self.structure.metrics[index], column, column) for column in columns]
             for row in self.rows(index, group)[2 * len(lines) :]:
                 sizes = [size + value * value for size, value in zip(sizes, row, strict=True)]
             signed[index] = determinant / np.sqrt(math.prod(sizes))
@@ -335,6 +330,17 @@ def determinants(linearization: Linearization) -> list[Value]:
             rows = linearization.rows(index, group)
             values.append(solve_linear(rows, [0.0] * len(rows))[1])
     return values
+
+
+def inner(metric: Floats, one: Sequence[Vector], other: Sequence[Vector]) -> Value:
+    """Inner product of two columns of loop equations, a vector each loop, by the metric of the loops."""
+    total: Value = 0.0
+    for j, k in zip(*np.nonzero(metric), strict=True):
+        a, b = one[j], other[k]
+        # A loop without the unknown has the number 0.
+        if not any(isinstance(value, float) and value == 0.0 for value in (a, b)):
+            total = total + float(metric[j, k]) * dot(a, b)
+    return total
 
 
 def regularity(linearization: Linearization) -> Value:
