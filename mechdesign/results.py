@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.statistics import Course, Request
+from mechdesign.statistics import Follow
 
 if TYPE_CHECKING:
     import pandas
@@ -145,6 +145,24 @@ class KeyNumber:
     several: str = ""  #: what the rows are, where the smallest of several stands beside the largest
 
 
+class Strands(NamedTuple):
+    """The rows of each pose, of a table that has several: one of each joint, say.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the rows of a pose, in their order, such as ``B_force``.
+    columns : tuple of str
+        Columns that each row has of its own; along a motion they are called ``B_force.fx``.
+    main : str
+        The column that a name alone means, also along a motion.
+    """
+
+    names: tuple[str, ...]
+    columns: tuple[str, ...]
+    main: str
+
+
 @dataclass(frozen=True, eq=False)
 class Scope:
     """What the rows of a table, one a pose or of all poses together, say of a motion.
@@ -155,13 +173,13 @@ class Scope:
         Whether nothing is known between the poses asked for.
     missing : str
         In words, which poses or parts of the motion are not valid; empty where all are.
-    course : callable, optional
-        A column along the motion, or a part of it; None where that is not known.
+    follow : callable, optional
+        Columns along the motion, or parts of it; None for each that is not known there.
     """
 
     poses_only: bool = False
     missing: str = ""
-    course: Callable[[Request], Course | None] | None = None
+    follow: Follow | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -189,6 +207,7 @@ class Table:
     columns: tuple[Column, ...]
     meaning: str = ""
     scope: Scope | None = None  #: of poses and motions
+    strands: Strands | None = None  #: the rows of a pose, where it has several
 
     def __post_init__(self) -> None:
         lengths = {len(column.values) for column in self.columns}
@@ -298,8 +317,8 @@ class LongTable(Table):
     def __init__(self, some: Table, count: int, source: Callable[[], Iterator[Table]]) -> None:
         columns = tuple(_LongColumn(column, self._values) for column in some.columns)
         self.__dict__.update(
-            name=some.name, columns=columns, meaning=some.meaning, scope=some.scope, _some=some, _count=count,
-            _source=source,
+            name=some.name, columns=columns, meaning=some.meaning, scope=some.scope, strands=some.strands,
+            _some=some, _count=count, _source=source,
         )  # fmt: skip
 
     @property

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import nearest, suggestion
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.results import Result, Table
-from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.results import Result, Strands, Table
+from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread, Several
 
 HELP_PAGE = "reference/study/requirements"
 
@@ -41,7 +41,8 @@ class Chosen:
     statistic: str = ""  # number that is taken of the rows, a word of `STATISTICS`; empty for the one row itself
     part: Part = ()  # part of a motion that counts: columns, and the interval in which each lies
     name: str = ""  # as the study may name it: command, table and row, without the statistic
-    picked: bool = False  # whether `where` picks single rows: then the motion between the rows does not count
+    picked: bool = False  # whether `where` picks single poses: then the motion between the rows does not count
+    strands: Ints | None = None  # of a table with several rows a pose: which of these count, by their numbers
 
     @property
     def unit(self) -> str:
@@ -54,16 +55,45 @@ class Chosen:
         """The columns that it is made from: itself. A `Sum` has one for each term."""
         return (self,)
 
-    @cached_property
-    def course(self) -> Course | None:
-        """The column between the rows, where these are poses of a motion that is followed."""
+    @property
+    def isolated(self) -> bool:
+        """Whether it speaks of the poses alone, though rows of a motion are judged."""
         scope = self.table.scope
-        return None if scope is None or scope.course is None or self.picked else scope.course(self.request)
+        return scope is not None and (scope.poses_only or not (scope.follow is None or self.picked or self.courses))
+
+    @cached_property
+    def courses(self) -> Mapping[str, Course]:
+        """The column between the rows, where these are poses of a motion that is followed.
+
+        Of a table with several rows a pose there is one of each, by its words.
+        """
+        scope = self.table.scope
+        if scope is None or scope.follow is None or self.picked:
+            return {}
+        seen = self.table.seen
+        words = [
+            ", ".join(f"{column.name} {column.values[k]}" for column in seen.columns if not column.numeric)
+            for k in ([] if self.strands is None else self.strands.tolist())
+        ]
+        courses = zip(words or [""], scope.follow(self.requests), strict=True)
+        known = {word: course for word, course in courses if course is not None}
+        return known if len(known) == len(self.requests) else {}
 
     @property
-    def request(self) -> Request:
+    def requests(self) -> tuple[Request, ...]:
         """What has to be known of the column between the rows."""
-        return Request(self.column, self.part, bool(self.statistic) and STATISTICS[self.statistic].integral)
+        integral = bool(self.statistic) and STATISTICS[self.statistic].integral
+        if self.strands is None or self.table.strands is None:
+            return (Request(self.column, self.part, integral),)
+        names, own, main = self.table.strands
+
+        def request(strand: str) -> Request:
+            columns = {name: f"{strand}.{name}" for name in own} | {main: strand}
+            column, *ends = (columns.get(name, name) for name in (self.column, *dict(self.part)))
+            part = tuple((end, interval) for end, (_, interval) in zip(ends, self.part, strict=True))
+            return Request(column, part, integral)
+
+        return tuple(request(names[k]) for k in self.strands.tolist())
 
     def shaped(self, designs: int, *, assembled: bool = False) -> tuple[Floats, Flags]:
         """Values of several designs, shape (designs, rows), and which count; `assembled`: only assembled poses do."""
@@ -91,10 +121,11 @@ class Chosen:
         statistic = STATISTICS[self.statistic].of
         with np.errstate(invalid="ignore", divide="ignore"):
             rows = statistic(RowSpread(values, counts))
-            if self.course is None:
+            if not self.courses:
                 return rows
-            lost = (np.isnan(values) & counts).any(axis=1)
-            return np.where(lost | ~self.course.followed, rows, statistic(self.course))
+            courses = [*self.courses.values()]
+            lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
+            return np.where(lost, rows, statistic(Several(courses)))
 
     def _several(self, count: int) -> str:
         words = [*STATISTICS]
@@ -156,6 +187,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
         )
     where, part = dict(where), list[tuple[str, Interval]]()
+    # Rows of words alone, and whether other values pick poses among them.
+    worded, picked = rows, False
     for name, value in where.items():
         if name not in table:
             several = isinstance(value, Span) and table.name == "extremes"
@@ -167,14 +200,26 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
             continue
         if table.column(name).numeric and isinstance(value, Measured):
             where[name] = in_unit(value, table, name, counts)
-        counts = counts & _equal(table[name], where[name])
+        equal = _equal(table[name], where[name])
+        counts = counts & equal
+        # Words name rows of each pose, and the poses that are valid are all there are of a motion.
+        whole = name == "valid" and where[name] == 1
+        picked |= not whole and (table.strands is None or table.column(name).numeric)
+        worded = worded if table.column(name).numeric else worded & equal
     _one_unit(table, column, counts)
     numbers = values.astype(float)
     missing = "" if counts.any() or part else _missing(table, rows, where)
     return Chosen(
         table, column, np.abs(numbers) if absolute else numbers, counts, missing, statistic, tuple(part),
-        f"{result.command}.{path}", len(part) < len(where),
+        f"{result.command}.{path}", picked, _strands(table, worded),
     )  # fmt: skip
+
+
+def _strands(table: Table, rows: Flags) -> Ints | None:
+    """Which rows of a pose are among some rows, of a table with several; else None."""
+    if table.strands is None:
+        return None
+    return np.flatnonzero(rows.reshape(-1, len(table.strands.names)).any(axis=0))
 
 
 def named(result: Result, path: str) -> tuple[str, str]:
@@ -263,6 +308,7 @@ def located(result: Result, path: str) -> tuple[Table, str, Flags]:
         if absent in path.split("."):
             raise UnknownColumnError(_why_absent(result, absent))
     names = [column for table in result.tables.values() for column in table.names]
+    names += [name for table in result.tables.values() if table.strands for name in table.strands.names]
     raise UnknownColumnError(_unknown(f"the result of {result.command}", path, names))
 
 
@@ -274,6 +320,11 @@ def _place(result: Result, path: str) -> tuple[Table, str, Flags] | None:
     for table, column in places:
         if column in table:
             return table, column, np.ones(len(table), dtype=bool)
+    strand, _, rest_of_strand = path.removeprefix(f"{name}." if named is not None else "").partition(".")
+    for table in result.tables.values() if named is None else [named]:
+        names, own, main = table.strands or Strands((), (), "")
+        if strand in names and (column := rest_of_strand or main) in own:
+            return table, column, np.arange(len(table)) % len(names) == names.index(strand)
     if named is not None:
         for column in named.names:
             word = rest.removesuffix(f".{column}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -108,6 +108,25 @@ class RowSpread:
         return np.asarray(np.where(number > 0, total / np.maximum(number, 1), np.nan))
 
 
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Values of several columns, of as many values each, as those of one."""
+
+    parts: Sequence[Spread]
+
+    def end(self, sign: int) -> Floats:
+        """The largest value of all, or with the sign -1 the smallest."""
+        return np.asarray(sign * np.max([sign * part.end(sign) for part in self.parts], axis=0))
+
+    def mean(self, power: int) -> Floats:
+        """Mean of a power of all values."""
+        return np.asarray(np.mean([part.mean(power) for part in self.parts], axis=0))
+
+    def size(self) -> Floats:
+        """Mean of all absolute values."""
+        return np.asarray(np.mean([part.size() for part in self.parts], axis=0))
+
+
 def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
     """The smallest or largest of the rows that count, along the last axis; nan if one is nan or none counts."""
     none = -np.inf if largest else np.inf
@@ -186,3 +205,7 @@ class Course(Spread, Protocol):
 
     def of(self, design: int) -> Course | None:
         """The column along the motion of one of the designs; None where it is not followed."""
+
+
+# Columns along motions, asked together; None for each that is not known there.
+Follow = Callable[[Sequence[Request]], Sequence[Course | None]]

@@ -43,8 +43,6 @@ RISES = 1e-2
 ENDLESS_POWER = 0.9
 # It does so only where its series is no closer than this part of its size.
 UNRESOLVED = 1e-3
-# Logarithms of the ratios of the distances of the outermost nodes from the end of a piece.
-_NEARER = np.diff(np.log(1.0 - chebyshev.NODES[:-5:-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +123,9 @@ class Functions(Series):
         row = self.names[name]
         size = np.maximum(self._scale[row], self._sizes[row])[self.pieces.line]
         large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * size) ** power
-        endless = large & self._endless(values * pace * self.pieces.stretch)
-        mean[self.pieces.line[endless]] = np.inf if absolute or power % 2 == 0 else np.nan
+        endless = np.unique(self.pieces.line[large & self._endless(values * pace * self.pieces.stretch)])
+        negative = np.unique(self.pieces.line[(values < 0).any(axis=1)])
+        mean[endless] = np.where(absolute | ~np.isin(endless, negative), np.inf, np.nan)
         return mean
 
     def _endless(self, flow: Floats) -> Flags:
@@ -135,14 +134,16 @@ class Functions(Series):
         rough = np.flatnonzero(chebyshev.remainder(chebyshev.series(sizes)) > UNRESOLVED * sizes.max(axis=1))
         endless = np.zeros(len(flow), dtype=bool)
         for k in rough.tolist():
-            top = int(sizes[k].argmax())
-            inwards = sizes[k, top:] if top < chebyshev.COUNT // 2 else sizes[k, top::-1]
-            if top in (0, chebyshev.COUNT - 1):
+            top, present = int(sizes[k].argmax()), np.flatnonzero(np.isfinite(flow[k]))
+            inwards = np.arange(top, chebyshev.COUNT) if top < chebyshev.COUNT // 2 else np.arange(top, -1, -1)
+            # At the pole itself a node may have no value.
+            if top in (present[0], present[-1]):
+                near = inwards[:4]
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    powers = -np.diff(np.log(inwards[:4])) / _NEARER
+                    powers = -np.diff(np.log(sizes[k, near])) / np.diff(np.log(1.0 - np.abs(chebyshev.NODES[near])))
                 endless[k] = (powers >= ENDLESS_POWER).all()
             else:
-                endless[k] = self.pieces.depth[k] >= MOST_HALVINGS - 1 and _rises(inwards)
+                endless[k] = self.pieces.depth[k] >= MOST_HALVINGS - 1 and _rises(sizes[k, inwards])
         return endless
 
     def _sizes_of(self, values: Floats, pace: Floats | float, sizes: Floats) -> Floats:

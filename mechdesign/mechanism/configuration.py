@@ -26,7 +26,8 @@ class Reason(IntEnum):
     OTHER_ASSEMBLY = 2
     LIMIT = 3
     NOT_HELD = 4
-    NO_VALUE = 5
+    NOT_DETERMINED = 5
+    NO_VALUE = 6
 
     @classmethod
     def of(cls, number: int) -> Reason:
@@ -45,6 +46,8 @@ REASONS = {
     "other assembly": "the pose is not reached from the sketch without a singularity; draw the assembly that is meant",
     "limit": "a stated limit is passed; widen it, or leave the pose out",
     "does not hold its load": "a motion is free under the load; add a drive or a link",
+    "not determined": "links that meet have their other joints at one place, about which they turn freely; change a "
+    "length or the pose",
     "coupling without a value": "what it follows is outside of its table, or its expression has no value there; extend "
     "it, or leave the pose out",
 }

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, norm2, plus, quiet, times, vector
+from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, dot, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
@@ -90,14 +90,16 @@ class Linearization(Loops):
     def conditionings(self) -> dict[int, Value]:
         """By index of the drives' groups, their distance from a singularity: from -1 to 1, zero at a singularity.
 
-        The determinant of its loop equations over the product of the lengths of its columns; for two links that meet
-        it is the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
+        The determinant of its loop equations over the product of the lengths of its columns, whichever loops these are;
+        for two links that meet it is the sine of the angle between them. It changes its sign where the motion passes a
+        forward singularity.
         """
         groups = [(k, group) for k, group in enumerate(self.structure.groups) if group.solved]
         signed: dict[int, Value] = {}
         for (index, group), determinant in zip(groups, determinants(self), strict=True):
             lines, count = self.loop_columns(index, group), group.unknowns
-            sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(count)]
+            columns = [[line[j] for line in lines] for j in range(count)]
+            sizes = [inner(self.structure.metrics[index], column, column) for column in columns]
             for row in self.rows(index, group)[2 * len(lines) :]:
                 sizes = [size + value * value for size, value in zip(sizes, row, strict=True)]
             signed[index] = determinant / np.sqrt(math.prod(sizes))
@@ -328,6 +330,17 @@ def determinants(linearization: Linearization) -> list[Value]:
             rows = linearization.rows(index, group)
             values.append(solve_linear(rows, [0.0] * len(rows))[1])
     return values
+
+
+def inner(metric: Floats, one: Sequence[Vector], other: Sequence[Vector]) -> Value:
+    """Inner product of two columns of loop equations, a vector each loop, by the metric of the loops."""
+    total: Value = 0.0
+    for j, k in zip(*np.nonzero(metric), strict=True):
+        a, b = one[j], other[k]
+        # A loop without the unknown has the number 0.
+        if not any(isinstance(value, float) and value == 0.0 for value in (a, b)):
+            total = total + float(metric[j, k]) * dot(a, b)
+    return total
 
 
 def regularity(linearization: Linearization) -> Value:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
-from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.derivatives import Linearization, inner
 from mechdesign.mechanism.loops import Unknowns, rows_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
@@ -167,10 +167,10 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
             rows, changed = rows_of(lines), rows_of(changes)
             logarithmic: Value = 0.0
             for k in range(len(rows)):
-                column, column_z = [row[k] for row in rows], [row[k] for row in changed]
-                size = sum(value * value for value in column)
-                logarithmic = logarithmic + solve_linear(rows, column_z)[0][k]
-                logarithmic = logarithmic - sum(v * v_z for v, v_z in zip(column, column_z, strict=True)) / size
+                metric = linear.structure.metrics[index]
+                column, column_z = ([line[k] for line in part] for part in (lines, changes))
+                logarithmic = logarithmic + solve_linear(rows, [row[k] for row in changed])[0][k]
+                logarithmic = logarithmic - inner(metric, column, column_z) / inner(metric, column, column)
             pairs.append((1.0, 2.0 * logarithmic))
             continue
         ((a, b),), ((a_z, b_z),) = lines, changes

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import TURN, Value, angle_of, picked, quiet
+from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start
@@ -26,6 +26,8 @@ from mechdesign.work.threads import keep_freed_memory
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
+# Squares of lengths below this part of that of the mechanism's size are zero.
+ONE_PLACE = 1e-14
 # Poses of a chunk: the fastest of 4,096 to 262,144, measured.
 CHUNK = 32768
 # The same on several threads, which gain only on longer arrays: each operation passes on the interpreter's lock.
@@ -335,6 +337,8 @@ class Plan:
                 open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
         reason = np.zeros(shape, dtype=np.int8)
         reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
+        if np.any(open_):
+            reason[np.broadcast_to(self._free(state), shape)] = Reason.NOT_DETERMINED
         if reached is not None:
             solved = state.solved(shape)
             reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
@@ -368,6 +372,18 @@ class Plan:
     def coupling_of(self, group: Group) -> int:
         """Number of the coupling whose value a coupled group is."""
         return group.conditions[0] - len(self.structure.given)
+
+    def _free(self, state: State) -> Flags:
+        """Poses in which links that meet may point anywhere: their other joints are at one place."""
+        free: Flags = np.zeros((), dtype=bool)
+        for group in self.structure.groups:
+            if group.form in ("two angles", "angle and turning slide"):
+                span, links, lines = state.dyad(group)
+                one, *other = [norm2(links[root]) for root in group.angles]
+                apart = [one - part for part in other] or [cross(lines[group.slides[0]], links[group.angles[0]]) ** 2]
+                same = np.maximum(norm2(span), np.abs(apart[0])) <= ONE_PLACE * self.core.size**2
+                free = free | (same & ~np.isfinite(np.real(state.rotations[group.angles[0]])))
+        return free
 
     def judge(self, configuration: Configuration) -> None:
         """Set the reason of solved poses that are outside the study's limits."""

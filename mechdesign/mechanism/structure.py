@@ -6,13 +6,17 @@ With the drives given the groups are the mechanism's Assur groups; with outputs 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import Edge, Graph
+from mechdesign.numerics.arrays import Floats
 
 Form = Literal[
     "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides",
@@ -142,6 +146,31 @@ class Structure:
                 begin, end = end, end + group.unknowns
                 slices[index] = slice(begin, end)
         return slices
+
+    @cached_property
+    def metrics(self) -> tuple[Floats, ...]:
+        """Of each group the metric of its loops, shape (loops, loops), by which their choice does not matter; det 1.
+
+        Which of a group's loops are its equations follows from the order of the links. Loops that share links are no
+        right angles of each other: their products are numbers of common ends of unknown links, and of common slides.
+        """
+        return tuple(self._metric(group) for group in self.groups)
+
+    def _metric(self, group: Group) -> Floats:
+        counts = [Counter[tuple[str, int, int]]() for _ in group.loops]
+        for count, loop in zip(counts, group.loops, strict=True):
+            for k, sign in loop.edges:
+                edge = self.edges[k]
+                if (root := self.ties[edge.frame].root) in group.angles:
+                    count["angle", root, edge.head] += sign
+                    count["angle", root, edge.tail] -= sign
+                if edge.slide in group.slides:
+                    count["slide", k, 0] += sign
+            for base in group.bases:
+                count["base", base, 0] += (base == loop.start) - (base == loop.end)
+        products = [[sum(number * other[key] for key, number in one.items()) for other in counts] for one in counts]
+        gram = np.array(products, dtype=float).reshape(len(counts), len(counts))
+        return np.asarray(np.linalg.inv(gram) * np.linalg.det(gram) ** (1 / max(len(counts), 1)))
 
     def behind(self, coordinate: Coordinate, graph: Graph) -> frozenset[int]:
         """Indices of the groups that a coordinate follows from."""

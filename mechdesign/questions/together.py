@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import overload
 
@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Ints
 from mechdesign.results import Column, Result, Scope, Table
-from mechdesign.statistics import Course, Request
+from mechdesign.statistics import Course, Follow, Request
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +82,18 @@ class Group:
         columns = tuple(
             Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
         )
-        scope = table.scope and replace(table.scope, missing=end.missing, course=_course_of(table.scope, k))
-        return Table(table.name, columns, table.meaning, scope)
+        scope = table.scope and replace(table.scope, missing=end.missing, follow=_follow_of(table.scope, k))
+        return replace(table, columns=columns, scope=scope)
 
 
-def _course_of(scope: Scope, design: int) -> Callable[[Request], Course | None] | None:
-    """A column along the motion of one design of several."""
-    together = scope.course
+def _follow_of(scope: Scope, design: int) -> Follow | None:
+    """Columns along the motion of one design of several."""
+    together = scope.follow
     if together is None:
         return None
 
-    def own(request: Request) -> Course | None:
-        course = together(request)
-        return None if course is None else course.of(design)
+    def own(requests: Sequence[Request]) -> list[Course | None]:
+        return [None if course is None else course.of(design) for course in together(requests)]
 
     return own
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -225,7 +226,7 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: 
                 worst = verdict
         begin += len(part)
     chosen = replace(chosen, table=table)
-    if worst is None and chosen.part and chosen.course:
+    if worst is None and chosen.part and chosen.courses:
         # Between two rows.
         worst = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
         return _over_motion(worst, chosen, requirement)
@@ -258,29 +259,24 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
     """The verdict on the worst row, or on a worse place of the motion between the rows, and what it does not cover."""
     bounds = _bounds(chosen, requirement)
     signs = [-1] * (requirement.at_least is not None) + [1] * (requirement.at_most is not None)
-    course = chosen.course
-    for sign in signs if course is not None else ():
-        assert course is not None
+    for (words, course), sign in product(chosen.courses.items(), signs):
         value, place = (float(end[0]) for end in course.worst(sign, absolute=requirement.abs))
         if np.isfinite(place):
-            between = _verdict(requirement, bounds, value, course.shown(place), verdict.unit)
+            where = ", ".join(filter(None, (course.shown(place), words)))
+            between = _verdict(requirement, bounds, value, where, verdict.unit)
             verdict = between if not between.margin >= verdict.margin else verdict
     return _scoped(verdict, chosen, requirement)
 
 
 def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
-    scoped = [(chosen, chosen.table.scope) for chosen in terms.parts if chosen.table.scope is not None]
-    missing = [scope.missing for _, scope in scoped if scope.missing]
+    scopes = [chosen.table.scope for chosen in terms.parts]
+    missing = [scope.missing for scope in scopes if scope is not None and scope.missing]
     if missing and not requirement.unassembled:
         verdict = replace(verdict, met=False)
-    isolated = any(
-        scope.poses_only or (chosen.statistic and not chosen.picked and chosen.course is None)
-        for chosen, scope in scoped
-    )
-    notes = [POSES_ONLY] if isolated else []
-    means = [chosen.course for chosen in terms.parts if chosen.course is not None and chosen.request.integral]
-    notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in means if course.means_over)
+    notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
+    courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
+    notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
 
 
@@ -334,9 +330,9 @@ def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) 
     for column in table.columns:
         if column.numeric:
             freedom -= 1
-            if freedom < 0 or column.name == judged:
+            if column.name == judged or (freedom < 0 and table.strands is None):
                 break
-            parts.append(f"{column.name} {column.values[row]:.6g}")
+            parts += [f"{column.name} {column.values[row]:.6g}"] if freedom >= 0 else []
         else:
             parts.append(f"{column.name} {column.values[row]}")
     return ", ".join(parts) or f"row {begin + row + 1}"

@@ -140,14 +140,17 @@ def tables(
 def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
-    answers, along = tables(passage.motion, question, TABLES)
+    normals = [Request(name, end=-1) for name in lift_off.contacts(question_of(passage.motion)).values()]
+    answers, along = tables(passage.motion, question, TABLES, requests=normals)
     further, warnings = further_tables(passage.motion, along)
     answers |= further
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=Courses(question))
-    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
+    # Between poses of which one jams nothing is said.
+    a_pose = whole if along is None else replace(whole, follow=Courses(question))
+    scopes = {**dict.fromkeys(A_ROW_A_POSE, a_pose), "modes": replace(whole, poses_only=True)}
+    scoped = {name: replace(table, scope=scopes.get(name, whole)) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends
@@ -190,8 +193,11 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     warnings += beyond_profile(study, poses, passage.marks[k], "dynamics", k)
     for name, mark in passage.marks[k].items():
+        coupling = name.removeprefix(_LIFTED)
         if name.startswith(_LIFTED) and mark.number:
-            warnings.append(lift_off.caution(study, poses, name.removeprefix(_LIFTED), mark, k))
+            warnings.append(lift_off.caution(study, poses, coupling, mark, k))
+        elif name.startswith(_LIFTED) and along is not None:
+            warnings += lift_off.between(question_of(passage.motion), along, coupling, k)
     friction = question_of(passage.motion).friction
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")

@@ -1,4 +1,4 @@
-"""Where the follower of a cam lifts off."""
+"""Where the follower of a cam lifts off, in the poses or between them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from collections.abc import Iterator
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.cams import Cam
 from mechdesign.numerics.arrays import Flags
+from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
+from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.courses import Followed
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.poses import pose_in_words
@@ -18,14 +21,32 @@ from mechdesign.study.poses import Poses
 PRESSED = 1e-9
 
 
+def contacts(question: ForceQuestion) -> dict[str, str]:
+    """By the coupling of each cam whose follower nothing pulls, such as a groove, the column of its contact force."""
+    pairs = zip(question.forces, (contact.engaged for contact in question.joints.contacts), strict=True)
+    return {
+        cam.coupling: f"{name}.normal" for name, cam in pairs if isinstance(cam, Cam) and cam.given.side != "groove"
+    }
+
+
 def lifted(motion: Motion) -> Iterator[tuple[str, Flags]]:
-    """By the coupling of each cam, the poses in which its follower would have to be pulled; a groove pulls it."""
+    """By the coupling of each cam, the poses in which its follower would have to be pulled."""
     question = question_of(motion)
-    for name, contact in zip(question.forces, question.joints.contacts, strict=True):
-        cam = contact.engaged
-        if isinstance(cam, Cam) and cam.given.side != "groove":
-            pulled = motion.arrays[f"{name}.normal"] < -PRESSED * question.size
-            yield cam.coupling, motion.valid & pulled
+    for coupling, normal in contacts(question).items():
+        yield coupling, motion.valid & (motion.arrays[normal] < -PRESSED * question.size)
+
+
+def between(question: ForceQuestion, along: Along, coupling: str, design: int) -> Iterator[Caution]:
+    """The warning that the follower of a cam lifts off between the poses of a design."""
+    column = contacts(question)[coupling]
+    force, place = (end[design] for end in along.worst(column, -1))
+    if force < -PRESSED * question.size:
+        most = Followed(along, column, design).shown(float(place))
+        message = (
+            f"cam {coupling}: the follower lifts off between the poses, where it would have to be pulled; "
+            f"a spring holds it on the cam; by most at {most}"
+        )
+        yield Caution("cam", message, "joint_forces")
 
 
 def caution(study: Study, poses: Poses, coupling: str, mark: Mark, design: int = 0) -> Caution:

@@ -29,6 +29,7 @@ from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
 from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
+from mechdesign.results import Strands
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import Load
@@ -89,6 +90,24 @@ class ForceQuestion:
         ]
 
     @cached_property
+    def parts(self) -> dict[str, float]:
+        """Columns of what each joint or coupling bears, by the names of `strands`, and their sizes.
+
+        Directions jump by a turn: they are those of the poses.
+        """
+        sizes = {"fx": self.size, "fy": self.size, "moment": self.size * (self.study.mechanism.size or 1.0),
+                 "normal": self.size}  # fmt: skip
+        names = self.strands.names
+        return {f"{name}.{part}": size for name in names for part, size in sizes.items()} | dict.fromkeys(
+            names, self.size
+        )
+
+    @property
+    def strands(self) -> Strands:
+        """The rows of ``joint_forces.csv`` in each pose."""
+        return Strands(tuple(name for name, *_ in self.borne_by), PARTS, "magnitude")
+
+    @cached_property
     def size(self) -> float:
         """About how large the forces are: weights, inertia, springs and constant loads, all in the same direction.
 
@@ -112,8 +131,12 @@ class ForceQuestion:
         return sum(forces)
 
     def lean(self, names: Collection[str]) -> ForceQuestion:
-        """The question for some of the columns of `statics` alone."""
+        """The question for some of the columns of `statics` and `parts` alone."""
         return replace(self, subset=frozenset(names))
+
+    def _counts(self, name: str) -> bool:
+        """Whether a column, or one of those that begin with it, is computed."""
+        return self.subset is None or any(own == name or own.startswith(f"{name}.") for own in self.subset)
 
     @quiet
     def columns(
@@ -121,12 +144,13 @@ class ForceQuestion:
     ) -> Mapping[str, Value]:  # fmt: skip
         """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
 
-        Of a subset of the columns joint forces are computed only if one is among them, and then as vectors alone.
+        Of a subset of the columns joint forces are computed only if one is among them.
         """
         columns, held = self._held(poses, linear, rows, moving)
-        if self.subset is None or not self.subset.isdisjoint(self.forces):
+        if any(self._counts(name) for name in self.forces):
             borne, stiffness = self._borne(held), self.study.stiffness
-            if self.subset is None and self.joints.open and stiffness is not None and isinstance(held, Balance):
+            moments = any(self._counts(f"{name}.moment") for name in self.forces)
+            if moments and self.joints.open and stiffness is not None and isinstance(held, Balance):
                 section = poses.section(stiffness, rows)
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
                 self.apply(applied, 0, poses, rows, moving)
@@ -134,12 +158,10 @@ class ForceQuestion:
                     borne, self.joints, applied, section, self.study.mechanism.size, held.couplings
                 )  # fmt: skip
             for name, reaction in zip(self.forces, borne, strict=True):
-                force = np.asarray(reaction.force)
-                vector = {name: np.abs(force), f"{name}.fx": force.real, f"{name}.fy": force.imag}
-                columns |= self._parts(name, reaction) if self.subset is None else vector
+                columns |= self._parts(name, reaction) if self._counts(name) else {}
+        whole = held.balance if isinstance(held, Slipping) else held
+        columns |= self._turned(linear.configuration, whole)
         if self.subset is None:
-            whole = held.balance if isinstance(held, Slipping) else held
-            columns |= self._turned(linear.configuration, whole)
             for name, contact in zip(self.forces, self.joints.contacts, strict=True):
                 if contact.engaged is not None:
                     place = np.asarray(whole.pressing[contact.joint].place)
@@ -170,7 +192,8 @@ class ForceQuestion:
     def _turned(self, configuration: Configuration, held: Balance) -> dict[str, Value]:
         """Moments of these couplings, and no forces."""
         columns: dict[str, Value] = {}
-        for name, (number, gap) in self._without_wheels.items():
+        pulling = {name for name, body in self.turned if self._counts(_moment_on(name, body))}
+        for name, (number, gap) in self._without_wheels.items() if pulling else ():
             for body, moment in pulled(configuration, gap, held.couplings[number]).bodies.items():
                 columns |= self._parts(_moment_on(name, body), Reaction(0.0, moment, np.nan))
         return columns

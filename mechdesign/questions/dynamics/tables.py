@@ -58,7 +58,8 @@ def joint_table(motion: Motion) -> Table:
     }
     pose_columns = [replace(column, values=per_joint(column.values)) for column in motion.pose_columns()]
     columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)
-    return JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
+    bears = JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
+    return replace(bears, strands=question.strands)
 
 
 @quiet
@@ -112,4 +113,4 @@ def _between(along: Along, name: str, poses: Floats) -> Floats:
     whole = np.stack([*ends, along.mean(name), np.sqrt(np.maximum(square, 0.0))], axis=1)
     # What stands still keeps the place of the first pose.
     whole[constant, 1:6:2] = poses[constant, 1:6:2]
-    return np.where(np.isnan(whole), poses, whole)
+    return np.where(np.isnan(low)[:, None], poses, whole)

@@ -82,6 +82,7 @@ class Along:
         shown = {*((*columns, *question.rates) if names is None else names), *also}
         judged = dict.fromkeys([*also, *(request.column for request in whole)])
         followed = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
+        columns |= {name: size for name, size in question.parts.items() if name in followed}
         self._others = [name for name in followed if name not in columns]
         columns = {name: size for name, size in columns.items() if name in followed}
         columns |= dict.fromkeys(self._others, 0.0) | {
@@ -98,12 +99,13 @@ class Along:
         if passages and set(question.poses.names) != drives:
             structure = mechanism.forward.structure
             self._groups = [k for k, group in enumerate(structure.groups) if group.solved]
-        self._errors = any(name.endswith("_error") for name in columns)
+        needed = {*columns, *(name for request in requests for name in request.columns)}
+        self._errors = any(name.endswith("_error") for name in needed)
         self._poles = [name for name in question.poled if name in columns]
         self._chains: dict[str, tuple[int, ...]] = {}
         divisors = self._divisors()
         # The part of the question that the columns need.
-        self._lean = question.lean({*columns, *(name for request in requests for name in request.columns)})
+        self._lean = question.lean(needed)
         self.curve = curve = corners.divided(self._lean, curve, errors=self._errors)
         angles = {angle.name for angle in curve.angles}
         self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
@@ -146,7 +148,7 @@ class Along:
         """What functions with poles are divided by, and how often."""
         question = self.question
         rates = INVERSE if question.inverse else FORWARD
-        divisors = {static.name: (FORWARD, 1) for static in question.statics}
+        divisors = dict.fromkeys((*(static.name for static in question.statics), *question.parts), (FORWARD, 1))
         divisors |= {name: (f"rate of {name}", 1) for name in self._poles}
         for name in self._others:
             output, _, order = name.rpartition("_")
@@ -181,7 +183,8 @@ class Along:
             for error in targets.errors(self.question.study, whole, motion.arrays, rows, between=True):
                 arrays[error.name] = error.values
         signed = linear.conditionings
-        arrays[FORWARD] = forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
+        forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
+        arrays[FORWARD] = np.abs(forward) if corners.passes_singularities(self._lean) else forward
         arrays |= {f"group {k}": signed[k] for k in self._groups}
         for chain, groups in self._chains.items():
             arrays[chain] = np.prod(np.broadcast_arrays(np.ones(len(s)), *(signed[k] for k in groups)), axis=0)
@@ -192,7 +195,7 @@ class Along:
             matrix = unitless(mechanism, linear, outputs)[1]
             arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
         for name in self._poles:
-            arrays[f"rate of {name}"] = pole(self._lean, linear, name) * forward
+            arrays[f"rate of {name}"] = pole(motion, linear, name) * forward
         for k, loop in enumerate(self._loops):
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)

@@ -85,10 +85,10 @@ def answers_of(passage: Passage) -> list[Group]:
     ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, course=Courses(question))
-    scoped = {
-        name: replace(tables[name], scope=a_pose if name in A_ROW_A_POSE else whole) for name in ORDER if name in tables
-    }
+    a_pose = replace(whole, follow=Courses(question))
+    # Rows of a cam are places of its profile.
+    scopes = {**dict.fromkeys(A_ROW_A_POSE, a_pose), "cam": replace(whole, poses_only=True)}
+    scoped = {name: replace(tables[name], scope=scopes.get(name, whole)) for name in ORDER if name in tables}
     uneven = {"limits": [*map(len, events.limits)], "toggles": [*map(len, _by_line(toggles, designs))]}
     result = Result("kinematics", scoped, absent=question.absent)
     if designs == 1:

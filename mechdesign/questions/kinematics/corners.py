@@ -44,7 +44,7 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     for target in targets:
         if targeted.path(target, question.poses):
             divided = switched(divided, partial(_side, question, curve, target))
-    return divided
+    return switched(divided, partial(_sign, study, curve)) if passes_singularities(question) else divided
 
 
 def variables_of(
@@ -66,6 +66,19 @@ def variables_of(
         }
 
     return variables
+
+
+def passes_singularities(question: MotionQuestion) -> bool:
+    """Whether forces are asked of a motion that the poses may lead through places where the drives hold it no longer.
+
+    There the determinant of the loop equations changes its sign, and the size of a force does not.
+    """
+    return question.borne is not None and set(question.poses.names) != set(question.study.mechanism.drives)
+
+
+def _sign(study: Study, curve: Curve, line: Ints, s: Floats) -> Ints:
+    """1 where the determinant of the loop equations is positive."""
+    return np.asarray(determinant(study, curve)(line, s)[0][0] > 0, dtype=np.intp)
 
 
 def determinant(study: Study, curve: Curve) -> Evaluate:

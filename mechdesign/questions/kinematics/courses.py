@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.statistics import Request
 
 
-def course_of(along: Along, request: Request) -> Followed | None:
-    """A column along motions or a part of them; None where it has no values between the poses."""
-    if not along.knows(request.columns):
+def courses_of(along: Along, requests: Sequence[Request]) -> list[Followed | None]:
+    """Columns along motions or parts of them; None for each without values between the poses."""
+    return [_course_of(along, request) for request in requests]
+
+
+def _course_of(along: Along, request: Request) -> Followed | None:
+    # As in the extremes, efficiencies are those of the poses.
+    if request.column in EFFICIENCIES or not along.knows(request.columns):
         return None
     along = along.part(request.part) if request.part else along
     return Followed(along, request.column) if request.column in along.columns else None
@@ -22,17 +29,21 @@ def course_of(along: Along, request: Request) -> Followed | None:
 
 @dataclass(frozen=True, eq=False)
 class Courses:
-    """Columns along the motions of a question, each followed once for all designs; can be sent to another process."""
+    """Columns along the motions of a question, each followed once for all designs; can be sent to another process.
+
+    Those that are asked together are followed together.
+    """
 
     question: MotionQuestion
     _followed: dict[Request, Followed | None] = field(default_factory=dict)
 
-    def __call__(self, request: Request) -> Followed | None:
-        """A column along the motions; None where it has no values between the poses."""
-        if request not in self._followed:
-            along = along_of(self.question, (), requests=[request])
-            self._followed[request] = None if along is None else course_of(along, request)
-        return self._followed[request]
+    def __call__(self, requests: Sequence[Request]) -> list[Followed | None]:
+        """Columns along the motions; None for each without values between the poses."""
+        if new := [request for request in requests if request not in self._followed]:
+            along = along_of(self.question, (), requests=new)
+            courses = [None] * len(new) if along is None else courses_of(along, new)
+            self._followed.update(zip(new, courses, strict=True))
+        return [self._followed[request] for request in requests]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.outputs import Rates
-from mechdesign.numerics.arrays import Complexes, Ints
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # A centre farther away than this many sizes of the mechanism is at infinity.
 FARTHEST = 1e9
@@ -42,9 +42,21 @@ class Centre:
         """``rod.ground``: what its columns begin with."""
         return f"{self.one}.{self.other}"
 
+    @property
+    def columns(self) -> tuple[str, str]:
+        """Its coordinates."""
+        return f"{self.name}.x", f"{self.name}.y"
+
+    @property
+    def turn(self) -> str:
+        """Name of how fast one turns against the other: where it is 0, the centre is at infinity."""
+        return f"{self.name}.turn"
+
     @quiet
-    def at(self, mechanism: Mechanism, configuration: Configuration, velocity: Rates) -> tuple[Complexes, Ints]:
-        """Its place and how the links move against each other (`MOTIONS`), shape of the batch.
+    def at(
+        self, mechanism: Mechanism, configuration: Configuration, velocity: Rates
+    ) -> tuple[Complexes, Ints, Floats]:  # fmt: skip
+        """Its place, how the links move against each other (`MOTIONS`) and turn so, shape of the batch.
 
         At infinity in a translation, nan where the links do not move against each other, and where the velocities of
         neither are known. A pin of both is their centre whatever the velocities.
@@ -53,8 +65,6 @@ class Centre:
         frames = [graph.bodies[name][0] for name in (self.one, self.other)]
         points = [[point for body, point in graph.points if body == name] for name in (self.one, self.other)]
         pins = [point for point in points[0] if point in points[1]]
-        if pins and frames[0] != frames[1]:
-            return configuration.point(pins[0]), np.full(shape, ROTATION)
 
         def full(value: Vector, kind: type) -> np.ndarray:
             return np.broadcast_to(np.asarray(value, dtype=kind), shape)
@@ -64,6 +74,8 @@ class Centre:
         places = [full(configuration.nodes[node], complex) for node in nodes]
         moves = [full(velocity.nodes[node], complex) for node in nodes]
         turn, size = turns[0] - turns[1], mechanism.size
+        if pins and frames[0] != frames[1]:
+            return configuration.point(pins[0]), np.full(shape, ROTATION), turn
         slip = moves[0] - moves[1] - 1j * turns[1] * (places[0] - places[1])
         scale = sum(size * np.abs(omega) for omega in velocity.angles) + sum(np.abs(move) for move in velocity.nodes)
         speed, bend = np.abs(slip), size * np.abs(turn)
@@ -71,4 +83,4 @@ class Centre:
         motion = np.where(np.maximum(speed, bend) <= AT_REST * scale, REST, motion)
         motion = np.where(np.isfinite(speed + bend), motion, 0)
         place = np.where(motion == ROTATION, places[0] + 1j * slip / turn, complex(np.nan, np.nan))
-        return np.where(motion == TRANSLATION, INFINITY, place), motion
+        return np.where(motion == TRANSLATION, INFINITY, place), motion, turn

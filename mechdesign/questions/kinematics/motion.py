@@ -122,11 +122,12 @@ class Motion:
     def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
         assert velocity is not None
         for centre in self.question.centres:
-            place, motion = centre.at(self.question.study.mechanism, linear.configuration, velocity)
+            place, motion, turn = centre.at(self.question.study.mechanism, linear.configuration, velocity)
             regular = np.isfinite(self.arrays["conditioning"][rows]) & (self.arrays["conditioning"][rows] >= STALLED)
             self.put(f"{centre.name}.x", rows, np.where(regular, place.real, np.nan))
             self.put(f"{centre.name}.y", rows, np.where(regular, place.imag, np.nan))
             self.put(f"{centre.name}.motion", rows, np.where(regular, motion, 0))
+            self.put(centre.turn, rows, turn)
 
     def _rates(self, linear: Linearization, rows: Ints, regular: Flags, moving: Moving) -> None:
         velocity, acceleration, configuration = moving.velocity, moving.acceleration, linear.configuration
@@ -263,11 +264,14 @@ def _rests(linear: Linearization, output: Coordinate, mechanism: Mechanism) -> V
     return rests
 
 
-def pole(question: MotionQuestion, linear: Linearization, column: str) -> Value:
-    """What is zero where a column of `question.poled` goes to infinity: a rate, or the curvature of a pitch curve."""
+def pole(motion: Motion, linear: Linearization, column: str) -> Value:
+    """What is zero where a column of `MotionQuestion.poled` goes to infinity: a rate, or the curvature of a cam."""
+    question = motion.question
     name, advantages = column.removesuffix("_advantage"), question.section.mechanical_advantage
     if name in advantages:
         return _rates_of_advantage(question, linear, name, advantages[name])[0]
+    if (centre := next((c for c in question.centres if column in c.columns), None)) is not None:
+        return motion.arrays[centre.turn]
     cam = next(cam for cam in question.cams if column == f"{cam.coupling}_curvature_radius")
     return cam.touch(linear.configuration).pitch
 

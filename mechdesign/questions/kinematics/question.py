@@ -70,6 +70,11 @@ class Borne(Protocol):
         """The loads that it bears."""
         ...
 
+    @property
+    def parts(self) -> Mapping[str, float]:
+        """Columns that are followed where one of them is asked, with their sizes."""
+        ...
+
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
         """Values by their columns; `rows` are those of the poses."""
         ...
@@ -174,10 +179,16 @@ class MotionQuestion:
         return (*self.section.loads, *(self.borne.loads if self.borne is not None else ()))
 
     @property
+    def parts(self) -> Mapping[str, float]:
+        """Columns of the forces that are followed where one of them is asked, with their sizes."""
+        return self.borne.parts if self.borne is not None else {}
+
+    @property
     def poled(self) -> list[str]:
         """Columns that go to infinity where nothing is singular."""
         advantages = [f"{name}_advantage" for name in self.section.mechanical_advantage]
-        return advantages + [f"{cam.coupling}_curvature_radius" for cam in self.cams]
+        centres = [column for centre in self.centres for column in centre.columns]
+        return [*advantages, *(f"{cam.coupling}_curvature_radius" for cam in self.cams), *centres]
 
     @cached_property
     def friction(self) -> Friction | None:
@@ -245,7 +256,8 @@ class MotionQuestion:
             pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
         ]
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        needed = self.borne is not None and any(static.name in names for static in self.borne.statics)
+        statics = [static.name for static in self.borne.statics] if self.borne is not None else []
+        needed = self.borne is not None and any(name in names for name in (*statics, *self.parts))
         borne = self.borne.lean(names) if self.borne is not None and needed else None
         directed = self.friction is not None and any(static.name in names for static in self.statics)
         if not (rates or directed) and borne is None and not coordinates_in(self.study, section.loads):

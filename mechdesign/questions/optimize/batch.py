@@ -25,6 +25,7 @@ FAILED = np.array([
     "a pose is reached in another assembly only",
     "a pose is outside the limits",
     "a pose does not hold its load",
+    "a pose is not determined",
     "a coupling has no value at a pose",
 ], dtype=object)  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 VARIABLE = ColumnKind("<variable>", "design variable", "as the variable")
-WORST_ROW = ColumnKind("<result>", "worst row of <result>", "as the result")
+WORST_ROW = ColumnKind("<result>", "worst value of <result>", "as the result")
 EXPRESSION = ColumnKind("<parameter>", "expression over parameters", "as the expression")
 RESULT = ColumnKind("<result>", "<meaning of the result>", "as the result")
 CPI = ColumnKind("CPI", "sum of the normalised indices", "", "sum of (value - worst)/(best - worst)")

@@ -142,6 +142,10 @@ class Evaluator:
                 batch.reasons[k] = self._one(batch, k)
         for goal, column in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
             batch.note(slice(None), np.isnan(column), f"{goal.name} has no value")
+            # Nothing is best at infinity; a condition may well be met there.
+            infinite = np.isinf(column) & (not goal.gate)
+            batch.note(slice(None), infinite, f"{goal.name} is infinite")
+            batch.table[infinite, self.layout.shortfall] = np.nan
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
     def _regions(self, batch: Batch, rows: Ints, questions: Sequence[Question]) -> None:

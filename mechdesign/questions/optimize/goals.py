@@ -48,7 +48,7 @@ class Goal:
     outline : Outline, optional
         A shape that the workspace has to contain; the largest scale at which it does is judged.
     gate : bool
-        Whether it is a condition, which has to hold between the poses of a motion, too. Of a goal only the rows count.
+        Whether it is a condition.
     """
 
     name: str
@@ -109,22 +109,20 @@ class Goal:
                 return Judgement(extreme, _errors(result, outputs.pop(), extreme), squares=True)
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         rows = values[counts].reshape(designs, -1) if alike else None
-        if self.request(chosen) is not None and chosen.course is not None:
-            course, take = chosen.course, np.fmax if self.smallest else np.fmin
+        lost, take = (counts & np.isnan(values)).any(axis=1), np.fmax if self.smallest else np.fmin
+        for course in chosen.courses.values() if self.requests(chosen) else ():
             between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
-            lost = (counts & np.isnan(values)).any(axis=1)
             extreme = np.where(lost, np.nan, take(extreme, np.abs(between) if absolute else between))
-            between = np.where(np.isnan(between), extreme, between)
-            rows = None if rows is None else np.column_stack([rows, between])
+            if self.gate and rows is not None:
+                rows = np.column_stack([rows, np.where(np.isnan(between), extreme, between)])
         return Judgement(extreme, rows)
 
-    def request(self, chosen: Chosen) -> Request | None:
-        """How a column is followed between the poses, for conditions, statistics and parts of a motion; else None."""
-        between = self.gate or chosen.statistic or chosen.part
-        if not between or chosen.picked:
-            return None
+    def requests(self, chosen: Chosen) -> list[Request]:
+        """How a column is followed between the poses; not at all where single poses are picked."""
+        if chosen.picked:
+            return []
         both = self.absolute or bool(chosen.statistic)
-        return chosen.request._replace(end=0 if both else 1 if self.smallest else -1)
+        return [request._replace(end=0 if both else 1 if self.smallest else -1) for request in chosen.requests]
 
 
 class Judgement(NamedTuple):
@@ -133,9 +131,10 @@ class Judgement(NamedTuple):
     Parameters
     ----------
     values : ndarray, shape (designs,)
-        The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
+        The worst of the rows and of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
-        The signed rows that count, then of a condition the worst value between them; None where designs do not have the
+        The signed rows that count, then of a condition the worst value between them: that is not smooth in the design,
+        and would mislead a search for the best, but a condition must hold there. None where designs do not have the
         same number of rows. Of a root mean square over targets, where the result has the motion, errors whose squares
         add up to its square.
     squares : bool
@@ -155,8 +154,8 @@ def _errors(result: Result, output: str, rms: Floats) -> Floats:
     """
     motion, designs = result.tables["motion"], len(rms)
     parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
-    follow = motion.scope.course if motion.scope is not None else None
-    courses = [follow(Request(name, (), True)) for name in parts] if follow is not None else [None]
+    follow = motion.scope.follow if motion.scope is not None else None
+    courses = follow([Request(name, (), True) for name in parts]) if follow is not None else []
     followed = [course.at((1 + _NODES) / 2) * np.sqrt(_WEIGHTS) for course in courses if course is not None]
     columns = followed or [motion[name].reshape(designs, -1) for name in parts]
     errors = np.nan_to_num(np.concatenate(columns, axis=1))

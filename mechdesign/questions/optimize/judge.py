@@ -148,7 +148,9 @@ class Designs:
 
     def score(self, row: Floats) -> Floats:
         """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
-        return np.where(self.feasible, self.score_of(self.values, row), np.nan)
+        score = np.full(len(self), np.nan)
+        score[self.feasible] = self.score_of(self.values[self.feasible], row)
+        return score
 
     def score_of(self, values: Floats, row: Floats) -> Floats:
         """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
@@ -162,7 +164,9 @@ class Designs:
 
     def share(self, k: int) -> Floats:
         """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
-        return np.where(self.feasible, self._normalised(self.values, k), np.nan)
+        share = np.full(len(self), np.nan)
+        share[self.feasible] = self._normalised(self.values[self.feasible], k)
+        return share
 
     def _normalised(self, values: Floats, k: int) -> Floats:
         """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
@@ -243,6 +247,9 @@ class Judge:
         self.rough = bool(question.regional)
         self._squares, self._compute, self._journal = question.squares, compute, journal
         self._chunk = SLOW_DESIGNS_AT_ONCE if question.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
+        # A search is led by the worst rows, which are smooth in the design; what is told is the worst of the motion.
+        objectives = [part for part in self.parts() if 0 <= part.column < len(self.goals) and not part.squares]
+        self._leading = objectives if study.optimize.method == "search" else []
         # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._variables: list[Floats] = []
@@ -271,10 +278,15 @@ class Judge:
 
     def _points(self, u: Floats, rows: Floats) -> Points:
         values = np.where(rows[:, [self.layout.code]] > 0, np.nan, rows[:, self.layout.values])
+        behind = rows[:, self.layout.head :]
+        for part in self._leading if behind.shape[1] == self.layout.width - self.layout.head else ():
+            leading = part.sign * part.pieces(behind).max(axis=1)
+            told = values[:, part.column]
+            values[:, part.column] = np.where(np.isnan(leading + told), told, leading)
         margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
         return Points(
-            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
-            rows[:, self.layout.head :], rows[:, self.layout.shortfall],
+            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)), behind,
+            rows[:, self.layout.shortfall],
         )  # fmt: skip
 
     def nearest(self) -> int | None:

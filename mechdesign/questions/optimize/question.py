@@ -235,8 +235,8 @@ class _Reader:
             for chosen in terms.parts:
                 if chosen.table.name == "extremes":
                     self.outputs.update(chosen.table["output"][chosen.counts].tolist())
-                elif (request := goal.request(chosen)) is not None:
-                    self.requests.add(request)
+                else:
+                    self.requests.update(goal.requests(chosen))
         tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
         stack = stacked.tables(study, command, {"motion", *tables}, poses, self.outputs, self.requests)
         judged: dict[str, list[Goal]] = {}

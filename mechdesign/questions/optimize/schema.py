@@ -165,9 +165,10 @@ class Chosen(fields.Model):
         fields.Read(read_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
     ]
     """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
-    counts, or which a word behind it makes one number (|WORDS|), along a motion also between the rows; a sum of
-    such numbers of one unit; or an expression over parameters. Example: kinematics.extremes.C.x.range Example:
-    kinematics.C.x_velocity.peak Example: kinematics.C.y.range + 2*kinematics.D.y.range
+    counts, or which a word behind it makes one number (|WORDS|), along a motion also the worst place, or the number,
+    of all between the rows; a sum of such numbers of one unit; or an expression over parameters. Example:
+    kinematics.extremes.C.x.range Example: kinematics.C.x_velocity.peak Example: kinematics.C.y.range +
+    2*kinematics.D.y.range
     """
     where: dict[str, Rows] = Field(default_factory=dict)
     """Rows that count: those whose columns have these values, in the column's unit or with one of its kind, or lie in
@@ -339,20 +340,21 @@ class OptimizeSection(fields.Model):
     {stiffness.elastic.rod: {choices: [bar, tube]}}
     """
     maximize: Goals = ()
-    """Results that are to be large; one alone needs no list. Their worst row counts, the smallest. Example: [GII, SUI,
-    {result: reliability.reliability, where: {method: analytic}}]
+    """Results that are to be large; one alone needs no list. Their worst row counts, the smallest, along a motion the
+    worst place between the rows, too. Example: [GII, SUI, {result: reliability.reliability, where: {method: analytic}}]
     """
     minimize: Goals = ()
-    """Results that are to be small; their largest row counts, of an error the absolute value. Example:
-    kinematics.C.y_error
+    """Results that are to be small; their largest row counts, of an error the absolute value, along a motion the worst
+    place between the rows, too. Example: kinematics.C.y_error
     """
     weights: tuple[WeightRow, ...] | None = None
     """One optimum a row: weights of the goals, first those of ``maximize``, or by their names. Each goal is normalised
     by its range over the feasible designs. Left out: one row of equal weights. Example: [[1, 0], [1, 1], [2, 1]]
     """
     subject_to: tuple[AnyCondition, ...] = ()
-    """What a design must keep to be feasible: bounds of results, or a shape that the workspace contains. Example:
-    [{result: workspace.area, at_least: 0.35}, {contains: {circle: 80}}]
+    """What a design must keep to be feasible: bounds of results, in the worst row and along a motion between the rows,
+    too, or a shape that the workspace contains. Example: [{result: workspace.area, at_least: 0.35}, {contains: {circle:
+    80}}]
     """
     evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
     """Most designs that search and pareto evaluate; a search then uses them all. Left out: by the number of variables

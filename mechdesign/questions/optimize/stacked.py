@@ -18,7 +18,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.dynamics import analysis as dynamics
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import course_of
+from mechdesign.questions.kinematics.courses import courses_of
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.loops import loops_table, measured
 from mechdesign.questions.kinematics.motion import move
@@ -140,7 +140,7 @@ def tables(
         loops = four_bars(study.mechanism) if "loops" in names else ()
         errors = question.errors if "targets" in names else ()
         along = along_of(question, outputs, loops, also=errors, requests=requests)
-        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        scope = Scope(follow=partial(courses_of, along)) if along is not None else None
         built = {name: replace(table, scope=scope) for name, table in pose_tables(motion, names).items()}
         if "extremes" in names:
             built["extremes"] = extremes(motion, along, outputs)
@@ -152,7 +152,7 @@ def tables(
     elif command == "dynamics":
         motion = move(force_question(study, poses), also=solved.append)
         built, along = dynamics.tables(motion, motion.question, names, outputs, requests)
-        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        scope = Scope(follow=None if along is None else partial(courses_of, along))
         built = {name: replace(table, scope=scope) for name, table in built.items()}
         reason = motion.reason
     elif command == "reliability":

@@ -18,8 +18,7 @@ from mechdesign.report.cases import RANK, best_of, short, text_of
 from mechdesign.report.figures.style import printed, raised
 from mechdesign.report.requirements import DrawnCases
 from mechdesign.results import VARIED, Column, KeyNumber, Result, Table
-from mechdesign.rows import unit_of
-from mechdesign.statistics import Request
+from mechdesign.rows import choose, unit_of
 
 # Largest number of headlines of a question.
 MOST = 8
@@ -168,8 +167,8 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
         for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
-    between = _between(rule, table, column)
-    for row in rows[:1] if between else rows:
+    between = _between(rule, result, column)
+    for row in [between[0]] if between and rows else rows:
         words = {other.name: str(other.values[row]) for other in table.columns if not other.numeric}
         if rule.table is EXTREMES and result.tables["motion"].column(words["output"]).kind in _RATES_AND_FORCES:
             continue
@@ -182,7 +181,8 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            value, pose = between or (values[row], _Pose() if rule.row in ("first", "each") else _pose(table, row))
+            own = row, values[row], _Pose() if rule.row in ("first", "each") else _pose(table, row)
+            _, value, pose = between or own
             at = f"at {pose.words}" if pose.words else ""
             notes += [at] * bool(at)
             if rule.several and len(finite) > 1:
@@ -193,16 +193,23 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.coordinates, pose.place, meaning)
 
 
-def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pose] | None:
-    """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table."""
-    if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
+def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, float, _Pose] | None:
+    """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table.
+
+    The first of the three is a row with its words.
+    """
+    scope = result.tables[rule.table.name].scope
+    if scope is None or scope.follow is None or rule.row in ("first", "each"):
         return None
-    course = table.scope.course(Request(column.name))
-    if course is None:
+    sign, absolute = -1 if rule.row in _LOWEST else 1, rule.row in _ABSOLUTE
+    courses = [*choose(result, f"{rule.table.name}.{column.name}", {}).courses.values()]
+    ends = [tuple(float(end[0]) for end in course.worst(sign, absolute=absolute)) for course in courses]
+    present = [row for row, (_, place) in enumerate(ends) if np.isfinite(place)]
+    if not present:
         return None
-    value, place = course.worst(-1 if rule.row in _LOWEST else 1, absolute=rule.row in _ABSOLUTE)
-    at = float(place[0])
-    return float(value[0]), _Pose(course.shown(at), course.pose(at), at)
+    row = max(present, key=lambda number: sign * ends[number][0])
+    value, at = ends[row]
+    return row, value, _Pose(courses[row].shown(at), courses[row].pose(at), at)
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:

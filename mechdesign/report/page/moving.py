@@ -54,6 +54,7 @@ _WHY = {
     Reason.OTHER_ASSEMBLY: "in another assembly only",
     Reason.LIMIT: "beyond a limit",
     Reason.NOT_HELD: "does not hold its load here",
+    Reason.NOT_DETERMINED: "not determined here",
     Reason.NO_VALUE: "a coupling has no value here",
 }
 _RATES = ("velocity", "acceleration")

@@ -46,9 +46,9 @@ class StudyFile(fields.Model):
     matrix: MatrixSection | None = None
     sensitivities: SensitivitiesSection | None = None
     requirements: tuple[Requirement, ...] = ()
-    """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts. Example: [{result:
-    kinematics.mu, abs: true, at_least: 40}, {result: reliability.reliability, where: {method: monte_carlo}, at_least:
-    0.99}]
+    """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts, along a motion the
+    worst place between the rows, too. Example: [{result: kinematics.mu, abs: true, at_least: 40}, {result:
+    reliability.reliability, where: {method: monte_carlo}, at_least: 0.99}]
     """
     fail_on: Annotated[tuple[_Warning, ...], BeforeValidator(fields.as_list), fields.OrShort()] = ()
     """Kinds of warnings that a result may not have, or the exit code is 1; one alone needs no list. ``--strict`` is
