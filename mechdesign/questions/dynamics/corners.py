@@ -81,6 +81,8 @@ class Corners:
         self.study, self.end = study, float(section.duration)
         self.acting = [*_acting(study, loads, section)]
         self._bends: dict[tuple[tuple[Step, ...], float], Bend] = {}
+        #: What is not linear, and so may be narrow.
+        self.curved = [acting for acting in self.acting if not acting.expression.is_linear()]
         #: Couplings with a table, each with its rows and their period.
         self.tables: list[tuple[Acting, Corner]] = []
         self._in_time: list[tuple[Expression, Corner]] = []

@@ -135,8 +135,9 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
     assert isinstance(borne, ForceQuestion)
     if len(course.rates.friction):
         question = replace(question, borne=replace(borne, rubbing=course.rates.friction))
-    mechanism.forward.judge(course.configuration)
-    motion = Motion(question, reason=course.configuration.reason)
+    reason = np.zeros(count, dtype=np.int8)
+    mechanism.forward.judge(replace(course.configuration, reason=reason))
+    motion = Motion(question, reason=reason)
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
     # Efforts are known, also where the drives are singular.

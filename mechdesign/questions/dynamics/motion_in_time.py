@@ -24,6 +24,7 @@ from scipy.integrate import DOP853
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.charts import Positions, Sides, regularity
 from mechdesign.mechanism.configuration import joined
+from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import NULL, Progress
@@ -54,6 +55,9 @@ USED_UP = 1e-9
 STUCK, MOVED = 20, 100.0
 # How near to a pole of what acts a motion can come, as a part of the duration.
 NEAR_POLE = 1e-6
+# What acts, and is not linear, is looked at this often at least; it is known where the error of its series in a step is
+# less than this part of its size. Else the step shall be so much shorter.
+LEAST_STEPS, KNOWN, SHORTER = 64, 1e-3, 0.25
 # Parts of the duration in which progress is told.
 PARTS = 1000
 
@@ -130,13 +134,15 @@ class Integration:
         #: Laws of couplings with a corner at which velocities jumped, in words, and when.
         self.jumps: list[tuple[str, float]] = []
         self._turning: list[Bend] = []
+        self._turned = ""
         self.steps, self._bounces, self._stuck = 0, 0, 0
         self._deadline = np.inf
         # Of watches by kind and key, how large they were and, of events and corners, their signs.
         self._sizes: dict[tuple[str, Any], float] = {}
         self._sides: dict[tuple[str, Any], float] = {}
         self._begin_corners()
-        self._first_step, self._longest = np.inf, np.inf
+        self._most = self.end / LEAST_STEPS if self.corners.curved else np.inf
+        self._first_step, self._longest = np.inf, self._most
 
     def _begin_corners(self) -> None:
         """Efforts, loads and couplings on the sides of their corners on which the motion starts."""
@@ -226,7 +232,7 @@ class Integration:
             self._stuck = self._stuck + 1 if self.time <= begun + MOVED * beside else 0
             if self._stuck > STUCK:
                 words = "turns the motion back on both sides of a corner, as friction does, which 'friction' gives"
-                why = f"{self._turning[0].acting.words} {words}," if self._turning else "the motion cannot go on"
+                why = f"{self._turned} {words}," if self._turned else "the motion cannot go on"
                 self.ending = Ending("no value", f"{why} from {{time}} on")
             if self.time == solver.t and stop is None:
                 self.state = solver.y
@@ -252,17 +258,17 @@ class Integration:
 
     def _looked(self, dense: Callable[[Floats], Floats], begin: float, end: float) -> tuple[Watch | None, float]:
         """What ends a step first, if anything, and when; crossings up to there are noted."""
-        watches = [*self.watches]
-        if not watches and not self.corners.tables:
+        watches, self._turning = [*self.watches], []
+        if not watches and not self.corners.curved:
             return None, end
-        names = [(watch.kind, watch.key) for watch in watches]
-
+        names: list[tuple[str, Any]] = [(watch.kind, watch.key) for watch in watches]
         seen: list[Instants] = []
 
         def look(times: Floats) -> Floats:
             instants = self.instants(times, dense(times))
             seen.append(instants)
-            return np.array([np.broadcast_to(watch.function(instants), times.shape) for watch in watches], dtype=float)
+            values = [np.broadcast_to(watch.function(instants), times.shape) for watch in watches]
+            return np.array(values, dtype=float).reshape(len(watches), len(times))
 
         resolved = Resolved.of(look, np.array([begin, end]), np.array([self._sizes.get(name, 0.0) for name in names]))
         self._sizes |= zip(names, resolved.sizes.tolist(), strict=True)
@@ -272,7 +278,10 @@ class Integration:
         stopping = [change for change in changes if watches[change.function].kind == "corner"
                     or (watches[change.function].kind != "event" and change.sign < 0)]  # fmt: skip
         longer, until = self.watches.rows_of_tables(seen[0])
-        self._longest = (end - begin) * longer
+        self._longest = min((end - begin) * longer, self._most)
+        if self._curved(seen[0]):
+            self._first_step = (end - begin) * SHORTER
+            until = min(until, begin + self._first_step)
         until = min([end, until, resolved.reach, *(change.place for change in stopping)])
         stop = next((watches[change.function] for change in stopping if change.place <= until), None)
         if stop is not None and stop.kind == "corner":
@@ -290,21 +299,33 @@ class Integration:
             self._turning = [bend for bend in self.corners.bends if ("corner", bend.key) in turning]
         return stop, until
 
+    def _curved(self, instants: Instants) -> bool:
+        """Whether what acts has more in it than a step can know of, at the nodes of the step."""
+        sides, curved = dict(self.equations.branch.sides), False
+        for k, acting in enumerate(self.corners.curved):
+            values = np.nan_to_num(acting.value(acting.expression.held(sides), instants))
+            size = self._sizes["value", k] = max(self._sizes.get(("value", k), 0.0), float(np.abs(values).max()))
+            curved |= bool(chebyshev.remainder(chebyshev.series(values)) > KNOWN * size)
+        return curved
+
     def _stopped(self, stop: Watch) -> None:
         """Go on behind a stop, or end there."""
         equations = self.equations
-        branch = equations.branch
-        if stop.kind == "corner":
+        if self._turning:
+            self._turned = self._turning[0].acting.words
             self.state = turned(self, self._kept(), self._turning)
-        elif stop.kind == "contact":
+        branch = equations.branch
+        if stop.kind == "contact":
             assert isinstance(stop.key, int)
             self.state = rested(self, stop.key)
         elif stop.kind == "hold":
-            rates = self.instants(np.array([self.time]), self.state[:, None]).rates
+            # Just behind it, where the way is known.
+            rates = self.instants(np.array([self.time + MOVED * BESIDE * self.end]), self.state[:, None]).rates
             begins = (branch.signs == 0) & (rates.slack[:, 0] <= USED_UP)
             # Friction is against the way that a contact begins to slide.
-            equations.branch = branch._replace(signs=np.where(begins, -np.sign(rates.friction[:, 0]), branch.signs))
-        else:
+            ways = np.where(rates.friction == 0, self.sliding(rates.acceleration), -rates.friction)[:, 0]
+            equations.branch = branch._replace(signs=np.where(begins, np.sign(ways), branch.signs))
+        elif stop.kind == "limit":
             self.events.append(Event(stop.name, self.time, rises=False))
             self._bounces += 1
             self.state = bounced(self, stop)
