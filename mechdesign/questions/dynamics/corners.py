@@ -7,7 +7,7 @@ whose signs change there.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -81,8 +81,8 @@ class Corners:
         self.study, self.end = study, float(section.duration)
         self.acting = [*_acting(study, loads, section)]
         self._bends: dict[tuple[tuple[Step, ...], float], Bend] = {}
-        #: What is not linear, and so may be narrow.
-        self.curved = [acting for acting in self.acting if not acting.expression.is_linear()]
+        #: What is not linear between its corners, and so may be narrow there.
+        self.curved = [acting for acting in self.acting if not _straight(acting.expression)]
         #: Couplings with a table, each with its rows and their period.
         self.tables: list[tuple[Acting, Corner]] = []
         self._in_time: list[tuple[Expression, Corner]] = []
@@ -161,6 +161,13 @@ def _acting(study: Study, loads: Iterable[Load], section: ForwardSection) -> Ite
         yield from _expressions(f"measure {name}", study.mechanism.coordinate(name))
     for coupling in study.mechanism.couplings:
         yield from _expressions(f"coupling {coupling.name}", coupling.function, coupling=True)
+
+
+def _straight(expression: Expression) -> bool:
+    """Whether an expression is linear between its corners."""
+    sums = {"min": "+", "max": "+", "abs": "negate"}
+    program = (*((kind, sums.get(str(item), item)) for kind, item in expression.program),)
+    return replace(expression, program=program).is_linear()
 
 
 def _expressions(words: str, coordinate: Coordinate, *, coupling: bool = False) -> Iterator[Acting]:
