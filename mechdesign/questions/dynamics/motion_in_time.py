@@ -53,7 +53,7 @@ TO_NEXT, OF_LAST = 0.5, 0.1
 USED_UP = 1e-9
 # Most steps in a row that end where they begin, so many times as near as what acts is that of its side.
 STUCK, MOVED = 20, 100.0
-# How near to a pole of what acts a motion can come, as a part of the duration.
+# How near to a pole of what acts a motion comes, as a part of the duration.
 NEAR_POLE = 1e-6
 # What acts, and is not linear, is looked at this often at least; it is known where the error of its series in a step is
 # less than this part of its size. Else the step shall be so much shorter.
@@ -92,7 +92,7 @@ class Course:
     ending : Ending, optional
         Why the motion ended before its time.
     end : float
-        When it ended.
+        When it ended, or would have come to what is not finite.
     """
 
     positions: Positions
@@ -134,7 +134,7 @@ class Integration:
         #: Laws of couplings with a corner at which velocities jumped, in words, and when.
         self.jumps: list[tuple[str, float]] = []
         self._turning: list[Bend] = []
-        self._turned = ""
+        self._turned, self._pole = "", 0.0
         self.steps, self._bounces, self._stuck = 0, 0, 0
         self._deadline = np.inf
         # Of watches by kind and key, how large they were and, of events and corners, their signs.
@@ -214,8 +214,9 @@ class Integration:
         beside = BESIDE * self.end
         window = begin + beside if begin else -np.inf, end - beside if end < self.end else np.inf
         self.equations.branch = self.equations.branch._replace(window=window)
-        solver = None
-        while self.time < end and self.ending is None:
+        pole = self.corners.pole(end) if end < self.end else ""
+        until, solver = end - NEAR_POLE * self.end * bool(pole), None
+        while self.time < until and self.ending is None:
             solver = self._solver(end) if solver is None else solver
             solver.max_step = self._longest
             begun, self.steps = self.time, self.steps + 1
@@ -242,9 +243,8 @@ class Integration:
                 self.state, solver = states(self.time), None
                 if stop is not None:
                     self._stopped(stop)
-        near = end - self.time <= NEAR_POLE * self.end and end < self.end
-        if near and (self.ending is None or self.ending.kind == "no value") and (words := self.corners.pole(end)):
-            self.ending = Ending("no value", f"{words} is not finite at {{time}}")
+        if pole and self.time >= until:
+            self.ending, self._pole = Ending("no value", f"{pole} is not finite at {{time}}"), end
 
     def _solver(self, end: float) -> DOP853:
         tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
@@ -369,7 +369,7 @@ class Integration:
         near = self.positions.near(x)
         whole = replace(whole, near=near, counted=frozenset(near))
         events = sorted(self.events, key=lambda event: event.time)
-        return Course(self.positions, times, x, rates, work, whole, events, self.ending, self.time, self.steps)
+        return Course(self.positions, times, x, rates, work, whole, events, self.ending, self._pole or self.time, self.steps)
 
     def _switched(self, solver: DOP853) -> DOP853 | None:
         """The solver, or none where coordinates of another chart move much faster than those of this one."""
