@@ -102,7 +102,8 @@ class Case:
         words = ", ".join(f'{name}: "{text}"' for name, text in efforts.items())
         started = ", ".join(f"{name}: {value!r}" for name, value in start.items())
         return (
-            f"{UNITS}{self.text}dynamics:\n  {{{gravity}forward: {{duration: {DURATION}, rows: 21, start: {{{started}}}, "
+            f"{UNITS}{self.text}dynamics:\n"
+            f"  {{{gravity}forward: {{duration: {DURATION}, rows: 21, start: {{{started}}}, "
             f"efforts: {{{words}}}{self.extra}}}}}\n"
         )
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from mechdesign.questions.dynamics.analysis import dynamics
@@ -208,3 +209,32 @@ def test_crossings_near_the_turning_points_of_a_swing_are_all_found(swings: int)
     assert middles == pytest.approx(PERIOD * (np.arange(swings) + 0.5), rel=1e-8)
     assert np.isnan(swing(f", events: {{far: {{of: theta, value: {-math.pi / 2 - 1.0001 * math.pi / 3!r}}}}}", swings)
                     .tables["events"]["time"]).all()  # fmt: skip
+
+
+def test_a_follower_that_lifts_off_between_two_instants_is_said() -> None:
+    # At a constant speed w it is pulled where g + s'' w^2 < 0, of s = 0.4 (cos(turn) - 0.9)^2 within 26 degrees.
+    speed = 12.0
+    result = run(f"""
+mechanism:
+  links:
+    ground: {{O: [0, 0]}}
+    disc: {{from: O, to: N, length: 0.04, mass: 1, center: [0, 0], inertia: 1e6}}
+    valve: {{points: {{F: [0, 0]}}, mass: 1}}
+  joints: {{stem: {{prismatic: [ground, valve], through: O, direction: 90 deg}}}}
+  couplings:
+    lift:
+      set: stem.slide
+      to: "0.04 + 0.4*max(0, cos(disc.angle - 1) - 0.9)**2"
+      cam: {{link: disc, roller: F, radius: 0.008}}
+  drives: {{cam: {{angle: disc}}}}
+  sketch: {{N: [0.04, 0], F: [0, 0.04]}}
+dynamics: {{gravity: [0, -{G}], forward: {{duration: 0.2, rows: 2, start: {{cam: 0, cam_velocity: {speed}}}}}}}
+""")
+
+    def pressed(time: float) -> float:
+        turn = speed * time - 1
+        return G + speed**2 * 0.8 * (math.sin(turn) ** 2 - math.cos(turn) * (math.cos(turn) - 0.9))
+
+    (warning,) = result.warnings
+    assert "lifts off between the instants" in str(warning)
+    assert f"first at {brentq(pressed, 0.06, 1 / speed):.6g} s" in str(warning)

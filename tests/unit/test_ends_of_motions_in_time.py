@@ -31,6 +31,7 @@ def judged(forward: str = "", mechanism: str = "", sketch: str = "", unassembled
     return result, verdict
 
 
+TABLE = [[0, 0], [0.2, 0.01], [0.3, 0.02], [0.4, 0.02]]
 FOLLOWER = """, follower: {points: {F: [0, 0]}, mass: 3}}
   joints: {guide: {prismatic: [ground, follower], through: G}}
   couplings: {cam: {set: guide.slide, %s}"""
@@ -45,7 +46,7 @@ FOLLOWER = """, follower: {points: {F: [0, 0]}, mass: 3}}
                  marks=pytest.mark.nightly),
     pytest.param("efforts: {door: '-9*door_velocity/abs(door_velocity)'}", "",
                  "the effort of door turns the motion back", 5 / 9, marks=pytest.mark.nightly),
-    ("", "of: door, table: [[0, 0], [0.2, 0.01], [0.3, 0.02], [0.4, 0.02]]", "coupling cam has no value from 0.39", None),
+    ("", f"of: door, table: {TABLE}", "coupling cam has no value from 0.39", None),
 ])  # fmt: skip
 def test_what_has_no_value_further_on_is_named_and_nothing_is_met(
     forward: str, mechanism: str, reason: str, time: float | None
@@ -92,7 +93,7 @@ def test_a_motion_that_takes_too_long_is_not_met(
 @pytest.mark.slow
 def test_energies_that_do_not_follow_from_the_work_are_unconverged(monkeypatch: pytest.MonkeyPatch) -> None:
     # As if a pulse of work was taken from the motion's account alone.
-    monkeypatch.setattr(motion_in_time.Integration, "_course", _robbed(motion_in_time.Integration._course))
+    monkeypatch.setattr(motion_in_time.Integration, "course", _robbed(motion_in_time.Integration.course))
     result, _ = judged(", efforts: {door: '20*sin(9*time)'}")
     (warning,) = result.warnings
     assert (warning.kind, warning.table, warning.row) == ("unconverged", "forward", 5)

@@ -11,6 +11,7 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics import lift_off
@@ -59,11 +60,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     }  # fmt: skip
     scope, warnings = _scope(study, course), [*_cautions(study, integration, course)]
     tables = {name: replace(table, scope=replace(scope, poses_only=name != "events")) for name, table in tables.items()}
-    for coupling, where in lift_off.lifted(motion):
-        if where.any():
-            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
-            warnings.append(lift_off.caution(study, motion.question.poses, coupling, mark))
-    warnings += assumed(study)
+    warnings += [*_lift_offs(study, integration, motion), *assumed(study)]
     counts = {"instants": len(course.times), "steps": course.steps}
     return Result("dynamics", tables, warnings, counts), motion, shown
 
@@ -110,6 +107,35 @@ def _cautions(study: Study, integration: Integration, course: Course) -> Iterato
             f"at last by {off[-1] / size:.3g} of the largest change; what acts may be narrower there than the steps"
         )
         yield Caution("unconverged", message, "forward", row)
+
+
+def _lift_offs(study: Study, integration: Integration, rows: Motion) -> Iterator[Caution]:
+    """Warnings of followers that lift off their cams, at rows, or only between them."""
+    contacts = lift_off.contacts(integration.equations.question)
+    for coupling, where in lift_off.lifted(rows):
+        if where.any():
+            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
+            yield lift_off.caution(study, rows.question.poses, coupling, mark)
+            del contacts[coupling]
+    if not contacts or not integration.time:
+        return
+    least = lift_off.PRESSED * integration.equations.question.size
+
+    def pressed(times: Floats) -> Floats:
+        order = np.argsort(times)
+        motion, _ = _forces(study, integration.course(times[order]))
+        return np.array([motion.arrays[normal] + least for normal in contacts.values()])[:, np.argsort(order)]
+
+    ends = np.unique([stretch.end for stretch in integration.stretches])
+    changes = Resolved.of(pressed, ends, np.zeros(len(contacts))).changes(np.ones(len(contacts)))
+    for k, coupling in enumerate(contacts):
+        times = [change.place for change in changes if change.function == k and change.sign < 0]
+        if times:
+            message = (
+                f"cam {coupling}: the follower lifts off between the instants, where it would have to be pulled; a "
+                f"spring holds it on the cam; {len(times)} times, first at {_at(study, times[0])}"
+            )
+            yield Caution("cam", message, "joint_forces")
 
 
 def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:

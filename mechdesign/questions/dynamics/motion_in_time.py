@@ -129,7 +129,7 @@ class Integration:
         self.scales = self._scales(x, velocity, works)
         self.events: list[Event] = []
         begin = self.state
-        self._stretches = [self._stretch(lambda times: np.repeat(begin[:, None], len(times), axis=1), 0.0)]
+        self.stretches = [self._stretch(lambda times: np.repeat(begin[:, None], len(times), axis=1), 0.0)]
         self.ending: Ending | None = None
         #: Laws of couplings with a corner at which velocities jumped, in words, and when.
         self.jumps: list[tuple[str, float]] = []
@@ -207,7 +207,7 @@ class Integration:
                 words = f"{MAX_SECONDS:g} s of the processor are not enough, the motion got to {{time}}"
                 self.ending = Ending("spent", words)
             count = self.section.rows
-            return self._course(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
+            return self.course(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
 
     def _pass(self, begin: float, end: float, progress: Progress) -> None:
         """Integrate from a corner in time to the next."""
@@ -228,7 +228,7 @@ class Integration:
                 break
             states = solver.dense_output()
             stop, self.time = self._looked(states, begun, solver.t)
-            self._stretches.append(self._stretch(states, self.time))
+            self.stretches.append(self._stretch(states, self.time))
             progress.update(int(PARTS * self.time / self.end) - int(PARTS * begun / self.end))
             self._stuck = self._stuck + 1 if self.time <= begun + MOVED * beside else 0
             if self._stuck > STUCK:
@@ -351,13 +351,13 @@ class Integration:
         if moves.any():
             self.equations.branch = branch._replace(signs=np.where(moves, np.sign(speeds), branch.signs))
 
-    def _course(self, times: Floats) -> Course:
+    def course(self, times: Floats) -> Course:
         """The motion at some times."""
         equations = self.equations
-        numbers = np.searchsorted([stretch.end for stretch in self._stretches], times)
+        numbers = np.searchsorted([stretch.end for stretch in self.stretches], times)
         parts = []
         for number in np.unique(numbers):
-            states, _, equations.branch = self._stretches[number]
+            states, _, equations.branch = self.stretches[number]
             inside = times[numbers == number]
             x, velocity, work = self.parts_of(states(inside))
             poses = Instants(equations, inside, x, velocity).configuration
@@ -369,7 +369,9 @@ class Integration:
         near = self.positions.near(x)
         whole = replace(whole, near=near, counted=frozenset(near))
         events = sorted(self.events, key=lambda event: event.time)
-        return Course(self.positions, times, x, rates, work, whole, events, self.ending, self._pole or self.time, self.steps)
+        return Course(
+            self.positions, times, x, rates, work, whole, events, self.ending, self._pole or self.time, self.steps
+        )
 
     def _switched(self, solver: DOP853) -> DOP853 | None:
         """The solver, or none where coordinates of another chart move much faster than those of this one."""
