@@ -114,11 +114,15 @@ class Resolved(NamedTuple):
     def touched(self) -> Floats:
         """Places at which some function is zero, or touches it."""
         places = [change.place for change in self.changes(np.zeros(len(self.sizes)))]
-        for k, piece in zip(*np.nonzero(np.abs(self.coefficients).max(axis=-1) > 0), strict=True):
-            _, x, values = chebyshev.turning_points(self.coefficients[k, piece][None])
-            x = x[np.abs(values) <= RESOLVED * self.sizes[k]]
-            places += self.places(int(piece), x).tolist()
-        return np.unique(places)
+        return np.unique([*places, *self.turning(RESOLVED)])
+
+    def turning(self, near: float = np.inf) -> Floats:
+        """Places at which some function turns back, within a part of its size of zero."""
+        owner, piece = np.nonzero(np.abs(self.coefficients).max(axis=-1) > 0)
+        which, x, values = chebyshev.turning_points(self.coefficients[owner, piece])
+        some = np.abs(values) <= near * self.sizes[owner[which]]
+        low, high = (ends[piece[which[some]]] for ends in (self.low, self.high))
+        return np.asarray((low + high) / 2 + x[some] * (high - low) / 2)
 
     def _between_zeros(self, k: int, piece: int) -> list[tuple[float, float]]:
         """Where each side of a function in a piece begins, from -1 on, and the value in its middle."""

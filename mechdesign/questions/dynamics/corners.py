@@ -83,14 +83,16 @@ class Corners:
         self._bends: dict[tuple[tuple[Step, ...], float], Bend] = {}
         #: What is not linear between its corners, and so may be narrow there.
         self.curved = [acting for acting in self.acting if not _straight(acting.expression)]
+        #: Of each, corners where it may have peaks.
+        self.peaks = [[c for c in acting.expression.corners() if c.turning] for acting in self.curved]
         #: Couplings with a table, each with its rows and their period.
         self.tables: list[tuple[Acting, Corner]] = []
-        self._in_time: list[tuple[Expression, Corner]] = []
+        self._in_time: list[Corner] = []
         for acting in self.acting:
             for corner in _corners_of(acting):
                 names = corner.argument.names - study.parameters.nominal.keys()
                 if names == {TIME}:
-                    self._in_time.append((acting.expression, corner))
+                    self._in_time.append(corner)
                 elif names:
                     self._add(acting, corner)
 
@@ -111,17 +113,18 @@ class Corners:
 
     @cached_property
     def instants(self) -> Floats:
-        """Instants of the corners that depend on time alone, within the duration."""
+        """Instants of the corners, and of the narrow peaks, that depend on time alone, within the duration."""
         known = np.linspace(0.0, self.end, PARTS + 1)
         marks = np.array([0.0, self.end])
-        for _, corner in self._in_time:
-            for level in corner.levels:
+        for corner in self._in_time:
+            for level in corner.levels or (0.0,):
 
                 def look(times: Floats, corner: Corner = corner, level: float = level) -> Floats:
                     return _of_level(self._at(corner.argument, times), corner, level)[None]
 
-                resolved = Resolved.of(look, np.union1d(known, marks), np.full(1, 1e-300))
-                marks = np.union1d(marks, resolved.touched())
+                resolved = Resolved.of(look, np.union1d(known, marks), np.zeros(1))
+                places = resolved.touched() if corner.levels else np.empty(0)
+                marks = np.union1d(marks, [*places, *(resolved.turning() if corner.turning else ())])
         return marks[1:-1]
 
     def pole(self, time: float) -> str:

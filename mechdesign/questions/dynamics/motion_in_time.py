@@ -279,8 +279,8 @@ class Integration:
                     or (watches[change.function].kind != "event" and change.sign < 0)]  # fmt: skip
         longer, until = self.watches.rows_of_tables(seen[0])
         self._longest = min((end - begin) * longer, self._most)
-        if self._curved(seen[0]):
-            self._first_step = (end - begin) * SHORTER
+        if (curved := self._curved(dense, seen[0], begin, end)) is not None:
+            self._first_step = (curved - begin) * SHORTER
             until = min(until, begin + self._first_step)
         until = min([end, until, resolved.reach, *(change.place for change in stopping)])
         stop = next((watches[change.function] for change in stopping if change.place <= until), None)
@@ -299,13 +299,27 @@ class Integration:
             self._turning = [bend for bend in self.corners.bends if ("corner", bend.key) in turning]
         return stop, until
 
-    def _curved(self, instants: Instants) -> bool:
-        """Whether what acts has more in it than a step can know of, at the nodes of the step."""
-        sides, curved = dict(self.equations.branch.sides), False
+    def _curved(self, dense: Callable[[Floats], Floats], nodes: Instants, begin: float, end: float) -> float | None:
+        """Before when a step has more of what acts in it than it can know of; None where it knows all."""
+        sides, curved = dict(self.equations.branch.sides), None
         for k, acting in enumerate(self.corners.curved):
-            values = np.nan_to_num(acting.value(acting.expression.held(sides), instants))
+            held = acting.expression.held(sides)
+            values = np.nan_to_num(acting.value(held, nodes))
             size = self._sizes["value", k] = max(self._sizes.get(("value", k), 0.0), float(np.abs(values).max()))
-            curved |= bool(chebyshev.remainder(chebyshev.series(values)) > KNOWN * size)
+            series = chebyshev.series(values)
+            if chebyshev.remainder(series) > KNOWN * size:
+                return end
+            # Peaks between the nodes.
+            for corner in self.corners.peaks[k]:
+                argument = np.nan_to_num(acting.value(corner.argument.held(sides), nodes))
+                _, x, _ = chebyshev.turning_points(chebyshev.series(argument)[None])
+                if not len(x):
+                    continue
+                times = (begin + end) / 2 + x * (end - begin) / 2
+                peaks = np.nan_to_num(acting.value(held, self.instants(times, dense(times))))
+                off = np.abs(peaks - chebyshev.value(np.repeat(series[None], len(x), axis=0), x))
+                if (off > KNOWN * max(size, float(np.abs(peaks).max()))).any():
+                    curved = min(times.min(), end if curved is None else curved)
         return curved
 
     def _stopped(self, stop: Watch) -> None:
