@@ -113,7 +113,8 @@ class Resolved(NamedTuple):
 
     def touched(self) -> Floats:
         """Places at which some function is zero, or touches it."""
-        places = [change.place for change in self.changes(np.zeros(len(self.sizes)))]
+        changes = self.changes(np.zeros(len(self.sizes)))
+        places = [change.place for change in changes if change.place > self.low[0]]
         return np.unique([*places, *self.turning(RESOLVED)])
 
     def turning(self, near: float = np.inf) -> Floats:
