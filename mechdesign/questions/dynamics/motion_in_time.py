@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from time import thread_time
+from time import perf_counter, thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,6 @@ from scipy.integrate import DOP853
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.charts import Positions, Sides, regularity
 from mechdesign.mechanism.configuration import joined
-from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import NULL, Progress
@@ -55,9 +54,8 @@ USED_UP = 1e-9
 STUCK, MOVED = 20, 100.0
 # How near to a pole of what acts a motion comes, as a part of the duration.
 NEAR_POLE = 1e-6
-# What acts, and is not linear, is looked at this often at least; it is known where the error of its series in a step is
-# less than this part of its size. Else the step shall be so much shorter.
-LEAST_STEPS, KNOWN, SHORTER = 64, 1e-3, 0.25
+# What acts, and is not linear, is looked at this often at least. A step that does not know it shall be so much shorter.
+LEAST_STEPS, SHORTER = 64, 0.25
 # Parts of the duration in which progress is told.
 PARTS = 1000
 
@@ -136,7 +134,7 @@ class Integration:
         self._turning: list[Bend] = []
         self._turned, self._pole = "", 0.0
         self.steps, self._bounces, self._stuck = 0, 0, 0
-        self._deadline = np.inf
+        self._deadlines = np.inf, np.inf
         # Of watches by kind and key, how large they were and, of events and corners, their signs.
         self._sizes: dict[tuple[str, Any], float] = {}
         self._sides: dict[tuple[str, Any], float] = {}
@@ -178,7 +176,8 @@ class Integration:
 
     def _function(self, at: float, state: Any) -> Any:
         """Derivative of the state: positions, velocities, work."""
-        if thread_time() > self._deadline:
+        # A look at the wall's clock costs less than one at the processor's, which is never ahead.
+        if perf_counter() > self._deadlines[0] and thread_time() > self._deadlines[1]:
             raise SpentError
         x, velocity, _ = self.parts_of(state[:, None])
         rates = self.equations.rates(np.array([at]), x, velocity)
@@ -196,7 +195,7 @@ class Integration:
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
         progress.start(PARTS, "parts of the motion's time")
-        self._deadline = thread_time() + MAX_SECONDS
+        self._deadlines = perf_counter() + MAX_SECONDS, thread_time() + MAX_SECONDS
         with np.errstate(all="ignore"):
             try:
                 for begin, end in pairwise([0.0, *self.corners.instants, self.end]):
@@ -264,8 +263,11 @@ class Integration:
         names: list[tuple[str, Any]] = [(watch.kind, watch.key) for watch in watches]
         seen: list[Instants] = []
 
+        def look_at(times: Floats) -> Instants:
+            return self.instants(times, dense(times))
+
         def look(times: Floats) -> Floats:
-            instants = self.instants(times, dense(times))
+            instants = look_at(times)
             seen.append(instants)
             values = [np.broadcast_to(watch.function(instants), times.shape) for watch in watches]
             return np.array(values, dtype=float).reshape(len(watches), len(times))
@@ -279,7 +281,7 @@ class Integration:
                     or (watches[change.function].kind != "event" and change.sign < 0)]  # fmt: skip
         longer, until = self.watches.rows_of_tables(seen[0])
         self._longest = min((end - begin) * longer, self._most)
-        if (curved := self._curved(dense, seen[0], begin, end)) is not None:
+        if (curved := self.watches.curved(look_at, seen[0], begin, end)) is not None:
             self._first_step = (curved - begin) * SHORTER
             until = min(until, begin + self._first_step)
         until = min([end, until, resolved.reach, *(change.place for change in stopping)])
@@ -298,29 +300,6 @@ class Integration:
         if stop is not None:
             self._turning = [bend for bend in self.corners.bends if ("corner", bend.key) in turning]
         return stop, until
-
-    def _curved(self, dense: Callable[[Floats], Floats], nodes: Instants, begin: float, end: float) -> float | None:
-        """Before when a step has more of what acts in it than it can know of; None where it knows all."""
-        sides, curved = dict(self.equations.branch.sides), None
-        for k, acting in enumerate(self.corners.curved):
-            held = acting.expression.held(sides)
-            values = np.nan_to_num(acting.value(held, nodes))
-            size = self._sizes["value", k] = max(self._sizes.get(("value", k), 0.0), float(np.abs(values).max()))
-            series = chebyshev.series(values)
-            if chebyshev.remainder(series) > KNOWN * size:
-                return end
-            # Peaks between the nodes.
-            for corner in self.corners.peaks[k]:
-                argument = np.nan_to_num(acting.value(corner.argument.held(sides), nodes))
-                _, x, _ = chebyshev.turning_points(chebyshev.series(argument)[None])
-                if not len(x):
-                    continue
-                times = (begin + end) / 2 + x * (end - begin) / 2
-                peaks = np.nan_to_num(acting.value(held, self.instants(times, dense(times))))
-                off = np.abs(peaks - chebyshev.value(np.repeat(series[None], len(x), axis=0), x))
-                if (off > KNOWN * max(size, float(np.abs(peaks).max()))).any():
-                    curved = min(times.min(), end if curved is None else curved)
-        return curved
 
     def _stopped(self, stop: Watch) -> None:
         """Go on behind a stop, or end there."""
