@@ -7,7 +7,7 @@ zero does not change its sign.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,8 @@ from mechdesign.numerics.arrays import Floats
 RESOLVED = 1e-9
 # A function that is below this part of its size is zero.
 NOTHING = 1e-12
+# A function that has its sign only from this part of the interval on had it before: it has just left zero.
+EARLY = 1e-8
 # Shortest piece, as a part of the interval; most pieces that are looked at.
 SHORTEST, MOST_PIECES = 1e-11, 4096
 # A zero moves by less than this part of its piece when it is polished.
@@ -94,11 +96,15 @@ class Resolved(NamedTuple):
         low, high = self.low[piece], self.high[piece]
         return np.asarray((low + high) / 2 + x * (high - low) / 2)
 
-    def changes(self, sides: Floats) -> list[SignChange]:
-        """Changes of sign in order, from `sides` before the interval on; 0 where a function has none yet."""
+    def changes(self, sides: Floats, least: Sequence[float] | float = 0.0) -> list[SignChange]:
+        """Changes of sign in order, from `sides` before the interval on; 0 where a function has none yet.
+
+        A function that is no more than `least` has no sign.
+        """
         leading, others = self.coefficients[..., 0], np.abs(self.coefficients[..., 1:]).sum(axis=-1)
-        noise = NOTHING * self.sizes
+        noise = np.maximum(NOTHING * self.sizes, least)
         sure = np.abs(leading) > others
+        begin, early = self.low[0], EARLY * (self.high[-1] - self.low[0])
         changes: list[SignChange] = []
         for k in np.flatnonzero(~(sure & (np.sign(leading) == sides[:, None])).all(axis=1)).tolist():
             side = float(sides[k])
@@ -107,7 +113,11 @@ class Resolved(NamedTuple):
                     sign = float(np.sign(middle))
                     if sign == side or abs(middle) <= noise[k]:
                         continue
-                    changes.append(SignChange(k, self._polished(k, piece, x), sign))
+                    change = SignChange(k, self._polished(k, piece, x), sign)
+                    if changes and changes[-1][:2] == (k, begin) and sides[k] and change.place < begin + early:
+                        changes.pop()
+                    else:
+                        changes.append(change)
                     side = sign
         return sorted(changes, key=lambda change: change.place)
 

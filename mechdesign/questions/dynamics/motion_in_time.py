@@ -36,20 +36,20 @@ from mechdesign.questions.dynamics.watches import Watch, Watches
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
 RELATIVE, ABSOLUTE = 1e-11, 1e-12
-# Most steps, and most time of the processor (s).
-MAX_STEPS, MAX_SECONDS = 5000, 30.0
+# Most steps, and most time of the processor (s); for more angles and slides than so many in proportion.
+MAX_STEPS, MAX_SECONDS, MANY = 5000, 30.0, 10
 MAX_BOUNCES = 1000
 # Another chart takes over where its coordinates move so many times faster.
 FASTER = 3.0
-# A velocity below this part of the usual one is that of a contact at rest.
-STILL = 1e-8
+# A velocity below this part of the usual one is that of a contact at rest; and what it drifts by while it rests.
+STILL, DRIFT = 1e-8, 1e-9
 STANDSTILL = "standstill"
 # What acts is that of its side this near to a corner, as a part of the duration.
 BESIDE = 1e-13
 # The first step behind a corner: as a part of the way to the next one, and of the step before.
 TO_NEXT, OF_LAST = 0.5, 0.1
-# Slack of friction, as a part of it, that is none.
-USED_UP = 1e-9
+# How far behind a break-away contacts are told to slide, as a part of the duration.
+BEGUN = 1e-9
 # Most steps in a row that end where they begin, so many times as near as what acts is that of its side.
 STUCK, MOVED = 20, 100.0
 # How near to a pole of what acts a motion comes, as a part of the duration.
@@ -195,7 +195,8 @@ class Integration:
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
         progress.start(PARTS, "parts of the motion's time")
-        self._deadlines = perf_counter() + MAX_SECONDS, thread_time() + MAX_SECONDS
+        seconds = MAX_SECONDS * max(1.0, self.count / MANY)
+        self._deadlines = perf_counter() + seconds, thread_time() + seconds
         with np.errstate(all="ignore"):
             try:
                 for begin, end in pairwise([0.0, *self.corners.instants, self.end]):
@@ -203,7 +204,7 @@ class Integration:
                     if self.ending is not None:
                         break
             except SpentError:
-                words = f"{MAX_SECONDS:g} s of the processor are not enough, the motion got to {{time}}"
+                words = f"{seconds:g} s of the processor are not enough, the motion got to {{time}}"
                 self.ending = Ending("spent", words)
             count = self.section.rows
             return self.course(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
@@ -275,7 +276,10 @@ class Integration:
         resolved = Resolved.of(look, np.array([begin, end]), np.array([self._sizes.get(name, 0.0) for name in names]))
         self._sizes |= zip(names, resolved.sizes.tolist(), strict=True)
         sides = [self._sides.get(name, 0.0 if name[0] == "event" else 1.0) for name in names]
-        changes = resolved.changes(np.array(sides))
+        # What rests has the velocities of rounding.
+        changes = resolved.changes(
+            np.array(sides), [DRIFT * self.pace * (watch.kind == "contact") for watch in watches]
+        )
         # At others than events and corners a change to the other side is none, as what they watch ends there.
         stopping = [change for change in changes if watches[change.function].kind == "corner"
                     or (watches[change.function].kind != "event" and change.sign < 0)]  # fmt: skip
@@ -290,6 +294,9 @@ class Integration:
             until = min(until + BESIDE * self.end, end)
             later = [change.place for change in changes if change.place > until]
             self._first_step = min([OF_LAST * (end - begin), *(TO_NEXT * (place - until) for place in later)])
+        elif stop is not None and stop.kind == "hold":
+            # A little further on it is certain which contacts begin to slide.
+            until = min(until + BEGUN * self.end, end)
         turning = {names[change.function] for change in changes if change.place <= until}
         for change in changes:
             kind, name = watches[change.function].kind, names[change.function]
@@ -312,9 +319,8 @@ class Integration:
             assert isinstance(stop.key, int)
             self.state = rested(self, stop.key)
         elif stop.kind == "hold":
-            # Just behind it, where the way is known.
-            rates = self.instants(np.array([self.time + MOVED * BESIDE * self.end]), self.state[:, None]).rates
-            begins = (branch.signs == 0) & (rates.slack[:, 0] <= USED_UP)
+            rates = self.instants(np.array([self.time]), self.state[:, None]).rates
+            begins = (branch.signs == 0) & (rates.slack[:, 0] < 0)
             # Friction is against the way that a contact begins to slide.
             ways = np.where(rates.friction == 0, self.sliding(rates.acceleration), -rates.friction)[:, 0]
             equations.branch = branch._replace(signs=np.where(begins, np.sign(ways), branch.signs))
