@@ -17,7 +17,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.expressions import Step
 from mechdesign.mechanism.algebra import TURN, Value, cross, quiet, rotation
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate, Coupled, angles_of
+from mechdesign.mechanism.coordinates import Coordinate, Coupled, angles_of, corners_of
 from mechdesign.mechanism.decomposition import compile_structure
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.loops import Loops
@@ -181,6 +181,8 @@ class Atlas:
     def __init__(self, positions: Positions) -> None:
         self.positions = positions
         self._charts: dict[tuple[tuple[int, ...], Sides], Chart | None] = {}
+        laws = corners_of(coupling.function for coupling in positions.mechanism.couplings)
+        self._programs = {corner.argument.program for corner in laws}
 
     def best(self, slopes: Floats, sides: Sides) -> tuple[Chart, float]:
         """The chart whose coordinates move most along the mechanism's motions, and the volume that they span.
@@ -210,9 +212,9 @@ class Atlas:
 
     def chart(self, rows: Ints, sides: Sides) -> Chart | None:
         """The chart of some positions; None if they do not determine the mechanism."""
-        key = (tuple(sorted(rows.tolist())), sides)
+        key = (tuple(sorted(rows.tolist())), (*(side for side in sides if side[0] in self._programs),))
         if key not in self._charts:
-            kept = dict(sides)
+            kept = dict(key[1])
             couplings = [replace(c, function=c.function.held(kept), gap=c.gap.held(kept))
                          for c in self.positions.mechanism.couplings]  # fmt: skip
             try:

@@ -120,7 +120,9 @@ def turned(motion: Integration, sides: Sides, turning: Sequence[Bend]) -> Floats
 def _chart(motion: Integration, sides: Sides) -> Chart:
     """The chart of the same positions on other sides of corners."""
     chart = motion.equations.atlas.chart(motion.equations.branch.chart.rows, sides)
-    assert chart is not None
+    if chart is None:
+        motion.ending = Ending("no value", "nothing determines the mechanism on both sides of a corner at {time}")
+        return motion.equations.branch.chart
     return chart
 
 
