@@ -118,6 +118,8 @@ _FUNCTIONS: dict[str, _Function] = {
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
 # Functions whose value has a period, in turns.
 _TURNS = {"atan2": 1.0, "atan": 0.5}
+# Functions that are another one of their arguments, or its negative, on each side of a corner.
+_HELD = frozenset(("min", "max", "abs"))
 _OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
 _UNARY_BINDING = 30
 
@@ -395,6 +397,25 @@ class Expression:
 
         self._run(_constant_step, lambda name: (("name", name),), call)
         return list({(program, corner.levels, corner.turning): corner for program, corner in corners}.values())
+
+    def held(self, sides: Mapping[tuple[Step, ...], float]) -> Expression:
+        """What the expression is on one side of each corner of `min`, `max` and `abs`, and beyond it.
+
+        `sides` are the signs of the corners' arguments, by the programs of these.
+        """
+
+        def call(function: Called, inner: list[tuple[Any, Any]]) -> tuple[Any, Any]:
+            plain, kept = ([part[k] for part in inner] for k in (0, 1))
+            corner = next(_corners(function, plain, self.angle_unit), None) if function in _HELD else None
+            side = sides.get(corner[0], 0.0) if corner is not None else 0.0
+            if not side:
+                return _call_steps(function, plain), _call_steps(function, kept)
+            if function == "abs":
+                return _call_steps(function, plain), kept[0] if side > 0 else _call_steps("negate", kept)
+            return _call_steps(function, plain), kept[(side > 0) != (function == "max")]
+
+        _, program = self._run(lambda value: (_constant_step(value),) * 2, lambda name: ((("name", name),),) * 2, call)
+        return replace(self, program=program)
 
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[Any, list[Any]], Any]

@@ -175,11 +175,14 @@ class Scope:
         In words, which poses or parts of the motion are not valid; empty where all are.
     follow : callable, optional
         Columns along the motion, or parts of it; None for each that is not known there.
+    until : str
+        In words, where the motion has its own end before the time that was asked.
     """
 
     poses_only: bool = False
     missing: str = ""
     follow: Follow | None = None
+    until: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.linalg import qr
 
 from mechdesign.errors import MechanismError
+from mechdesign.expressions import Step
 from mechdesign.mechanism.algebra import TURN, Value, cross, quiet, rotation
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.coordinates import Coordinate, Coupled, angles_of, corners_of
 from mechdesign.mechanism.decomposition import compile_structure
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.loops import Loops
@@ -25,6 +26,8 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import WITHOUT_MODE, side
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Floats, Ints
+
+Sides = tuple[tuple[tuple[Step, ...], float], ...]
 
 
 class Positions:
@@ -109,11 +112,11 @@ class Chart:
         If they do not determine it.
     """
 
-    def __init__(self, positions: Positions, rows: Sequence[int]) -> None:
+    def __init__(self, positions: Positions, rows: Sequence[int], couplings: Sequence[Coupled]) -> None:
         self.positions, self.rows = positions, np.array(rows, dtype=int)
         mechanism = positions.mechanism
         given = [positions.coordinates[row] for row in rows]
-        self.structure = compile_structure(mechanism.graph, given, mechanism.couplings)
+        self.structure = compile_structure(mechanism.graph, given, couplings)
         self.plan = Plan(mechanism, self.structure, [0] * len(self.structure.groups), follows=False)
 
     @quiet
@@ -177,15 +180,19 @@ class Atlas:
 
     def __init__(self, positions: Positions) -> None:
         self.positions = positions
-        self._charts: dict[tuple[int, ...], Chart | None] = {}
+        self._charts: dict[tuple[tuple[int, ...], Sides], Chart | None] = {}
+        laws = corners_of(coupling.function for coupling in positions.mechanism.couplings)
+        self._programs = {corner.argument.program for corner in laws}
 
-    def best(self, slopes: Floats) -> tuple[Chart, float]:
+    def best(self, slopes: Floats, sides: Sides) -> tuple[Chart, float]:
         """The chart whose coordinates move most along the mechanism's motions, and the volume that they span.
 
         Parameters
         ----------
         slopes : Floats, shape (m, mobility)
             Derivatives of all positions by any coordinates.
+        sides : tuple of (program, sign)
+            On which couplings are kept; see `Expression.held`.
 
         Raises
         ------
@@ -197,17 +204,21 @@ class Atlas:
         while len(left) >= slopes.shape[1]:
             upper, order = qr(scaled[left].T, mode="r", pivoting=True)
             rows = left[order[: slopes.shape[1]]]
-            chart = self._chart(rows)
+            chart = self.chart(rows, sides)
             if chart is not None:
                 return chart, float(np.abs(np.prod(np.diag(upper))))
             left = left[left != rows[-1]]
         raise MechanismError("no angles and slides of the mechanism determine its motion", "dynamics.forward")
 
-    def _chart(self, rows: Ints) -> Chart | None:
-        key = tuple(sorted(rows.tolist()))
+    def chart(self, rows: Ints, sides: Sides) -> Chart | None:
+        """The chart of some positions; None if they do not determine the mechanism."""
+        key = (tuple(sorted(rows.tolist())), (*(side for side in sides if side[0] in self._programs),))
         if key not in self._charts:
+            kept = dict(key[1])
+            couplings = [replace(c, function=c.function.held(kept), gap=c.gap.held(kept))
+                         for c in self.positions.mechanism.couplings]  # fmt: skip
             try:
-                self._charts[key] = Chart(self.positions, key)
+                self._charts[key] = Chart(self.positions, key[0], couplings)
             except MechanismError:
                 self._charts[key] = None
         return self._charts[key]

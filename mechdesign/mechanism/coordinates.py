@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from mechdesign.errors import MechanismError, suggestion
-from mechdesign.expressions import Corner, Expression
+from mechdesign.expressions import Corner, Expression, Step
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import (
@@ -66,6 +66,11 @@ class Coordinate:
             for part in self.parts
         }
         return self.expression.substituted(values).is_linear()
+
+    def held(self, sides: Mapping[tuple[Step, ...], float]) -> Coordinate:
+        """An expression of it, and those of its parts, on some sides of their corners; see `Expression.held`."""
+        expression = None if self.expression is None else self.expression.held(sides)
+        return replace(self, expression=expression, parts=(*(part.held(sides) for part in self.parts),))
 
     @property
     def ends(self) -> tuple[tuple[str, int], ...]:

@@ -43,11 +43,15 @@ class Accelerations(NamedTuple):
         Moments on `on` by `by`, of a slide forces along it.
     jams : Ints, shape (poses,)
         Number of the contact that jams, -1 where the mechanism moves or rests.
+    slack : Floats, shape (contacts, poses)
+        Of contacts at rest what is left of their limit, as a part of it; where it is used up, less by how fast friction
+        lets them begin to slide, as a part of how fast they would without it. 1 where contacts slide.
     """
 
     values: Floats
     friction: Floats
     jams: Ints
+    slack: Floats
 
 
 def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Accelerations:
@@ -80,6 +84,7 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
     freely = offsets + np.einsum("nkp,np->kp", np.moveaxis(moves, 0, -1), free)
     mobility = np.einsum("njp,nkp->jkp", np.moveaxis(moves, 0, -1), gains)
     values, friction, jams = free, np.zeros_like(rates), np.full(rates.shape[1], -1)
+    slack = np.ones_like(rates)
     pressed = held.pressed
     for _ in range(ROUNDS):
         if rubs.engaged:
@@ -95,7 +100,7 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
             friction, jams, _ = Equations(start, changes, strength, rubs.weights).solve(rates)
         else:
             limits = Equations(start, changes, rubs.coefficients, rubs.weights)
-            friction, jams = _resting(limits, signs, mobility, freely)
+            friction, jams, slack = _resting(limits, signs, mobility, freely)
         parts = gains * friction
         values = free + parts.sum(axis=1)
         values = np.where(np.abs(values) <= NOTHING * (np.abs(free) + np.abs(parts).sum(axis=1)), 0.0, values)
@@ -104,7 +109,7 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
             break
     else:
         values = np.full_like(values, np.nan)
-    return Accelerations(values, friction, jams)
+    return Accelerations(values, friction, jams, slack)
 
 
 def solved_each(matrix: Floats, right: Floats) -> Floats:
@@ -123,9 +128,9 @@ def _along(effort: object, accelerations: Floats, friction: Floats, cases: int) 
     return total
 
 
-def _resting(limits: Equations, signs: Floats, mobility: Floats, freely: Floats) -> tuple[Floats, Ints]:
-    """Friction where some contacts rest, nan where none is found, and the contact that takes most of it there."""
-    whole, poses = np.zeros_like(freely), freely.shape[1]
+def _resting(limits: Equations, signs: Floats, mobility: Floats, freely: Floats) -> tuple[Floats, Ints, Floats]:
+    """Friction where some contacts rest, nan where there is none, the contact with most of it there, and slack."""
+    whole, slack, poses = np.zeros_like(freely), np.ones_like(freely), freely.shape[1]
     jams = np.full(poses, -1)
     for pose in range(poses):
         one = limits.take(np.array([pose]))
@@ -142,7 +147,13 @@ def _resting(limits: Equations, signs: Floats, mobility: Floats, freely: Floats)
             jams[pose] = int(np.abs(friction[:, 0]).argmax())
             friction = np.full_like(friction, np.nan)
         whole[:, pose] = friction[:, 0]
-    return whole, jams
+        left, begun = (
+            np.where(size > 0, 1.0 - np.abs(friction / size), 0.0)[:, 0],
+            freely[:, pose] + mobility[..., pose] @ friction[:, 0],
+        )
+        slides = (signs == 0) & (left <= ROUNDING)
+        slack[:, pose] = np.where(slides, -np.abs(begun / freely[:, pose]), np.where(signs == 0, left, 1.0))
+    return whole, jams, slack
 
 
 def _shared(limits: Floats, signs: Floats, mobility: Floats, freely: Floats) -> Floats:

@@ -277,7 +277,8 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
     notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
     courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
-    return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
+    ends = [scope.until for scope in scopes if scope is not None and scope.until]
+    return replace(verdict, note="; ".join([*notes, *dict.fromkeys([*missing, *ends])]))
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:

@@ -26,6 +26,7 @@ from typer.testing import CliRunner
 from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
+from mechdesign.questions.dynamics import motion_in_time
 from mechdesign.questions.optimize import variables
 from mechdesign.study import load, poses, template
 from mechdesign.study.templates import templates
@@ -110,6 +111,7 @@ def moderate(data: object) -> object:
 def moderately(monkeypatch):
     monkeypatch.setattr(poses, "MAX_POSES", MOST_POSES)
     monkeypatch.setattr(variables, "MAX_DESIGNS", MOST_DESIGNS)
+    monkeypatch.setattr(motion_in_time, "MAX_SECONDS", SECONDS / 5)
 
 
 def studies() -> dict[str, dict]:

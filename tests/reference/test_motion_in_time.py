@@ -99,7 +99,7 @@ dynamics: {{gravity: [0, -9.81], forward: {{duration: 5, start: {{theta: pi/2, t
 mechanism:
   links:
     ground: {{O: [0, 0]}}
-    arm: {{from: O, to: P, length: 1, mass: 1, center: [{moment}, 0], inertia: {inertia - moment**2 + 10}}}
+    arm: {{from: O, to: P, length: 1, mass: {moment}, center: [1, 0], inertia: {inertia + 10 - moment}}}
   drives: {{theta: {{angle: arm}}}}
 dynamics:
   gravity: [0, {-9.81 * (inertia + 10) / inertia!r}]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,14 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
-from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, EquationsOfMotion, Integration
+from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
+from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
@@ -27,6 +30,9 @@ from mechdesign.results import Column, Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.checker import ORDERS
+
+# Energies that differ from the work of what acts by more than this part of the largest are wrong.
+ENERGY = 1e-6
 
 
 def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
@@ -43,7 +49,8 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     assert section.forward is not None
     outputs = expand_outputs(study, section.outputs or ())
     equations = EquationsOfMotion(ForceQuestion.of(study, moves=True), section.forward, outputs)
-    course = Integration(equations).run(progress)
+    integration = Integration(equations)
+    course = integration.run(progress)
     motion, shown = _forces(study, course)
     names = [static.name for static in question_of(motion).statics]
     tables = {
@@ -51,21 +58,84 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
         "dynamics": dynamics_table(motion), "joint_forces": joint_table(motion),
         "extremes": extremes_table(motion, None, names),
     }  # fmt: skip
-    scope = Scope(poses_only=True)
-    tables = {name: table if name == "events" else replace(table, scope=scope) for name, table in tables.items()}
-    warnings = []
-    if course.ended:
-        kind, words = ("unconverged", "ended early") if course.failed else ("incomplete", "ended")
-        warnings.append(
-            Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward")
-        )
-    for coupling, where in lift_off.lifted(motion):
-        if where.any():
-            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
-            warnings.append(lift_off.caution(study, motion.question.poses, coupling, mark))
-    warnings += assumed(study)
+    scope, warnings = _scope(study, course), [*_cautions(study, integration, course)]
+    tables = {name: replace(table, scope=replace(scope, poses_only=name != "events")) for name, table in tables.items()}
+    warnings += [*_lift_offs(study, integration, motion), *assumed(study)]
     counts = {"instants": len(course.times), "steps": course.steps}
     return Result("dynamics", tables, warnings, counts), motion, shown
+
+
+def _at(study: Study, time: float) -> str:
+    return f"{time:.6g} {study.units.label('time')}"
+
+
+def _scope(study: Study, course: Course) -> Scope:
+    """What tables say of the motion that was asked: a part of it is missing, or it has its own end before its time."""
+    ending = course.ending
+    if ending is None:
+        return Scope()
+    words, until = ending.words.format(time=_at(study, course.end)), _at(study, course.end)
+    if ending.place:
+        return Scope(until=f"until {ending.place} at {until}")
+    section = DynamicsSection.of(study).forward
+    assert section is not None
+    return Scope(missing=f"no motion from {until} to {_at(study, float(section.duration))}: {words}")
+
+
+def _cautions(study: Study, integration: Integration, course: Course) -> Iterator[Caution]:
+    """Warnings of a motion that ended before its time, jumps, or has energies that are not those of the work done."""
+    if (ending := course.ending) is not None:
+        kind = {"limit": "incomplete", "rest": "incomplete", "jams": "jammed"}.get(ending.kind, "unconverged")
+        ended = "ended" if kind == "incomplete" else "ended early"
+        yield Caution(
+            kind, f"the motion in time {ended}: {ending.words.format(time=_at(study, course.end))}", "forward"
+        )
+    for words in dict.fromkeys(words for words, _ in integration.jumps):
+        times = [time for name, time in integration.jumps if name == words]
+        yield Caution(
+            "singular", f"the law of {words} has a corner, at which velocities jump, {len(times)} times, first at "
+            f"{_at(study, times[0])}: the motion is that of a rounded corner, and forces there have no bound", "forward"
+        )  # fmt: skip
+    rates, (work, *_) = course.rates, course.work
+    gained = rates.kinetic + rates.potential - work
+    off, size = np.abs(gained - gained[0]), max(float(np.ptp(part)) for part in (rates.kinetic, rates.potential, work))
+    wrong = off > ENERGY * max(size, float(rates.kinetic.max()))
+    if wrong.any():
+        row = int(wrong.argmax())
+        message = (
+            f"energies do not change by the work of what acts: from {_at(study, course.times[row])} on they are off, "
+            f"at last by {off[-1] / size:.3g} of the largest change; what acts may be narrower there than the steps"
+        )
+        yield Caution("unconverged", message, "forward", row)
+
+
+def _lift_offs(study: Study, integration: Integration, rows: Motion) -> Iterator[Caution]:
+    """Warnings of followers that lift off their cams, at rows, or only between them."""
+    contacts = lift_off.contacts(integration.equations.question)
+    for coupling, where in lift_off.lifted(rows):
+        if where.any():
+            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
+            yield lift_off.caution(study, rows.question.poses, coupling, mark)
+            del contacts[coupling]
+    if not contacts or not integration.time:
+        return
+    least = lift_off.PRESSED * integration.equations.question.size
+
+    def pressed(times: Floats) -> Floats:
+        order = np.argsort(times)
+        motion, _ = _forces(study, integration.course(times[order]))
+        return np.array([motion.arrays[normal] + least for normal in contacts.values()])[:, np.argsort(order)]
+
+    ends = np.unique([stretch.end for stretch in integration.stretches])
+    changes = Resolved.of(pressed, ends, np.zeros(len(contacts))).changes(np.ones(len(contacts)))
+    for k, coupling in enumerate(contacts):
+        times = [change.place for change in changes if change.function == k and change.sign < 0]
+        if times:
+            message = (
+                f"cam {coupling}: the follower lifts off between the instants, where it would have to be pulled; a "
+                f"spring holds it on the cam; {len(times)} times, first at {_at(study, times[0])}"
+            )
+            yield Caution("cam", message, "joint_forces")
 
 
 def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
@@ -91,7 +161,9 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
     assert isinstance(borne, ForceQuestion)
     if len(course.rates.friction):
         question = replace(question, borne=replace(borne, rubbing=course.rates.friction))
-    motion = Motion(question, reason=np.zeros(count, dtype=np.int8))
+    reason = np.zeros(count, dtype=np.int8)
+    mechanism.forward.judge(replace(course.configuration, reason=reason))
+    motion = Motion(question, reason=reason)
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
     # Efforts are known, also where the drives are singular.

@@ -196,13 +196,14 @@ class Judged(Chosen):
     abs: bool = False
     """Whether the absolute value is judged."""
     unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
-    """What becomes of a motion with poses that cannot be assembled or lie outside the limits. Left out: it is not met,
-    and a design is infeasible, where one pose is not valid or the motion ends between two. Example: allowed
+    """What becomes of a motion with poses that cannot be assembled or lie outside the limits, or of one in time that
+    fails before its end. Left out: it is not met, and a design is infeasible, where one pose is not valid or the motion
+    ends between two. Example: allowed
     """
 
     @model_validator(mode="after")
     def _of_poses(self) -> Self:
-        if self.unassembled and not self.name.startswith(("kinematics.", "reliability.", "stiffness.")):
+        if self.unassembled and not self.name.startswith(("kinematics.", "reliability.", "stiffness.", "dynamics.")):
             raise failure(f"{self.name!r} is of no poses that could be missing: leave out 'unassembled'")
         return self
 

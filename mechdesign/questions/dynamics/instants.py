@@ -1,0 +1,54 @@
+"""A motion in time at some instants, of which no more is computed than is looked at."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.loads import Loading
+from mechdesign.study.poses import Poses
+
+if TYPE_CHECKING:
+    from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion, Rates
+
+
+class Instants:
+    """Times of shape (n,), and positions and velocities there of shape (m, n)."""
+
+    def __init__(self, equations: EquationsOfMotion, times: Floats, x: Floats, velocity: Floats) -> None:
+        self.equations, self.times, self.x, self.velocity = equations, times, x, velocity
+
+    @cached_property
+    def linear(self) -> Linearization:
+        """The poses, ready for derivatives by the chart's coordinates."""
+        return self.equations.branch.chart.solve(self.x, self.equations.branch.last)
+
+    @property
+    def configuration(self) -> Configuration:
+        """The poses."""
+        return self.linear.configuration
+
+    @cached_property
+    def moving(self) -> Moving:
+        """Velocities."""
+        return Moving(self.linear.velocity([*self.velocity[self.equations.branch.chart.rows]]))
+
+    @cached_property
+    def rates(self) -> Rates:
+        """What the equations of motion give."""
+        return self.equations.rates(self.times, self.x, self.velocity)
+
+    @cached_property
+    def forces(self) -> Forces:
+        """No forces yet."""
+        return Forces(self.configuration)
+
+    @cached_property
+    def loading(self) -> Loading:
+        """By which expressions get their values."""
+        poses = Poses((), len(self.times), True, self.times.shape, times=self.times)
+        return Loading(self.equations.study, (), poses, slice(None))
