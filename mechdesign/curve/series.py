@@ -107,11 +107,11 @@ class Series:
             products = np.where(self._poled[:, None, None], values * divisors**orders, values)
         # At a pole a quotient has no value: its numerator is interpolated from the other nodes.
         _fill(products, ~np.isfinite(products) & self._poled[:, None, None])
-        known = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
+        regular = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
         own = np.zeros((len(self.names), len(pieces.line)), dtype=bool)
         if self._poled.any():
             # Positions have lost digits there as well.
-            noise = EXACT / known ** (orders[self._poled] + 1)
+            noise = EXACT / regular ** (orders[self._poled] + 1)
             table = values[self._poled]
             lost = ~np.isfinite(table) | (noise > NOISE)
             _fill(table, lost)
@@ -125,7 +125,7 @@ class Series:
             largest(self._noise, pieces.line, rounding)
             products[self._poled] = np.where(some[..., None], table, products[self._poled])
             divisors[own] = 1.0
-        return products, divisors, EXACT / known.min(axis=1, initial=1.0), own
+        return products, divisors, EXACT / regular.min(axis=1, initial=1.0), own
 
     def _follow(self) -> None:
         """Halve pieces until every series is exact where extremes, means or zeros depend on it."""

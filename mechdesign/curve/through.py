@@ -35,15 +35,15 @@ class Through:
         size = 1.0 if curve.plan.structure.given[0].quantity == "angle" else curve.mechanism.size
         with np.errstate(divide="ignore"):
             step = STEP * size * 2 * apart / np.abs(behind - before)
-        # Where the motion rests at a change point nothing is known beside it.
+        # Where the motion rests at a change point no pose lies beside it.
         some = (step < curve.poses.end) & np.append(True, (np.diff(line) > 0) | (np.diff(place) > apart))[: len(line)]
         line, place, step = line[some], place[some], step[some]
         beside = place[:, None] + step[:, None] * PLACES
         values, conditioning = evaluate(np.repeat(line, len(PLACES)), beside.ravel())
         values = np.moveaxis(values.reshape(len(values), *beside.shape), 0, 1)
-        known = np.isfinite(values).all(axis=(1, 2))
-        self._line, self._place, self._step, self._values = line[known], place[known], step[known], values[known]
-        self._conditioning = conditioning.reshape(beside.shape)[known].min(axis=1, initial=1.0)
+        finite = np.isfinite(values).all(axis=(1, 2))
+        self._line, self._place, self._step, self._values = line[finite], place[finite], step[finite], values[finite]
+        self._conditioning = conditioning.reshape(beside.shape)[finite].min(axis=1, initial=1.0)
 
     def __call__(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         values, conditioning = self._evaluate(line, s)

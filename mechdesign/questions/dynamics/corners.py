@@ -114,7 +114,7 @@ class Corners:
     @cached_property
     def instants(self) -> Floats:
         """Instants of the corners, and of the narrow peaks, that depend on time alone, within the duration."""
-        known = np.linspace(0.0, self.end, PARTS + 1)
+        parts = np.linspace(0.0, self.end, PARTS + 1)
         marks = np.array([0.0, self.end])
         for corner in self._in_time:
             for level in corner.levels or (0.0,):
@@ -122,7 +122,7 @@ class Corners:
                 def look(times: Floats, corner: Corner = corner, level: float = level) -> Floats:
                     return _of_level(self._at(corner.argument, times), corner, level)[None]
 
-                resolved = Resolved.of(look, np.union1d(known, marks), np.zeros(1))
+                resolved = Resolved.of(look, np.union1d(parts, marks), np.zeros(1))
                 places = resolved.touched() if corner.levels else np.empty(0)
                 marks = np.union1d(marks, [*places, *(resolved.turning() if corner.turning else ())])
         return marks[1:-1]

@@ -132,7 +132,7 @@ def _to_common_chart(motion: Integration, sides: Sides) -> None:
     x, branch = motion.parts_of(motion.state)[0][:, None], equations.branch
     some = combinations(range(len(x)), len(branch.chart.rows))
     for rows in [branch.chart.rows, *(np.array(rows, dtype=np.intp) for rows in some)]:
-        charts = [equations.atlas.chart(rows, each) for each in (branch.sides, sides)]
+        charts = [equations.atlas.chart(rows, own) for own in (branch.sides, sides)]
         one, other = charts
         if one is not None and other is not None:
             least = min(float(regularity(chart.solve(x, branch.last))[0]) for chart in (one, other))
