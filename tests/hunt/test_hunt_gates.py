@@ -1,6 +1,7 @@
 """Gates along random motions: none is met by a mechanism that violates it between the poses.
 
-Every motion is scanned at 20,000 poses by circles that are cut in `helpers.linkages`.
+Every motion is scanned at 20,000 poses by circles that are cut in `helpers.linkages`, or, where loads, couplings and
+measures have corners, by the closed forms of `helpers.corner_motions`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from helpers.corner_motions import Case, coupled_by_table, dynamic, kinematic, path
+from helpers.corners import STATISTICS, scanned
 from helpers.linkages import FiveBar, FourBar, Path, cut, swept
 from helpers.studies import study_of
 
@@ -75,6 +78,43 @@ def test_gates_along_sweeps_of_four_bars(seeds: Seeds) -> None:
         sweep = f"{{crank: {{from: {low!r}, to: {high!r}, step: {step!r}}}}}"
         outputs = "[P, gap, F]" if bar.six else "[P, gap]"
         check(rng, f"{bar.text()}kinematics:\n  sweep: {sweep}\n  outputs: {outputs}\n", scan)
+
+
+def parts_of(case: Case, rng: np.random.Generator) -> list[tuple[str, float, float]]:
+    """The whole motion, and a part of one that is swept or over time: a condition of a requirement, and its ends."""
+    found = [("", case.low, case.high)]
+    name = "time" if "motion: {crank" in case.text else "crank" if "sweep:" in case.text else ""
+    if name:
+        low, high = np.sort(rng.uniform(case.low, case.high, 2)).tolist()
+        if high - low > 0.05 * (case.high - case.low):
+            found.append((f", where: {{{name}: {{from: {low!r}, to: {high!r}}}}}", low, high))
+    return found
+
+
+def check_beside(case: Case, rng: np.random.Generator) -> None:
+    """Random statistics of columns, and bounds that these miss or keep by a millionth of the column."""
+    lines, wanted = [], []
+    for where, low, high in parts_of(case, rng):
+        breaks = tuple(place for place in case.breaks if low < place < high)
+        for column, found in scanned(case.course, low, high, 20_001, breaks).items():
+            if column in case.loose or column == "shaking":
+                continue
+            word, upper, met = str(rng.choice([*STATISTICS])), bool(rng.random() < 0.5), bool(rng.random() < 0.5)
+            value = STATISTICS[word](found)
+            bound = value + 2e-6 * max(found.peak, -found.low, 1e-3) * (1 if upper == met else -1)
+            result = f"result: {case.command}.{column}.{word}{where}"
+            lines.append(f"  - {{{result}, {'at_most' if upper else 'at_least'}: {bound!r}}}\n")
+            wanted.append((value, met))
+    study = study_of(case.text + "requirements:\n" + "".join(lines))
+    verdicts = mechdesign.requirements(study, getattr(mechdesign, case.command)(study))
+    for (value, met), verdict in zip(wanted, verdicts, strict=True):
+        assert verdict.met == met, (str(verdict), value, case.text)
+
+
+@pytest.mark.parametrize("make", [kinematic, path, dynamic, coupled_by_table])
+def test_gates_a_millionth_beside_what_motions_with_corners_come_to(make: Callable[[int], Case], seeds: Seeds) -> None:
+    for seed in seeds(30):
+        check_beside(make(10_000 + seed), np.random.default_rng([seed, 3]))
 
 
 @pytest.mark.parametrize("lean", [0.0, 1.0, -1.0])
