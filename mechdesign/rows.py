@@ -120,12 +120,13 @@ class Chosen:
             return RowSpread(values, counts).end(1)
         statistic = STATISTICS[self.statistic].of
         with np.errstate(invalid="ignore", divide="ignore"):
-            rows = statistic(RowSpread(values, counts))
+            spread = RowSpread(values, counts)
+            rows = statistic(spread)
             if not self.courses:
                 return rows
             courses = [*self.courses.values()]
             lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
-            return np.where(lost, rows, statistic(Several(courses)))
+            return np.where(lost, rows, statistic(Several(courses, spread)))
 
     def _several(self, count: int) -> str:
         words = [*STATISTICS]

@@ -110,13 +110,17 @@ class RowSpread:
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Values of several columns, of as many values each, as those of one."""
+    """Values of several columns along motions, of as many values each, as those of one, and of the rows among them."""
 
     parts: Sequence[Spread]
+    rows: RowSpread
 
     def end(self, sign: int) -> Floats:
-        """The largest value of all, or with the sign -1 the smallest."""
-        return np.asarray(sign * np.max([sign * part.end(sign) for part in self.parts], axis=0))
+        """The largest value of all, or with the sign -1 the smallest: that of a row where it is farther out."""
+        between = sign * np.max([sign * part.end(sign) for part in self.parts], axis=0)
+        row = self.rows.end(sign)
+        with np.errstate(invalid="ignore"):
+            return np.where(sign * (row - between) > AT_END * np.abs(between), row, between)
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of all values."""

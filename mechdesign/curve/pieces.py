@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,7 +100,9 @@ class Pieces(Lanes):
         of, low, high = between_marks(owner, marks, np.arange(len(self.line)))
         nowhere = np.zeros(len(of), dtype=bool)
         parts = _parts(self.take(of), low, high, nowhere, nowhere)
-        return parts.take(np.lexsort((parts.begin, parts.line)))
+        parts = parts.take(np.lexsort((parts.begin, parts.line)))
+        # Depth counts halvings.
+        return replace(parts, depth=parts.depth - 1)
 
     @property
     def joined_to_next(self) -> Flags:

@@ -30,7 +30,7 @@ MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
 MOST_LOST = 4
 # Rounding of a quotient at a node, as a part of its value, with which the node says nothing of it.
-NOISE = 1e-9
+NOISE = 2e-8
 
 # Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]

@@ -5,6 +5,8 @@ Near such a place they are the polynomials through poses farther off, on both si
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mechdesign.curve.functions import Functions
@@ -14,7 +16,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 
 # Distance of the poses from the change point and from each other (radians, or sizes of the mechanism). Nearer than the
 # first of them accelerations have lost more digits than the polynomial leaves out.
-STEP = 5e-2
+STEP = 2e-2
 PLACES = np.array([-5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 # Weights of the polynomial through them, by the barycentric formula [Berrut and Trefethen, 2004].
 _WEIGHTS = 1.0 / np.prod(PLACES[:, None] - PLACES + np.eye(len(PLACES)), axis=1)
@@ -23,10 +25,10 @@ ZERO = 1e-8
 
 
 class Through:
-    """What `evaluate` gives, smooth through the zeros of a `determinant` along the motions of a curve."""
+    """What `evaluate` gives, the `smooth` ones so through the zeros of a `determinant` along the motions of a curve."""
 
-    def __init__(self, curve: Curve, evaluate: Evaluate, determinant: Evaluate) -> None:
-        self._evaluate, self._span = evaluate, curve.poses.end + 2.0
+    def __init__(self, curve: Curve, evaluate: Evaluate, determinant: Evaluate, smooth: Sequence[bool]) -> None:
+        self._evaluate, self._span, self._smooth = evaluate, curve.poses.end + 2.0, np.flatnonzero(smooth)
         name, apart = "determinant", ZERO * curve.poses.end
         zeros = Functions(curve, [name], determinant, [1.0], zeros=[name]).zeros([name], ZERO)
         order = np.lexsort((zeros.place, zeros.line))
@@ -40,7 +42,7 @@ class Through:
         line, place, step = line[some], place[some], step[some]
         beside = place[:, None] + step[:, None] * PLACES
         values, conditioning = evaluate(np.repeat(line, len(PLACES)), beside.ravel())
-        values = np.moveaxis(values.reshape(len(values), *beside.shape), 0, 1)
+        values = np.moveaxis(values[self._smooth].reshape(len(self._smooth), *beside.shape), 0, 1)
         finite = np.isfinite(values).all(axis=(1, 2))
         self._line, self._place, self._step, self._values = line[finite], place[finite], step[finite], values[finite]
         self._conditioning = conditioning.reshape(beside.shape)[finite].min(axis=1, initial=1.0)
@@ -54,7 +56,7 @@ class Through:
             near = np.flatnonzero((self._line[k] == line) & (np.abs(s - self._place[k]) < self._step[k]))
             own = k[near]
             parts = _WEIGHTS / ((s[near] - self._place[own]) / self._step[own] - PLACES[:, None]).T
-            smooth = np.einsum("nfp,np->fn", self._values[own], parts) / parts.sum(axis=1)
-            values[:, near] = smooth
+            through = np.einsum("nfp,np->fn", self._values[own], parts) / parts.sum(axis=1)
+            values[np.ix_(self._smooth, near)] = through
             conditioning[near] = self._conditioning[own]
         return values, conditioning

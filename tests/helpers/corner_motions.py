@@ -107,8 +107,8 @@ class Forces:
 
     def __init__(self, pieces: Pieces, point: str, link: str) -> None:
         self.point, self.link = point, link
-        self.fx, self.fy = pieces.expression(50, rough=False), pieces.expression(50, rough=False)
-        self.moment = pieces.expression(2000, rough=False) if link else "0"
+        self.fx, self.fy = pieces.expression(50), pieces.expression(50)
+        self.moment = pieces.expression(2000) if link else "0"
         turn = f", {{link: {link}, moment: '{self.moment}'}}" if link else ""
         self.text = f"  loads: [{{at: {point}, force: ['{self.fx}', '{self.fy}']}}{turn}]\n"
 

@@ -55,22 +55,19 @@ def bounds(result: Any, question: str) -> Iterator[tuple[str, str, float]]:
     units = {name: result.main.column(name).unit for name in result.main.names}
     for name, values in columns.items():
         finite = values[np.isfinite(values)]
-        if name in ("conditioning", "inverse_condition"):
-            # A singular pose that is passed smoothly, or in which all stands still, is judged by what is beside it.
-            finite = finite[finite > 1e-9]
         # What is nowhere more than rounding says nothing.
         if not len(finite) or np.abs(finite).max() <= rounding_of(result, units.get(name, "")):
             continue
         little = LITTLE * max(float(np.abs(finite).max()), 1e-3)
-        told = f"{question}.{name}" if name in result.main.names else f"{question}.extremes.{name}"
+        result_name = f"{question}.{name}" if name in result.main.names else f"{question}.extremes.{name}"
         for word, bound, row in (
             ("at_most", finite.max() - little, finite.max()), ("at_least", finite.min() + little, finite.min())
         ):  # fmt: skip
             end = {"at_most": "max", "at_least": "min"}[word]
-            column = told if name in result.main.names else f"{told}.{end}"
+            column = result_name if name in result.main.names else f"{result_name}.{end}"
             yield f"{{result: {column}, {word}: {float(bound)!r}}}", name, float(row)
             if name in result.main.names:
-                yield f"{{result: {told}.{end}, {word}: {float(bound)!r}}}", name, float(row)
+                yield f"{{result: {result_name}.{end}, {word}: {float(bound)!r}}}", name, float(row)
 
 
 def check(load: Any, question: str) -> None:

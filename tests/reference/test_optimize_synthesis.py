@@ -31,7 +31,7 @@ def structural_error(x1: float, x3: float) -> float:
     k1, k2, k3 = np.linalg.solve(
         np.column_stack([np.cos(follower), -np.cos(crank), np.ones(3)]), np.cos(crank - follower)
     )
-    crank, follower = wanted(1 + np.arange(61) / 60)
+    crank, follower = wanted(np.linspace(1, 2, 60_001))
     # a cos(follower) + b sin(follower) = c
     a, b, c = np.cos(crank) - k1, np.sin(crank), k3 - k2 * np.cos(crank)
     middle, half = np.arctan2(b, a), np.arccos(c / np.hypot(a, b))
@@ -45,16 +45,16 @@ def test_function_generator_with_the_best_three_exact_values() -> None:
     designs, name = tables["designs"], "kinematics.follower.angle_error"
     exact = [structural_error(x1, x3) for x1, x3 in zip(designs["x1"], designs["x3"], strict=True)]
     assert designs["feasible"].all()
-    assert designs[name] == pytest.approx(np.array(exact), abs=1e-9)
+    assert designs[name] == pytest.approx(np.array(exact), abs=1e-7)
     best = int(np.argmin(exact))
     assert (tables["optimum"]["x1"][0], tables["optimum"]["x3"][0]) == (designs["x1"][best], designs["x3"][best])
     spread = np.cos(np.radians(30)) / 2
     assert tables["optimum"][name][0] < structural_error(1.5 - spread, 1.5 + spread)
 
 
-def sine_errors(k1, k2, k3, crank_0, follower_0):
+def sine_errors(k1, k2, k3, crank_0, follower_0, step=1.5):
     """Errors of the follower for y = sin(x), every 1.5 deg of x, in degrees, by Freudenstein's equation."""
-    x = np.radians(np.arange(0, 90.1, 1.5))
+    x = np.radians(np.linspace(0, 90, round(90 / step) + 1))
     crank, follower = np.radians(crank_0) + x * 4 / 3, np.radians(follower_0) + np.radians(60) * np.sin(x)
     a, b, c = np.cos(crank) - k1, np.sin(crank), k3 - k2 * np.cos(crank)
     found = np.arctan2(b, a) - np.arccos(c / np.hypot(a, b))
@@ -82,18 +82,20 @@ def test_sine_generator_against_three_exact_values() -> None:
     (best,) = optimised("sine_generator")["optimum"]
     a, b, c = (best[name] for name in "abc")
     ratios = 1 / a, 1 / c, (a**2 - b**2 + c**2 + 1) / (2 * a * c)
+    between = sine_errors(*ratios, best["crank_0"], best["follower_0"], 0.01)
+    assert best["kinematics.follower.angle_error"] == pytest.approx(np.abs(between).max(), abs=1e-6)
+    # The search descends by the rows.
     errors = sine_errors(*ratios, best["crank_0"], best["follower_0"])
     worst = np.abs(errors).max()
-    assert best["kinematics.follower.angle_error"] == pytest.approx(worst, abs=1e-9)
     assert worst < np.abs(spaced).max() / 20
     signs = np.sign(errors[np.abs(errors) > worst - 1e-6])
     assert len(signs) == 6
     assert abs(signs.sum()) < 6
 
 
-def hoeken(l1, l3):
+def hoeken(l1, l3, step=0.01):
     """Path of P over a half turn of the crank: where two circles meet, and as far beyond."""
-    pin = np.exp(1j * np.radians(np.arange(90, 271, 5)))
+    pin = np.exp(1j * np.radians(np.linspace(90, 270, round(180 / step) + 1)))
     return pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
 
 
@@ -109,7 +111,7 @@ def test_straightest_line_in_the_textbooks_steps() -> None:
     for k in range(0, len(designs), 40):
         path = hoeken(designs["l1"][k], designs["l3"][k])
         height = np.sqrt(4 * designs["l3"][k] ** 2 - (designs["l1"][k] + 1) ** 2)
-        assert designs["kinematics.P.y_error"][k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-12)
+        assert designs["kinematics.P.y_error"][k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-7)
     extremes = result_of("straight_line_synthesis").tables["extremes"]
     assert row(extremes, "P.x")["range"] == pytest.approx(4.181, abs=5e-4)
     assert 100 * row(extremes, "P.y")["range"] / row(extremes, "P.x")["range"] == pytest.approx(0.096, abs=5e-4)
@@ -117,14 +119,16 @@ def test_straightest_line_in_the_textbooks_steps() -> None:
 
 @pytest.mark.nightly
 def test_straightest_line_between_the_textbooks_steps() -> None:
-    """The bottom of the valley, by a search against a simplex of the closed form."""
+    """The bottom of the valley at the rows, by a search against a simplex of the closed form."""
     best = minimize(
-        lambda at: np.abs(hoeken(*at).imag - np.sqrt(4 * at[1] ** 2 - (at[0] + 1) ** 2)).max(),
+        lambda at: np.abs(hoeken(*at, 5).imag - np.sqrt(4 * at[1] ** 2 - (at[0] + 1) ** 2)).max(),
         (2.2, 2.8), method="Nelder-Mead", options={"xatol": 1e-12, "fatol": 1e-14, "maxiter": 2000},
     )  # fmt: skip
     optimum = mechdesign.optimize(study_named("straight_line_synthesis", "optimize.method=search")).main
-    assert optimum["kinematics.P.y_error"][0] <= best.fun + 1e-10
-    assert (optimum["l1"][0], optimum["l3"][0]) == pytest.approx(best.x, abs=1e-5)
+    l1, l3 = optimum["l1"][0], optimum["l3"][0]
+    assert (l1, l3) == pytest.approx(best.x, abs=1e-5)
+    error = np.abs(hoeken(l1, l3).imag - np.sqrt(4 * l3**2 - (l1 + 1) ** 2)).max()
+    assert optimum["kinematics.P.y_error"][0] == pytest.approx(error, abs=1e-8)
 
 
 @pytest.mark.nightly
@@ -175,7 +179,7 @@ def test_straightness_against_uniform_speed() -> None:
         pin = np.exp(1j * crank)
         path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
         height = np.sqrt(4 * l3**2 - (l1 + 1) ** 2)
-        assert up[k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-12)
+        assert up[k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-7)
         assert along[k] == pytest.approx(np.abs(path.real - l1 + speed * (crank - np.pi)).max(), abs=1e-12)
     order = np.argsort(up)
     assert (np.diff(along[order]) < 0).all()

@@ -77,5 +77,5 @@ def test_a_result_is_the_same_in_another_process() -> None:
     result = mechdesign.kinematics(study)
     _, sent = pickle.loads(pickle.dumps((study, result.seen)))
     assert sent.main["rocker.angle"].tolist() == result.main["rocker.angle"].tolist()
-    largest = [each.main.scope.course(Request("rocker.angle")).worst(1)[0] for each in (result, sent)]
+    largest = [part.main.scope.follow([Request("rocker.angle")])[0].worst(1)[0] for part in (result, sent)]
     assert largest[0] == largest[1]

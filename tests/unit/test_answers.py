@@ -176,8 +176,8 @@ def test_the_worst_value_between_the_poses_is_that_of_the_design() -> None:
 def worst(result: Result, name: str, sign: int, absolute: bool) -> tuple[float, str]:
     scope = result.tables["motion"].scope
     assert scope is not None
-    assert scope.course is not None
-    course = scope.course(Request(name))
+    assert scope.follow is not None
+    (course,) = scope.follow([Request(name)])
     assert course is not None
     (value,), (place,) = course.worst(sign, absolute=absolute)
     return float(value), course.shown(float(place))

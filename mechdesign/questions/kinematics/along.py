@@ -38,6 +38,8 @@ from mechdesign.study.poses import Poses
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
 FORWARD, INVERSE, _PACE = "forward singularity", "inverse singularity", "pace"
+# Columns that have a corner where the mechanism is singular.
+_CONDITIONS = ("conditioning", "inverse_condition")
 # Prefix of the quotient of a function with poles, from which its mean is taken.
 _MEAN_OF = "mean of "
 # A place within this many rows of a pose is that pose.
@@ -108,7 +110,7 @@ class Along:
         self._lean = question.lean(needed)
         self.curve = curve = corners.divided(self._lean, curve, errors=self._errors)
         angles = {angle.name for angle in curve.angles}
-        self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
+        self._turning = not angles.isdisjoint(angles_of(corners.evaluated(self._lean)))
         below = {name for name, _ in divisors.values()}
         integrals = {request.column for request in whole if request.integral}
         functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
@@ -124,13 +126,15 @@ class Along:
         functions |= {f"{_MEAN_OF}{name}": columns[name] for name in self._means if name in divisors}
         means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
         self._names = list(functions)
+        magnitudes = [static.name for static in question.statics if static.magnitude]
         self._evaluate: Evaluate = self._evaluated
         if curve.plan.change_points is not None:
-            self._evaluate = Through(curve, self._evaluated, corners.determinant(question.study, curve))
+            smooth = [name not in _CONDITIONS for name in self._names]
+            self._evaluate = Through(curve, self._evaluated, corners.determinant(question.study, curve), smooth)
         self._follow = partial(
             Functions, curve, self._names, self._evaluate, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
-            magnitudes=[s.name for s in question.statics if s.magnitude and s.name in columns],
+            magnitudes=[name for name in (*magnitudes, *_CONDITIONS) if name in columns],
             ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
         )  # fmt: skip
 

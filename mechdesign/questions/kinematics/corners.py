@@ -30,10 +30,7 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     """The curve of a question with pieces on which its measures, its loads and, for errors, its targets are smooth."""
     study, loads = question.study, question.loads
     targets = study.targets.values() if errors else ()
-    named = [*question.watched, *coordinates_in(study, loads), *(question.listed if question.square else ())]
-    named += question.rated.values() if question.section.rated else ()
-    named += [study.mechanism.coordinate(name) for name in question.section.mechanical_advantage]
-    expressions = expressions_of(named)
+    expressions = expressions_of(evaluated(question))
     corners = corners_of(expressions.values())
     written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
     written += [target.expression for target in targets if target.expression is not None]
@@ -45,6 +42,14 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
         if targeted.path(target, question.poses):
             divided = switched(divided, partial(_side, question, curve, target))
     return switched(divided, partial(_sign, study, curve)) if passes_singularities(question) else divided
+
+
+def evaluated(question: MotionQuestion) -> list[Coordinate]:
+    """Coordinates that a question evaluates, or takes rates of: its own, those of its loads, of its Jacobian."""
+    coordinates = [*question.watched, *coordinates_in(question.study, question.loads)]
+    coordinates += question.listed if question.square else ()
+    coordinates += question.rated.values() if question.section.rated else ()
+    return coordinates + [question.study.mechanism.coordinate(name) for name in question.section.mechanical_advantage]
 
 
 def variables_of(
