@@ -84,13 +84,13 @@ def test_sine_generator_against_three_exact_values() -> None:
     ratios = 1 / a, 1 / c, (a**2 - b**2 + c**2 + 1) / (2 * a * c)
     between = sine_errors(*ratios, best["crank_0"], best["follower_0"], 0.01)
     assert best["kinematics.follower.angle_error"] == pytest.approx(np.abs(between).max(), abs=1e-6)
-    # The search descends by the rows.
-    errors = sine_errors(*ratios, best["crank_0"], best["follower_0"])
-    worst = np.abs(errors).max()
+    worst = np.abs(between).max()
     assert worst < np.abs(spaced).max() / 20
-    signs = np.sign(errors[np.abs(errors) > worst - 1e-6])
-    assert len(signs) == 6
-    assert abs(signs.sum()) < 6
+    # The search descends by the rows and chooses by what is between them: six errors are nearly equal.
+    errors = sine_errors(*ratios, best["crank_0"], best["follower_0"])
+    signs = np.sign(errors[np.abs(errors) > 0.98 * worst])
+    assert len(signs) >= 6
+    assert abs(signs.sum()) < len(signs)
 
 
 def hoeken(l1, l3, step=0.01):
@@ -119,16 +119,19 @@ def test_straightest_line_in_the_textbooks_steps() -> None:
 
 @pytest.mark.nightly
 def test_straightest_line_between_the_textbooks_steps() -> None:
-    """The bottom of the valley at the rows, by a search against a simplex of the closed form."""
-    best = minimize(
-        lambda at: np.abs(hoeken(*at, 5).imag - np.sqrt(4 * at[1] ** 2 - (at[0] + 1) ** 2)).max(),
-        (2.2, 2.8), method="Nelder-Mead", options={"xatol": 1e-12, "fatol": 1e-14, "maxiter": 2000},
-    )  # fmt: skip
+    """The bottom of the valley, by a search against a simplex of the closed form.
+
+    The search descends by the rows, of which the peaks between them differ by 2 %, and chooses by the peaks.
+    """
+
+    def error(at):
+        return np.abs(hoeken(*at).imag - np.sqrt(4 * at[1] ** 2 - (at[0] + 1) ** 2)).max()
+
+    best = minimize(error, (2.2, 2.8), method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12, "maxiter": 2000})
     optimum = mechdesign.optimize(study_named("straight_line_synthesis", "optimize.method=search")).main
-    l1, l3 = optimum["l1"][0], optimum["l3"][0]
-    assert (l1, l3) == pytest.approx(best.x, abs=1e-5)
-    error = np.abs(hoeken(l1, l3).imag - np.sqrt(4 * l3**2 - (l1 + 1) ** 2)).max()
-    assert optimum["kinematics.P.y_error"][0] == pytest.approx(error, abs=1e-8)
+    (value,) = optimum["kinematics.P.y_error"]
+    assert value == pytest.approx(error((optimum["l1"][0], optimum["l3"][0])), abs=1e-8)
+    assert best.fun - 1e-8 <= value < 1.015 * best.fun
 
 
 @pytest.mark.nightly
@@ -173,14 +176,14 @@ def test_path_through_five_points_of_a_line() -> None:
 def test_straightness_against_uniform_speed() -> None:
     """Every design of the front by the closed form; none is better than another in both errors."""
     front = optimised("straight_line_front")["pareto"]
-    crank = np.radians(np.arange(120, 241, 5))
+    crank = np.radians(np.linspace(120, 240, 12_001))
     up, along = front["kinematics.P.y_error"], front["kinematics.P.x_error"]
     for k, (l1, l3, speed) in enumerate(zip(front["l1"], front["l3"], front["speed"], strict=True)):
         pin = np.exp(1j * crank)
         path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
         height = np.sqrt(4 * l3**2 - (l1 + 1) ** 2)
         assert up[k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-7)
-        assert along[k] == pytest.approx(np.abs(path.real - l1 + speed * (crank - np.pi)).max(), abs=1e-12)
+        assert along[k] == pytest.approx(np.abs(path.real - l1 + speed * (crank - np.pi)).max(), abs=1e-7)
     order = np.argsort(up)
     assert (np.diff(along[order]) < 0).all()
     assert front["knee"].sum() == 1
@@ -193,5 +196,6 @@ def test_straightness_against_uniform_speed() -> None:
         return float(np.abs(x - l1 + speed * (crank - np.pi)).max())
 
     best = minimize_scalar(unevenness, bounds=(1.35, 1.6), method="bounded", options={"xatol": 1e-12}).fun
-    assert along.max() == pytest.approx(best, rel=1e-5)
+    # The search descends by the rows, of which the peaks between them differ a little.
+    assert best - 1e-9 <= along.max() < 1.002 * best
     assert along.max() > 4 * along.min()
