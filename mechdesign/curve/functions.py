@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.curve.integrals import Integrals, rises
+from mechdesign.curve.means import Means, rises
 from mechdesign.curve.motion import INSET
 from mechdesign.curve.pieces import MOST_HALVINGS, largest
 from mechdesign.curve.series import EXACT
@@ -61,7 +61,7 @@ class Zeros(Lanes):
     place: Floats
 
 
-class Functions(Integrals):
+class Functions(Means):
     """Functions along the motions of a curve; see `Series` for the parameters."""
 
     def at_ends(self, names: Sequence[str], line: Ints, place: Floats, x: Ints) -> Floats:

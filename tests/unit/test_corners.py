@@ -53,6 +53,7 @@ def verdicts(text):
     return [(verdict.met, verdict.worst) for verdict in answer.verdicts]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [4, 0.4, 0.02])
 def test_a_load_that_acts_between_two_rows_is_seen(width):
     """The arm's effort is the load times its lever, however narrow the pulse and coarse the rows."""
@@ -143,6 +144,7 @@ requirements: [{result: kinematics.F.y, at_most: 40.5}]
     assert limits["w"] == pytest.approx([46.75, 47.25], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pulse_in_time_between_two_instants_is_seen():
     """A force of 8 ms on a motion of 1 s, of which the rows hold 1.2 %."""
     text = (
@@ -213,6 +215,7 @@ kinematics:
     assert max(abs(low), abs(high)) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_crossed_parallelogram_goes_smoothly_through_its_change_points():
     """With a = A and d = D, B - A is (d - a)^2 |d| / |d - a|^2, for d - a is the axis of the kite that mirrors it."""
     answer = mechdesign.kinematics(
@@ -368,6 +371,7 @@ kinematics:
     assert (limits["C.x"][0], limits["C.y"][0]) == pytest.approx((part, 170 - 130 * part), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_size_of_a_force_that_changes_its_sign_is_zero_there():
     """The rod of a crank that a load at B alone pushes bears F/cos: it is zero with the load, and never negative."""
     answer = mechdesign.dynamics(

@@ -32,7 +32,7 @@ POLE, NEAR_POLE = 1.7, 1e-12
 GROWTH = 1e-6
 
 
-class Acting(NamedTuple):
+class ActingExpression(NamedTuple):
     """An expression that acts on the motion, in words; of a coordinate where it is a measure's or a `coupling`'s."""
 
     words: str
@@ -51,10 +51,10 @@ class Acting(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Bend:
+class Threshold:
     """A corner that depends on the motion: where its argument passes a level, or one of levels with a period."""
 
-    acting: Acting
+    acting: ActingExpression
     corner: Corner
     level: float
 
@@ -80,13 +80,13 @@ class Corners:
     def __init__(self, study: Study, loads: Iterable[Load], section: ForwardSection) -> None:
         self.study, self.end = study, float(section.duration)
         self.acting = [*_acting(study, loads, section)]
-        self._bends: dict[tuple[tuple[Step, ...], float], Bend] = {}
+        self._thresholds: dict[tuple[tuple[Step, ...], float], Threshold] = {}
         #: What is not linear between its corners, and so may be narrow there.
         self.curved = [acting for acting in self.acting if not _straight(acting.expression)]
         #: Of each, corners where it may have peaks.
         self.peaks = [[c for c in acting.expression.corners() if c.turning] for acting in self.curved]
         #: Couplings with a table, each with its rows and their period.
-        self.tables: list[tuple[Acting, Corner]] = []
+        self.tables: list[tuple[ActingExpression, Corner]] = []
         self._in_time: list[Corner] = []
         for acting in self.acting:
             for corner in _corners_of(acting):
@@ -96,20 +96,20 @@ class Corners:
                 elif names:
                     self._add(acting, corner)
 
-    def _add(self, acting: Acting, corner: Corner) -> None:
+    def _add(self, acting: ActingExpression, corner: Corner) -> None:
         """Of a table the ends are corners, and not the rows, at which it is smooth enough."""
         levels = corner.levels
         if len(levels) > 2:
             self.tables.append((acting, corner))
             levels = () if corner.period else (levels[0], levels[-1])
         for level in levels:
-            bend = Bend(acting, corner, level)
-            self._bends.setdefault(bend.key, bend)
+            threshold = Threshold(acting, corner, level)
+            self._thresholds.setdefault(threshold.key, threshold)
 
     @property
-    def bends(self) -> Collection[Bend]:
+    def thresholds(self) -> Collection[Threshold]:
         """Corners that depend on the motion."""
-        return self._bends.values()
+        return self._thresholds.values()
 
     @cached_property
     def instants(self) -> Floats:
@@ -146,7 +146,7 @@ class Corners:
         return np.broadcast_to(np.asarray(value, dtype=float), times.shape)
 
 
-def _acting(study: Study, loads: Iterable[Load], section: ForwardSection) -> Iterator[Acting]:
+def _acting(study: Study, loads: Iterable[Load], section: ForwardSection) -> Iterator[ActingExpression]:
     """Everything that acts: efforts, loads, measures in their expressions, couplings."""
     quantities: list[tuple[str, Quantity]] = [(f"the effort of {name}", part) for name, part in section.efforts.items()]
     for load in loads:
@@ -157,7 +157,7 @@ def _acting(study: Study, loads: Iterable[Load], section: ForwardSection) -> Ite
             quantities.append((where.replace("at between", "between"), quantity))
     for words, quantity in quantities:
         if isinstance(quantity, Expression):
-            yield Acting(words, quantity)
+            yield ActingExpression(words, quantity)
     used = {name.removesuffix(VELOCITY) for _, quantity in quantities if isinstance(quantity, Expression)
             for name in quantity.names - study.parameters.nominal.keys() - {TIME}}  # fmt: skip
     for name in sorted(used):
@@ -173,15 +173,15 @@ def _straight(expression: Expression) -> bool:
     return replace(expression, program=program).is_linear()
 
 
-def _expressions(words: str, coordinate: Coordinate, *, coupling: bool = False) -> Iterator[Acting]:
+def _expressions(words: str, coordinate: Coordinate, *, coupling: bool = False) -> Iterator[ActingExpression]:
     """A coordinate's expression, after those of its parts."""
     for part in coordinate.parts:
         yield from _expressions(words, part, coupling=coupling)
     if coordinate.expression is not None:
-        yield Acting(words, coordinate.expression, coordinate, coupling)
+        yield ActingExpression(words, coordinate.expression, coordinate, coupling)
 
 
-def _corners_of(acting: Acting) -> list[Corner]:
+def _corners_of(acting: ActingExpression) -> list[Corner]:
     corners = acting.expression.corners()
     # An arctangent that is followed through all turns does not jump.
     turned = acting.coordinate is not None and acting.coordinate.turn and acting.expression.program[-1][1] == "atan2"

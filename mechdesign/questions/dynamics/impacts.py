@@ -12,9 +12,9 @@ import numpy as np
 from mechdesign.mechanism.charts import Chart, Sides, regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.dynamics.corners import Bend
+from mechdesign.questions.dynamics.corners import Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING
-from mechdesign.questions.dynamics.reasons import Ending
+from mechdesign.questions.dynamics.reasons import EndOfRun
 
 if TYPE_CHECKING:
     from mechdesign.questions.dynamics.motion_in_time import Integration
@@ -36,7 +36,7 @@ def bounced(motion: Integration, stop: Watch) -> Floats:
     assert coordinate is not None
     if restitution is None:
         words = f"limit {stop.name} is reached at {{time}}"
-        motion.ending = Ending("limit", words, f"the limit of {coordinate.name}")
+        motion.ending = EndOfRun("limit", words, f"the limit of {coordinate.name}")
         return motion.state
     x, velocity, works = motion.parts_of(motion.state)
     matrix, linear = equations.matrix(motion.time, x)
@@ -46,7 +46,7 @@ def bounced(motion: Integration, stop: Watch) -> Floats:
     scale = positions.size if coordinate.quantity == "length" else 1.0
     if not restitution * abs(speed) > REST * motion.pace * scale:
         words = f"the mechanism rests at limit {stop.name} from {{time}} on"
-        motion.ending = Ending("rest", words, f"its rest at the limit of {coordinate.name}")
+        motion.ending = EndOfRun("rest", words, f"its rest at the limit of {coordinate.name}")
         return motion.state
     impulse = np.linalg.solve(matrix, along)
     after = velocity - (1 + restitution) * impulse * speed / (along @ impulse)
@@ -82,7 +82,7 @@ def rested(motion: Integration, contact: int) -> Floats:
     return np.concatenate([exact, velocity, works])
 
 
-def turned(motion: Integration, sides: Sides, turning: Sequence[Bend]) -> Floats:
+def turned(motion: Integration, sides: Sides, turning: Sequence[Threshold]) -> Floats:
     """The state behind corners of what acts, from which on it is on other sides.
 
     Where the law of a coupling has a corner, the mass matrix M of the independent velocities v jumps, and they with it.
@@ -90,17 +90,17 @@ def turned(motion: Integration, sides: Sides, turning: Sequence[Bend]) -> Floats
     gradient of the corner's argument M2 v2 = M1 v1 + a n, where v2 goes through the corner as v1 did.
     """
     equations = motion.equations
-    bend = next((bend for bend in turning if bend.acting.coupling), None)
-    if bend is None:
+    threshold = next((threshold for threshold in turning if threshold.acting.coupling), None)
+    if threshold is None:
         equations.branch = equations.branch._replace(sides=sides, chart=_chart(motion, sides))
         return motion.state
     x, velocity, works = motion.parts_of(motion.state)
     _to_common_chart(motion, sides)
     before, linear = equations.matrix(motion.time, x)
     velocity, kept = velocity[equations.branch.chart.rows], dict(equations.branch.sides)
-    coordinate = bend.acting.coordinate
+    coordinate = threshold.acting.coordinate
     assert coordinate is not None
-    argument = replace(coordinate, expression=bend.corner.argument.held(kept))
+    argument = replace(coordinate, expression=threshold.corner.argument.held(kept))
     normal = np.array([np.ravel(first(linear.configuration, argument, part))[0] for part in linear.by_drives])
     equations.branch = equations.branch._replace(sides=sides, chart=_chart(motion, sides))
     after, linear = equations.matrix(motion.time, x)
@@ -110,7 +110,7 @@ def turned(motion: Integration, sides: Sides, turning: Sequence[Bend]) -> Floats
         excess = momentum @ mobility @ momentum - velocity @ momentum
         speed = np.sqrt(max(along**2 - through * excess, 0.0)) * np.sign(normal @ velocity)
         velocity = mobility @ (momentum + (speed - along) / through * normal)
-        motion.jumps.append((bend.acting.words, motion.time))
+        motion.jumps.append((threshold.acting.words, motion.time))
     exact = motion.positions.of(linear.configuration)[:, 0]
     whole = equations.slopes(linear) @ velocity
     equations.branch = equations.branch._replace(last=linear.configuration.take(0))
@@ -121,7 +121,7 @@ def _chart(motion: Integration, sides: Sides) -> Chart:
     """The chart of the same positions on other sides of corners."""
     chart = motion.equations.atlas.chart(motion.equations.branch.chart.rows, sides)
     if chart is None:
-        motion.ending = Ending("no value", "nothing determines the mechanism on both sides of a corner at {time}")
+        motion.ending = EndOfRun("no value", "nothing determines the mechanism on both sides of a corner at {time}")
         return motion.equations.branch.chart
     return chart
 

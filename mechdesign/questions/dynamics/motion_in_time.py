@@ -27,11 +27,11 @@ from mechdesign.mechanism.configuration import joined
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import NULL, Progress
-from mechdesign.questions.dynamics.corners import Bend, Corners
+from mechdesign.questions.dynamics.corners import Corners, Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING, Branch, EquationsOfMotion, Rates
 from mechdesign.questions.dynamics.impacts import bounced, rested, turned
 from mechdesign.questions.dynamics.instants import Instants
-from mechdesign.questions.dynamics.reasons import Ending, cannot_go_on
+from mechdesign.questions.dynamics.reasons import EndOfRun, cannot_go_on
 from mechdesign.questions.dynamics.watches import Watch, Watches
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
@@ -87,7 +87,7 @@ class Course:
         All positions, as `positions` has them.
     work : Floats, shape (1 or 2, instants)
         Work of efforts and loads since the start, less what dampers, stops and friction have taken; that of friction.
-    ending : Ending, optional
+    ending : EndOfRun, optional
         Why the motion ended before its time.
     end : float
         When it ended, or would have come to what is not finite.
@@ -100,7 +100,7 @@ class Course:
     work: Floats
     configuration: Configuration
     events: list[Event] = field(default_factory=list)
-    ending: Ending | None = None
+    ending: EndOfRun | None = None
     end: float = 0.0
     steps: int = 0
 
@@ -128,10 +128,10 @@ class Integration:
         self.events: list[Event] = []
         begin = self.state
         self.stretches = [self._stretch(lambda times: np.repeat(begin[:, None], len(times), axis=1), 0.0)]
-        self.ending: Ending | None = None
+        self.ending: EndOfRun | None = None
         #: Laws of couplings with a corner at which velocities jumped, in words, and when.
         self.jumps: list[tuple[str, float]] = []
-        self._turning: list[Bend] = []
+        self._turning: list[Threshold] = []
         self._turned, self._pole = "", 0.0
         self.steps, self._bounces, self._stuck = 0, 0, 0
         self._deadlines = np.inf, np.inf
@@ -145,8 +145,8 @@ class Integration:
     def _begin_corners(self) -> None:
         """Efforts, loads and couplings on the sides of their corners on which the motion starts."""
         start = self.instants(np.zeros(1), self.state[:, None])
-        for bend in self.corners.bends:
-            self._sides["corner", bend.key] = float(np.sign(np.nan_to_num(bend.value(start, {})[0]))) or 1.0
+        for threshold in self.corners.thresholds:
+            self._sides["corner", threshold.key] = float(np.sign(np.nan_to_num(threshold.value(start, {})[0]))) or 1.0
         branch, sides = self.equations.branch, self._kept()
         chart = self.equations.atlas.chart(branch.chart.rows, sides)
         assert chart is not None
@@ -205,7 +205,7 @@ class Integration:
                         break
             except SpentError:
                 words = f"{seconds:g} s of the processor are not enough, the motion got to {{time}}"
-                self.ending = Ending("spent", words)
+                self.ending = EndOfRun("spent", words)
             count = self.section.rows
             return self.course(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
 
@@ -221,7 +221,7 @@ class Integration:
             solver.max_step = self._longest
             begun, self.steps = self.time, self.steps + 1
             if self.steps > MAX_STEPS:
-                self.ending = Ending("spent", f"{MAX_STEPS} steps are not enough, the motion got to {{time}}")
+                self.ending = EndOfRun("spent", f"{MAX_STEPS} steps are not enough, the motion got to {{time}}")
                 return
             if not np.isfinite(solver.f).all() or solver.step() is not None:
                 self.ending = cannot_go_on(self)
@@ -234,7 +234,7 @@ class Integration:
             if self._stuck > STUCK:
                 words = "turns the motion back on both sides of a corner, as friction does, which 'friction' gives"
                 why = f"{self._turned} {words}," if self._turned else "the motion cannot go on"
-                self.ending = Ending("no value", f"{why} from {{time}} on")
+                self.ending = EndOfRun("no value", f"{why} from {{time}} on")
             if self.time == solver.t and stop is None:
                 self.state = solver.y
                 self._release()
@@ -244,7 +244,7 @@ class Integration:
                 if stop is not None:
                     self._stopped(stop)
         if pole and self.time >= until:
-            self.ending, self._pole = Ending("no value", f"{pole} is not finite at {{time}}"), end
+            self.ending, self._pole = EndOfRun("no value", f"{pole} is not finite at {{time}}"), end
 
     def _solver(self, end: float) -> DOP853:
         tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
@@ -305,7 +305,7 @@ class Integration:
                     self.events.append(Event(str(name[1]), change.place, change.sign > 0))
                 self._sides[name] = change.sign
         if stop is not None:
-            self._turning = [bend for bend in self.corners.bends if ("corner", bend.key) in turning]
+            self._turning = [threshold for threshold in self.corners.thresholds if ("corner", threshold.key) in turning]
         return stop, until
 
     def _stopped(self, stop: Watch) -> None:
@@ -329,7 +329,7 @@ class Integration:
             self._bounces += 1
             self.state = bounced(self, stop)
             if self._bounces > MAX_BOUNCES and self.ending is None:
-                self.ending = Ending("spent", f"{MAX_BOUNCES} bounces are not enough, the motion got to {{time}}")
+                self.ending = EndOfRun("spent", f"{MAX_BOUNCES} bounces are not enough, the motion got to {{time}}")
 
     def stands_still(self) -> None:
         """Note that friction holds the whole mechanism from now on."""
@@ -337,8 +337,8 @@ class Integration:
 
     def _kept(self) -> Sides:
         """Sides on which efforts, loads and couplings are, by the programs of the corners' arguments."""
-        return tuple((bend.corner.argument.program, self._sides["corner", bend.key])
-                     for bend in self.corners.bends if not bend.level)  # fmt: skip
+        return tuple((threshold.corner.argument.program, self._sides["corner", threshold.key])
+                     for threshold in self.corners.thresholds if not threshold.level)  # fmt: skip
 
     def _release(self) -> None:
         """Let contacts that were at rest slide, once they move."""

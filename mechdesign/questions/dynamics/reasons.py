@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 BEYOND = 1e-6
 
 
-class Ending(NamedTuple):
+class EndOfRun(NamedTuple):
     """Why a motion ends before its time.
 
     A ``limit`` of the study, and a ``rest`` at it, belong to the motion, and so does friction that ``jams`` it: it is
@@ -35,7 +35,7 @@ class Ending(NamedTuple):
     place: str = ""
 
 
-def cannot_go_on(motion: Integration) -> Ending:
+def cannot_go_on(motion: Integration) -> EndOfRun:
     """Why the equations give no motion at the last instant of a motion, or just beyond."""
     equations = motion.equations
     x, velocity, _ = motion.parts_of(motion.state[:, None])
@@ -43,7 +43,7 @@ def cannot_go_on(motion: Integration) -> Ending:
     rates, step = equations.rates(at, x, velocity), BEYOND * motion.end
     if equations.jams:
         words = f"friction in {equations.jams} jams the mechanism, no acceleration agrees with it, at {{time}}"
-        return Ending("jams", words, f"friction in {equations.jams} jams it")
+        return EndOfRun("jams", words, f"friction in {equations.jams} jams it")
     accelerations = np.nan_to_num(rates.acceleration)
     here = Instants(equations, at, x, velocity)
     beyond = Instants(equations, at + step, x + step * velocity, velocity + step * accelerations)
@@ -57,12 +57,12 @@ def cannot_go_on(motion: Integration) -> Ending:
             unit = function.expression.angle_unit if part.quantity == "angle" else 1.0
             ahead[part.name] = ahead[part.name] + step / unit * first(configuration, part, moves)
         if not np.isfinite(function.expression.evaluate(ahead)).all():
-            return Ending("no value", f"coupling {coupling.name} has no value from {{time}} on")
+            return EndOfRun("no value", f"coupling {coupling.name} has no value from {{time}} on")
     for acting in motion.corners.acting:
         if acting.coordinate is None:
             now, later = (bool(np.isfinite(acting.value(acting.expression, part)).all()) for part in (here, beyond))
             if not later:
-                return Ending("no value", f"{acting.words} has no value from {{time}} on")
+                return EndOfRun("no value", f"{acting.words} has no value from {{time}} on")
             if not now:
-                return Ending("no value", f"{acting.words} is not finite at {{time}}")
-    return Ending("no value", "the motion cannot go on at {time}")
+                return EndOfRun("no value", f"{acting.words} is not finite at {{time}}")
+    return EndOfRun("no value", "the motion cannot go on at {time}")

@@ -52,8 +52,8 @@ class Watches:
         branch = self.equations.branch
         yield from self._lasting
         sides = dict(branch.sides)
-        for bend in self.corners.bends:
-            yield Watch("corner", bend.key, partial(bend.value, sides=sides))
+        for threshold in self.corners.thresholds:
+            yield Watch("corner", threshold.key, partial(threshold.value, sides=sides))
         for k, sign in enumerate(branch.signs.tolist()):
             if sign:
                 yield Watch("contact", k, partial(self._ahead, k, sign))

@@ -205,7 +205,7 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
 
 def _error_title(curve: Reached) -> str:
     """An output and its largest error."""
-    words = f"{curve.output}: reached less wanted, at most {curve.worst:.3g} {curve.unit}".rstrip()
+    words = f"{curve.output}: reached less wanted, in the poses at most {curve.worst:.3g} {curve.unit}".rstrip()
     return style.folded(words, 9.5, style.width() - LEFT)
 
 

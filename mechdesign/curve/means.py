@@ -18,7 +18,7 @@ ENDLESS_POWER = 0.9
 UNRESOLVED = 1e-3
 
 
-class Integrals(Series):
+class Means(Series):
     """Integrals of functions along the motions of a curve; see `Series` for the parameters."""
 
     def means(
