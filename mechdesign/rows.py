@@ -324,8 +324,10 @@ def _place(result: Result, path: str) -> tuple[Table, str, Flags] | None:
     strand, _, rest_of_strand = path.removeprefix(f"{name}." if named is not None else "").partition(".")
     for table in result.tables.values() if named is None else [named]:
         names, own, main = table.strands or Strands((), (), "")
-        if strand in names and (column := rest_of_strand or main) in own:
-            return table, column, np.arange(len(table)) % len(names) == names.index(strand)
+        # A joint of several links bears a force on each.
+        numbers = [k for k, own_name in enumerate(names) if own_name == strand or own_name.startswith(f"{strand}_on_")]
+        if numbers and (column := rest_of_strand or main) in own:
+            return table, column, np.isin(np.arange(len(table)) % len(names), numbers)
     if named is not None:
         for column in named.names:
             word = rest.removesuffix(f".{column}")

@@ -101,6 +101,16 @@ def test_gate_statistic_extremes_and_sweep_of_a_joint_force_agree():
     assert swept["dynamics.B_force"][0] == pytest.approx(told["max"], rel=1e-9)
 
 
+def test_a_joint_at_which_a_load_acts_is_judged_on_all_its_links():
+    text = FOUR_BAR + FORCES.replace("STEP", "15") + "  loads: [{at: B, force: [0, 900*abs(sin(2*theta))]}]\n"
+    gates = "{result: dynamics.B_force, at_most: 1}", "{result: dynamics.B_force.peak, at_most: 1}"
+    whole = "{result: dynamics.magnitude, where: {joint: B}, at_most: 1}"
+    rows, peak, table = (verdict.worst for verdict in verdicts(text + asked(*gates, whole), "dynamics"))
+    result = mechdesign.dynamics(mechdesign.load(text=text))
+    largest = max(extremes(result, f"B_force_on_{link}")["max"] for link in ("coupler", "rocker"))
+    assert (rows, peak, table) == pytest.approx((largest,) * 3, rel=1e-9)
+
+
 def test_goals_and_conditions_on_a_joint_force_are_those_of_extremes():
     optimize = """
 optimize:
