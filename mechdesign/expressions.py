@@ -159,11 +159,32 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
             return NotImplemented
         values = [argument.value if isinstance(argument, Dual) else argument for argument in arguments]
         slopes = [
-            partial * argument.slope
+            _chained(partial, argument.slope)
             for partial, argument in zip(_PARTIALS[function](*values), arguments, strict=True)
             if isinstance(argument, Dual)
         ]
         return Dual(function(*values), sum(slopes[1:], start=slopes[0]))
+
+
+def _chained(partial: Any, slope: Any) -> Any:
+    """A partial derivative times the slope of its argument: 0 where that rests, though the partial is infinite."""
+    product = partial * slope
+    return product if _finite(product) else _where(_rests(slope), product)
+
+
+def _finite(number: Any) -> bool:
+    return all(_finite(part) for part in Dual.parts(number)) if isinstance(number, Dual) else np.isfinite(number).all()
+
+
+def _rests(slope: Any) -> Any:
+    return _rests(slope.value) & _rests(slope.slope) if isinstance(slope, Dual) else np.equal(slope, 0.0)
+
+
+def _where(zero: Any, number: Any) -> Any:
+    """A number or dual that is 0 at some places."""
+    if isinstance(number, Dual):
+        return Dual(_where(zero, number.value), _where(zero, number.slope))
+    return np.where(zero, 0.0, number)
 
 
 @dataclass(frozen=True)
@@ -466,7 +487,7 @@ class Expression:
         total: dict[str, Any] = {}
         for (_, seeds), partial in zip(arguments, function.partials(*values), strict=True):
             for variable, seed in seeds.items():
-                total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
+                total[variable] = total.get(variable, 0.0) + _chained(partial, seed) * inner * outer
         return function.value(*values) * outer, total
 
     def _angle_factors(self, function: _Function | Tabulated | Repeated) -> tuple[float, float]:

@@ -25,6 +25,8 @@ ROUNDING = 1e-11
 DEEP, ROUNDING_DEEP = 20, 1e-3
 # A magnitude below this part of its size is nearly zero. Pieces are divided at such places so many times at the most.
 NEARLY_ZERO, MOST_PARTED = 3e-2, 8
+# Rounding of a value that has all its digits is below this part of it.
+DIGITS = 1e-13
 # Error of means, as a part of the function's size.
 MEAN_ERROR = 1e-10
 # Largest number of nodes of a piece at which a quotient may have no value.
@@ -121,7 +123,8 @@ class Series:
                 some = _remainder(table, np.count_nonzero(lost, axis=2)) <= left * size
             own[self._poled] = some
             rounding = np.zeros(own.shape)
-            rounding[self._poled] = np.where(some, left * size, 0.0)
+            # Far from singular poses a value has all its digits, whatever the largest is.
+            rounding[self._poled] = np.where(some & (left > DIGITS), left * size, 0.0)
             largest(self._noise, pieces.line, rounding)
             products[self._poled] = np.where(some[..., None], table, products[self._poled])
             divisors[own] = 1.0

@@ -192,3 +192,11 @@ def test_corners_within_others_come_first():
     """Between inner corners the arguments of the outer ones are smooth."""
     corners = Expression.parse("max(0, 1 - abs(x))").corners()
     assert [corner.argument.evaluate({"x": 0.25}) for corner in corners] == [0.25, -0.75]
+
+
+def test_where_an_argument_rests_an_infinite_slope_is_none():
+    """sqrt(max(0, 1 - x^2)) is 0 beyond its ends, with all its derivatives; within them it is a half circle."""
+    dome, x = Expression.parse("sqrt(max(0, 1 - x**2))"), np.array([-2.0, 0.6, 3.0])
+    assert dome.derivatives({"x": x})["x"].tolist() == pytest.approx([0, -0.75, 0])
+    bend = dome.derivatives({"x": Dual(x, np.ones(3))})["x"].slope
+    assert bend.tolist() == pytest.approx([0, -1 / 0.8**3, 0])
