@@ -25,6 +25,8 @@ ROUNDING = 1e-11
 DEEP, ROUNDING_DEEP = 20, 1e-3
 # A magnitude below this part of its size is nearly zero. Pieces are divided at such places so many times at the most.
 NEARLY_ZERO, MOST_PARTED = 3e-2, 8
+# Neighbouring numbers in the narrowest piece that is halved.
+NARROW = 64
 # Rounding of a value that has all its digits is below this part of it.
 DIGITS = 1e-13
 # Error of means, as a part of the function's size.
@@ -185,7 +187,9 @@ class Series:
                 | (self._zeros[:, None] & (self._poled[:, None] | crossed))
                 | self._everywhere[:, None]
             )
-            halve = (rough & matters).any(axis=0) & (pending.depth < MOST_HALVINGS)
+            # A piece of a few neighbouring numbers has no halves.
+            wide = pending.end - pending.begin > NARROW * np.spacing(np.maximum(pending.end, 1.0))
+            halve = (rough & matters).any(axis=0) & (pending.depth < MOST_HALVINGS) & wide
             self.unresolved |= np.bincount(pending.line[halve], minlength=lines).astype(bool) & (spent > BUDGET)
             halve &= spent[pending.line] <= BUDGET
             done.append((pending.take(~halve), values[:, ~halve], divisors[:, ~halve], exact[~halve], rough[:, ~halve]))
