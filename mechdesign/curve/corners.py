@@ -23,8 +23,6 @@ BISECTIONS = 60
 # Values of variables of expressions at places of lines, by name.
 Variables = Callable[[frozenset[str], Ints, Floats], Mapping[str, ArrayLike]]
 
-_ARGUMENT = "argument"
-
 
 def curve_of(study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True) -> Curve:
     """The motions of some poses, divided at the corners of couplings and of what limits bound; see `Curve`."""

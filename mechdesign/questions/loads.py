@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechdesign.expressions import Expression, Number
+from mechdesign.expressions import Corner, Expression, Number
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
@@ -26,6 +26,12 @@ def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
     names = {name.removesuffix(VELOCITY): name for load in loads for _, quantity, _ in load.numbers
              if isinstance(quantity, Expression) for name in quantity.names}  # fmt: skip
     return [study.mechanism.coordinate(name) for name in names if name != TIME and name not in study.parameters.nominal]
+
+
+def corners_in(loads: Sequence[Load]) -> list[Corner]:
+    """The corners of the expressions of loads."""
+    numbers = [quantity for load in loads for _, quantity, _ in load.numbers if isinstance(quantity, Expression)]
+    return [corner for expression in numbers for corner in expression.corners()]
 
 
 class Loading:

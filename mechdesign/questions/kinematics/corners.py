@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 from mechdesign.curve.corners import Variables, divide, switched
 from mechdesign.curve.motion import Curve
 from mechdesign.curve.series import Evaluate
-from mechdesign.expressions import Expression
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics import targets as targeted
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import moving_at
-from mechdesign.questions.loads import coordinates_in, variable
+from mechdesign.questions.loads import coordinates_in, corners_in, variable
 from mechdesign.questions.poses import SolvedPoses
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY
@@ -31,9 +30,8 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     study, loads = question.study, question.loads
     targets = study.targets.values() if errors else ()
     expressions = expressions_of(evaluated(question))
-    corners = corners_of(expressions.values())
-    written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
-    written += [target.expression for target in targets if target.expression is not None]
+    corners = [*corners_of(expressions.values()), *corners_in(loads)]
+    written = [target.expression for target in targets if target.expression is not None]
     corners += [corner for expression in written for corner in expression.corners()]
     corners += [corner for target in targets for corner in targeted.knots(study, target, question.poses)]
 

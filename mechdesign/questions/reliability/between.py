@@ -12,11 +12,10 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.curve.corners import curve_of, divide
 from mechdesign.curve.motion import Curve
-from mechdesign.expressions import Expression
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.questions.kinematics.corners import variables_of
-from mechdesign.questions.loads import coordinates_in
+from mechdesign.questions.loads import coordinates_in, corners_in
 from mechdesign.questions.poses import followed_angles
 from mechdesign.questions.reliability.forces import pace
 from mechdesign.questions.reliability.methods.auto import FACTOR
@@ -57,9 +56,7 @@ def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
     plan = study.mechanism.plan(poses.groups[0].names)
     curve = curve_of(study, poses, followed_angles(study.mechanism, plan, coordinates))
     expressions = expressions_of(coordinates)
-    written = [part for load in loads for _, part, _ in load.numbers if isinstance(part, Expression)]
-    corners = [*corners_of(coordinates), *(corner for expression in written for corner in expression.corners())]
-
+    corners = [*corners_of(coordinates), *corners_in(loads)]
     return divide(curve, corners, variables_of(study, pace(study), curve, expressions))[0]
 
 
