@@ -1,4 +1,4 @@
-"""Files written whole or not at all, folders locked by one process, and formats of pictures."""
+"""Files written whole or not at all, those that may be replaced, folders locked by one process, formats of pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import json
 import os
 import platform
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -25,10 +25,11 @@ except ImportError:
 
 # Formats of pictures; the first is the default.
 FORMATS = ("png", "svg", "pdf")
-# In a folder of results: the lock of the process that writes there, and the names of files that are being replaced.
+# In a folder of results: the lock of the process that writes there, the names of files that are being replaced, and the
+# digests of files that no manifest of results lists, such as exports, reports and summaries.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
-_MOST_BYTES = 10_000_000  # most bytes searched for the mark of a file
+_RECORD = ".mechdesign.json"
 
 
 def formats_of(listed: str | None, option: str) -> str:
@@ -83,7 +84,7 @@ class Transaction:
 
     def stage(self, name: str, blocks: Iterable[bytes]) -> str:
         """Write a file under a temporary name, and return its SHA-256."""
-        temporary = self._staged[name] = self.directory / f".{name}.{os.getpid()}.tmp"
+        temporary = self._staged[name] = self.directory / f".mechdesign.{name}.{os.getpid()}.tmp"
         digest = hashlib.sha256()
         with temporary.open("wb") as stream:
             for block in blocks:
@@ -150,32 +151,46 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
     StudyError
         If there is such a file; it is named.
     """
-    patterns = [*names, *map(glob.escape, own)]
-    there = [
-        directory / name for name in file_names(directory) if any(fnmatchcase(name, pattern) for pattern in patterns)
-    ]
-    kept = [file for file in read if os.path.exists(file)]
-    for path in there:
-        if os.path.exists(path) and any(path.samefile(file) for file in kept):
-            raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
-        if path.name not in own or path.is_symlink():
-            raise _foreign(path)
+    patterns, read = [*names, *map(glob.escape, own)], [*read]
+    for name in file_names(directory):
+        if any(fnmatchcase(name, pattern) for pattern in patterns):
+            check_unread(directory / name, read)
+            if name not in own or (directory / name).is_symlink():
+                raise _foreign(directory / name)
 
 
-def check_marked(path: Path, mark: bytes) -> None:
-    """Check that a file may be replaced: it contains the mark of our files, or is empty.
-
-    Devices and pipes may be written to. A link to a file is not followed.
+def check_unread(path: Path, read: Iterable[Path]) -> None:
+    """Check that a file is none of those that are `read`.
 
     Raises
     ------
     StudyError
-        If there is one without the mark.
+        If it is one of them.
     """
-    if not os.path.lexists(path) or flowing(path) or marked(path, mark):
+    if os.path.exists(path) and any(os.path.exists(file) and path.samefile(file) for file in read):
+        raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
+
+
+def check_replaceable(path: Path, read: Iterable[Path] = (), *, whole: bool = True) -> None:
+    """Check that a file may be replaced: it is as the record of its folder lists it, or empty, and none that is `read`.
+
+    Devices and pipes may be written to. A link to a file is not followed. Where it need not be `whole`, a file of a
+    name that the record lists may be damaged.
+
+    Raises
+    ------
+    StudyError
+        If another file stands there.
+    """
+    if flowing(path):
+        return
+    check_unread(path, read)
+    # A record of others would be replaced with the file.
+    listed = _entries(path.parent)
+    if not os.path.lexists(path) or _is_listed(path, listed, whole=whole):
         return
     if path.is_symlink() or path.is_dir() or path.stat().st_size:
-        raise _foreign(path)
+        raise _foreign(path, changed=path.name in listed)
 
 
 def flowing(path: Path) -> bool:
@@ -183,19 +198,102 @@ def flowing(path: Path) -> bool:
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
-def marked(path: Path, mark: bytes) -> bool:
-    """Whether a path is a file, not a link, that contains a mark."""
+def write_recorded(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all, and list it in the record of its folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; an older file of that name is then as it was.
+    """
+    with _record(path.parent) as listed:
+        # Whichever of the two a killed process leaves is listed.
+        digests = digest(path), hashlib.sha256(data).hexdigest()
+        listed[path.name] = [*dict.fromkeys(filter(None, digests))]
+    replace(path, [data])
+
+
+def remove_recorded(path: Path) -> None:
+    """Remove a file that is as the record of its folder lists it; another file of that name stays.
+
+    Raises
+    ------
+    OSError
+        If it cannot be removed.
+    """
+    with suppress(StudyError):
+        if _is_listed(path, _entries(path.parent)):
+            path.unlink()
+            with _record(path.parent) as listed:
+                del listed[path.name]
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
     try:
-        if path.is_symlink() or not path.is_file():
-            return False
         with path.open("rb") as stream:
-            return mark in stream.read(_MOST_BYTES)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:
+        return ""
+
+
+def _is_listed(path: Path, listed: Mapping[str, Sequence[str]], *, whole: bool = True) -> bool:
+    """Whether a path is a file, not a link, of a name, and where it is to be `whole` a digest, that are listed."""
+    if path.name not in listed or path.is_symlink() or not path.is_file():
         return False
+    return not whole or digest(path) in listed[path.name]
 
 
-def _foreign(path: Path) -> StudyError:
+def _entries(directory: Path, text: str | None = None) -> dict[str, list[str]]:
+    """The digests that the record of a folder lists by the names of files; none where there is no record.
+
+    Raises
+    ------
+    StudyError
+        If what stands there is no record, or a link.
+    """
+    path = directory / _RECORD
+    try:
+        if path.is_symlink():
+            raise _foreign(path)
+        content = json.loads(path.read_text(encoding="utf-8") if text is None else text or "{}")
+        files = content.get("files", {})
+        if all(isinstance(digests, list) for digests in files.values()) and content.keys() <= {"tool", "files"}:
+            return dict(files)
+    except OSError:
+        return {}
+    except (ValueError, AttributeError, RecursionError):
+        pass
+    raise _foreign(path)
+
+
+@contextmanager
+def _record(directory: Path) -> Iterator[dict[str, list[str]]]:
+    """What the record of a folder lists, to be changed while no other process does; a record of nothing is removed."""
+    path = directory / _RECORD
+    while True:
+        with open(path, "a+", encoding="utf-8", opener=_unlinked) as stream:
+            if fcntl is not None:
+                with suppress(OSError):
+                    fcntl.lockf(stream, fcntl.LOCK_EX)
+            # Another process may have removed it in between.
+            if not os.path.exists(path) or not os.path.samestat(os.fstat(stream.fileno()), path.stat()):
+                continue
+            stream.seek(0)
+            listed = _entries(directory, stream.read())
+            yield listed
+            if listed:
+                text = json.dumps({"tool": "mechdesign", "files": listed}, indent=1, sort_keys=True) + "\n"
+                stream.truncate(0)
+                stream.write(text)
+            else:
+                path.unlink(missing_ok=True)
+            return
+
+
+def _foreign(path: Path, *, changed: bool = False) -> StudyError:
     kind = "a link" if path.is_symlink() else "no result of mechdesign's"
+    kind += ", or was changed since it was written" * changed
     return StudyError(f"{path}: is {kind}, and would be replaced; move it away, or write the results elsewhere")
 
 
@@ -292,7 +390,7 @@ def _held(stream: TextIO, path: Path) -> Iterator[None]:
 
 def _temporaries(directory: Path, name: str = ".+") -> list[Path]:
     """Temporary files of unfinished writes."""
-    pattern = re.compile(rf"\.{name}\.\d+\.tmp")
+    pattern = re.compile(rf"\.mechdesign\.{name}\.\d+\.tmp")
     try:
         return [path for path in directory.iterdir() if pattern.fullmatch(path.name)]
     except OSError:

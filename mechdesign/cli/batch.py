@@ -119,6 +119,7 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
 def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str]) -> list[Task]:
     """Read and check the studies; only their texts are kept."""
     tasks: list[Task] = []
+    inputs: list[Path] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
         interrupts.check()
@@ -133,15 +134,26 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             if own != options:
                 study = load_source(origin, own)
             folders = _places(only or questions(study), root, own)
-            places.check_reports(root, own)
-            for command, directory in folders:
-                places.check(study, command, directory, own)
+            inputs += manifest.read_by(study)
             tasks.append(Task(number, origin, label, root, folders, own))
         except Exception as error:
             record.missing(number, failure(label, "check", Path(), error, study))
             if record.stopped:
-                break
-    return tasks
+                return tasks
+    record.check(inputs)
+    return [task for task in tasks if not record.stopped and _free(task, inputs, record)]
+
+
+def _free(task: Task, inputs: Sequence[Path], record: BatchRecord) -> bool:
+    """Whether a study's results replace no files of others, and none that one of the studies reads."""
+    try:
+        places.check_reports(task.root, task.options, inputs)
+        for command, directory in task.questions:
+            places.check(command, directory, task.options, inputs)
+    except Exception as error:
+        record.missing(task.number, failure(task.label, "check", Path(), error))
+        return False
+    return True
 
 
 def _as_in_shards(label: str, root: Path, options: Options) -> Options:

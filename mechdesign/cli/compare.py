@@ -13,9 +13,9 @@ from typing import Any
 import mechdesign
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit_text, mark
+from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
-from mechdesign.files import FORMATS, check_marked, check_writable, marked
+from mechdesign.files import FORMATS, check_replaceable, check_writable, digest, remove_recorded
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
@@ -30,7 +30,6 @@ HELP_PAGE = "howto/batch"
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
-_HEADER = to_csv(Comparison().table).encode()
 # Changes that are printed as messages, not in the table.
 _SAID = ("verdict", "outcome")
 _SHOWN = 12  # digits of a hash
@@ -63,11 +62,11 @@ def compare(
     default = Tolerance(rtol, atol)
     chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if junit is not None:
-        check_marked(junit, mark(junit))
+        check_replaceable(junit)
     if out is not None:
         check_writable(out)
-        check_marked(out / _TABLE, _HEADER)
-        check_marked(out / _PICTURE, writer.CREATOR.encode())
+        check_replaceable(out / _TABLE)
+        check_replaceable(out / _PICTURE)
     comparison = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, comparison)
@@ -97,7 +96,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--json, --quiet and --allow-files"
         )
     if options.junit is not None:
-        check_marked(options.junit, mark(options.junit))
+        check_replaceable(options.junit)
     root = path.parent if path.name == manifest.NAME else path
     recorded = folders.results(path)
     if not recorded:
@@ -143,11 +142,11 @@ def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, 
     tables = {difference.table for difference in comparison.differences if difference.folder == folder}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
-        table, digest = name.removesuffix(".csv"), listed.get(name, "")
+        table = name.removesuffix(".csv")
         # Other texts and pictures also depend on the study's text, which the manifest does not contain.
         here_alone = (name in again) != (name in listed) and not name.endswith(drawn)
-        expected = again.get(name, "") if name in after["tables"] or here_alone else digest
-        digests = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
+        expected = again.get(name, "") if name in after["tables"] or here_alone else listed.get(name, "")
+        digests = {"in the manifest": listed.get(name, ""), "of the file": digest(kept / name)}
         wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in digests.items() if other != expected]
         if wrong and table not in tables:
             comparison.differences.append(
@@ -156,20 +155,16 @@ def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, 
 
 
 def _write(out: Path, comparison: Comparison) -> None:
-    creator = writer.CREATOR.encode()
-    writer.write_file(out / _TABLE, to_csv(comparison.table).encode(), _HEADER)
+    writer.write_file(out / _TABLE, to_csv(comparison.table).encode())
     if not comparison.moved:
         # Files of an older comparison are removed.
-        if marked(out / _PICTURE, creator):
-            (out / _PICTURE).unlink()
+        remove_recorded(out / _PICTURE)
         return
     from mechdesign.report.comparison.picture import differences_figure
     from mechdesign.report.figures import style
 
     with style.context():
-        writer.write_file(
-            out / _PICTURE, style.encoded(differences_figure(comparison.moved), "png", writer.CREATOR), creator
-        )
+        writer.write_file(out / _PICTURE, style.encoded(differences_figure(comparison.moved)))
 
 
 def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
@@ -187,7 +182,7 @@ def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: 
     else:
         terminal.show_lines([str(line) for line in comparison.differences if line.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(comparison, command).encode(), mark(junit))
+        writer.write_file(junit, _junit(comparison, command).encode())
     return 1 if comparison.differences else 0
 
 

@@ -133,7 +133,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
-    places.check(study, command, directory, options)
+    places.check(command, directory, options, manifest.read_by(study))
     if options.part is not None:
         return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
@@ -141,7 +141,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     before = under = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
-        manifest.check_folder(directory, study, command, output, before)
+        manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
     share, merging = None, options.command == MERGE and command in DIVIDED
     if merging and shards.files_in(directory):
@@ -357,12 +357,12 @@ def write_report(
     answers += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots), places.PAGE)
+    writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots))
     printed = ""
     if options.report == PDF:
         from mechdesign.report.page import printing
 
-        writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
+        writer.write_file(directory / pages.PRINTED, printing.pdf(path))
         printed = f", printed in {directory / pages.PRINTED}"
     terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
     return [number for answer in answers if answer.section is not None for number in answer.section["headlines"]]

@@ -39,7 +39,7 @@ ROUNDING = 1e-9
 ORDERS = ("velocity", "acceleration")
 
 
-@export("curve.csv", "places of points and outputs, closely along the motion", order=60, mark=b"part,")
+@export("curve.csv", "places of points and outputs, closely along the motion", order=60)
 def curve_csv(view: View) -> Content:
     """A row a pose: the part of the motion, what the poses give, and outputs and coupler points."""
     study, mechanism, track = view.study, view.mechanism, view.track
@@ -61,7 +61,7 @@ def curve_csv(view: View) -> Content:
     return Content(to_csv(Table("curve", tuple(columns))), view.unmoved)
 
 
-@export("motion.csv", "drives over time at the rate of a controller", order=61, mark=b"time,", options=("rate",))
+@export("motion.csv", "drives over time at the rate of a controller", order=61, options=("rate",))
 def motion_csv(view: View) -> Content:
     """A row an instant: time, and position, velocity and acceleration of each drive."""
     step = step_of(view.rate or RATE, view.study.units)

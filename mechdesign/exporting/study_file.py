@@ -10,9 +10,7 @@ from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
 
 
-@export(
-    "study.json", "the study with its overrides, for programs; mechdesign reads it too", order=70, mark=b'"mechanism"'
-)
+@export("study.json", "the study with its overrides, for programs; mechdesign reads it too", order=70)
 def study_json(view: View) -> Content:
     """The study as plain data, and a warning that names the files it needs."""
     study = view.study

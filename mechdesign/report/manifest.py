@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from mechdesign.errors import StudyError
-from mechdesign.files import check_own, check_writable, file_names, proper, unsettled
+from mechdesign.files import check_own, check_writable, digest, file_names, proper, unsettled
 from mechdesign.report.names import names
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
@@ -253,13 +253,19 @@ def own(directory: Path) -> set[str]:
     return unsettled(directory).union(listed, [NAME] if listed else [])
 
 
-def check_folder(directory: Path, study: Study, command: str, output: Extras, before: Study | None = None) -> None:
+def read_by(*studies: Study) -> list[Path]:
+    """The files that studies read: themselves, and those that they name."""
+    named = [file for study in studies for _, file, _ in study.inputs()]
+    return named + [study.path for study in studies if study.path is not None]
+
+
+def check_folder(directory: Path, command: str, output: Extras, read: Iterable[Path]) -> None:
     """Check before a long computation that its results can be written into a folder; creates nothing.
 
     Raises
     ------
     StudyError
-        If they would replace a file that no manifest there lists, or that a study reads.
+        If they would replace a file that no manifest there lists, or one that is `read`.
     OutputError
         If the folder takes no files.
     """
@@ -268,9 +274,6 @@ def check_folder(directory: Path, study: Study, command: str, output: Extras, be
     # Pictures are named only where one of them may replace a file of others: that imports Matplotlib.
     others = output.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
     written = [NAME, *names(command, output.formats if others else "", animate=output.animate)]
-    studies = [study] if before is None else [study, before]
-    read = [file for read_study in studies for _, file, _ in read_study.inputs()]
-    read += [read_study.path for read_study in studies if read_study.path is not None]
     check_own(directory, [*written, pages.SECTION] if output.report else written, ours, read)
 
 
@@ -287,12 +290,3 @@ def is_current(directory: Path, study: Study, command: str, output: Extras) -> d
     if "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None
     return content if all(digest(directory / name) == sha256 for name, sha256 in content["files"].items()) else None
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file; empty where it cannot be read."""
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
-        return ""

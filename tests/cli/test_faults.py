@@ -360,7 +360,7 @@ def test_a_folder_is_of_one_process(here, analysis, invoke):
     arguments = ("run", "slider.yaml", "--no-plots", "--out", "out")
     pid = forked(lambda: invoke(*arguments))
     os.read(reader, 1)
-    (here / "out/kinematics/.t0.csv.99999999.tmp").write_text("half")
+    (here / "out/kinematics/.mechdesign.t0.csv.99999999.tmp").write_text("half")
     analysis(lambda study, **options: quick)
     done = invoke(*arguments)
     assert done.exit_code == 4

@@ -27,8 +27,8 @@ def studies(folder):
 
 
 def content(folder):
-    """Every file of a folder; what a summary says of the folder itself is that of any."""
-    found = {file.relative_to(folder): file.read_bytes() for file in Path(folder).rglob("*") if file.is_file()}
+    """Every file of a folder but its record; what a summary says of the folder itself is that of any."""
+    found = {file.relative_to(folder): file.read_bytes() for file in Path(folder).rglob("[!.]*") if file.is_file()}
     return {name: data.replace(str(folder).encode() + b"/", b"") for name, data in found.items()}
 
 
