@@ -489,6 +489,38 @@ def test_every_command_tells_github_with_paths_from_its_workspace(here, invoke, 
     assert line.startswith(f"{place}slider.yaml::pose B.x = 900 mm")
 
 
+def test_github_is_told_of_a_file_whatever_its_name(here, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    wrong = SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]")
+    for name in ("<odd>.yaml", "-odd.yaml", "--set x.yaml"):
+        (here / name).write_text(wrong)
+        lines = invoke("check", f"./{name}", "--no-plots").stderr.splitlines()
+        assert any(line.startswith(f"::error file={name},line=6,col=19::mechanism.links.crank") for line in lines), (
+            lines
+        )
+
+
+@pytest.mark.parametrize("arguments", [("run", "slider.yaml"), ("kinematics",), ("check", "slider.yaml")])
+def test_a_working_folder_that_was_removed_is_told(here, arguments):
+    (here / "gone").mkdir()
+    text = "import os, sys; os.chdir('gone'); os.rmdir('../gone'); import mechdesign.__main__"
+    command = [sys.executable, "-c", f"{text}; sys.argv = ['mechdesign', *{arguments!r}]; mechdesign.__main__.main()"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert done.stderr.startswith("the working folder is not there any more"), done.stderr
+
+
+@pytest.mark.parametrize("name", ["MPLCONFIGDIR", "HOME"])
+def test_matplotlib_says_nothing_of_its_cache(here, name):
+    nowhere = {"MPLCONFIGDIR": "", "XDG_CACHE_HOME": "", "XDG_CONFIG_HOME": "", name: "/proc/nowhere"}
+    environment = os.environ | {key: value for key, value in nowhere.items() if value}
+    for key in nowhere.keys() - {key for key, value in nowhere.items() if value}:
+        environment.pop(key, None)
+    command = [*COMMAND, "kinematics", "slider.yaml", "--out", "out"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "slider: kinematics: 3 rows in out\n")
+
+
 def test_inputs_of_one_name_are_told_apart(here, invoke):
     """Results are kept by what the files hold, each of them."""
     for name in ("one", "two"):
