@@ -47,6 +47,8 @@ class _Group(TyperGroup):
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         # Without arguments there is the help.
         with _usage() if args else nullcontext():
+            if "" in args:
+                raise typer.BadParameter("an argument is empty, as of a variable of the shell that is not set")
             return super().make_context(info_name, args, parent, **extra)
 
     def invoke(self, ctx: Any) -> Any:

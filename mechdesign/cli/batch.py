@@ -19,6 +19,7 @@ from mechdesign.cli import places, terminal
 from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, name_of
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
+    HERE,
     Outcome,
     answer,
     drawing_ahead,
@@ -88,8 +89,10 @@ def source_of(path: Path | None, options: Options) -> Source:
     Raises
     ------
     StudyError
-        Also if it is a folder or pattern without studies.
+        Also if it is a folder or pattern without studies, or no study is named and none is here.
     """
+    if path is None and not HERE.exists():
+        raise StudyError(f"no study is named, and there is no {HERE} here")
     if path is not None and (path.is_dir() or (glob.has_magic(str(path)) and not path.exists())):
         raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
     return source(path, options)

@@ -44,6 +44,7 @@ from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
+HERE = Path("study.yaml")  # the study where none is named
 PICTURES = "mechdesign.report.figures.pictures"  # with it all of Matplotlib that pictures need is imported
 _ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 OUTCOMES = {
@@ -99,9 +100,8 @@ def source(path: Path | None, options: Options) -> Source:
         If it cannot be read.
     """
     if path is None:
-        here = Path("study.yaml")
-        path = here if here.exists() else template_path()
-        label = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        path = HERE if HERE.exists() else template_path()
+        label = str(HERE) if HERE.exists() else f"the built-in two-link arm (no {HERE} here)"
         terminal.say(f"study: {label}", quiet=options.quiet)
     if path == STANDARD_INPUT:
         return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
@@ -143,7 +143,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
-    share, merging = None, options.command == MERGE and command in DIVIDED
+    share, merging = None, options.command == MERGE
     if merging and shards.files_in(directory):
         share = shards.merge(directory, manifest.computed_from(study, command))
     elif (options.resume or merging) and (kept := _finished(study, command, directory, output)) is not None:
@@ -195,14 +195,16 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
 def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
     """Compute one shard of a command and keep it for `merge`; what is not divided is left to `merge`."""
     sentence, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
-    if command not in DIVIDED:
-        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
         return Outcome(study.label, command, directory, 0, 0, kept=True, shard=sentence)
     if is_long(study, command):
         requirements.foresee(study, [command])
     taken = shards.Taken(shard)
+    if command not in DIVIDED:
+        # By this merge knows that it is asked.
+        taken.write(directory, origin, options.command)
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
     try:
         with progress, divided(taken):
             getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
