@@ -15,7 +15,9 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mechdesign.cautions import Caution, fails
 from mechdesign.cli import places, terminal
+from mechdesign.cli.annotations import annotate, of_warnings
 from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, name_of
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
@@ -307,7 +309,7 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
             outcomes.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
-            ended = replace(ended, entry=_page(study, task, outcomes, several=several))
+            ended = replace(ended, entry=_page(study, task, outcomes, several=several), exit_code=_stale(study, task))
         except Exception as error:
             code, message = explained(error)
             terminal.say(f"{study.label}: report: {message}")
@@ -325,6 +327,19 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     except Exception as error:
         return failure(study.label, command, directory, error, study)
     return replace(outcome, table=None)
+
+
+def _stale(study: Study, task: Task) -> int:
+    """Tell of results of questions that the study no longer asks; the exit code, 1 where the study bars them."""
+    code, asked = 0, questions(study)
+    for path in sorted(task.root.glob(f"*/{manifest.NAME}")):
+        if manifest.is_stale(path.parent, study, asked):
+            caution = Caution("stale", f"{path.parent} answers a question that the study does not ask; remove it")
+            barred = fails(caution, study.barred)
+            terminal.say(f"{study.label}: warning: {caution} [{caution.kind}]", quiet=task.options.quiet and not barred)
+            annotate("error" if barred else "warning", of_warnings(study, path.parent.name, [caution]))
+            code = max(code, int(barred))
+    return code
 
 
 def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cli import terminal
+from mechdesign.cli.execution import exit_code
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
@@ -20,7 +21,9 @@ from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
+from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import to_csv
+from mechdesign.results import Result
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
@@ -31,7 +34,7 @@ HELP_PAGE = "howto/batch"
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 # Changes that are printed as messages, not in the table.
-_SAID = ("verdict", "outcome")
+_SAID = ("verdict", "outcome", "stale")
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
 
@@ -78,7 +81,9 @@ def compare(
 
 @one_thread()
 def verify(studies: Sequence[Path] | None, options: Options) -> int:
-    """Repeat the computations of manifests and compare the tables; returns 1 if one differs, else 0.
+    """Repeat the computations of manifests, compare the tables and judge them; the exit code is 1 if one differs.
+
+    It is that of the run as well, where a requirement is not met or a pose cannot be assembled.
 
     Raises
     ------
@@ -101,17 +106,25 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     recorded = folders.results(path)
     if not recorded:
         raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
-    total = Comparison()
+    total, code = Comparison(), 0
     for folder, content in recorded.items():
         with tempfile.TemporaryDirectory() as there:
             terminal.say(f"{root / folder}: {content.get('command')} again", quiet=options.quiet)
-            _repeat(Path(there), root / folder / manifest.NAME, content, options)
+            result, verdicts = _repeat(Path(there), root / folder / manifest.NAME, content, options)
+            for verdict in verdicts:
+                terminal.say(f"{root / folder}: requirement: {verdict}", quiet=options.quiet and verdict.met)
+            unmet = [verdict for verdict in verdicts if not verdict.met]
+            total.differences += [Difference(folder, "", verdict.requirement, "not met") for verdict in unmet]
+            code = max(code, exit_code(result.failed, verdicts, result.main))
             _verify(total, folder, root / folder, content, Path(there))
-    return _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet)
+    total.differences += folders.stale(recorded)
+    return max(code, _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet))
 
 
-def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
-    """Repeat the computation that a manifest describes and write its tables."""
+def _repeat(
+    there: Path, where: Path, content: dict[str, Any], options: Options
+) -> tuple[Result, Sequence[Verdict]]:  # fmt: skip
+    """Repeat the computation that a manifest describes, write its tables and judge them."""
     command = content.get("command")
     if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
@@ -121,6 +134,7 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
         inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
         about = content["study"]
         study = load_data(about["resolved"], (), content["seed"], inputs, about.get("drawn"))
+        study = dataclasses.replace(study, strict=content.get("strict", False))
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:
@@ -129,7 +143,9 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     with terminal.Bar(quiet=options.quiet) as bar:
         result = getattr(mechdesign, command)(study, jobs=options.jobs, progress=bar, **more)
     tables = Extras(plots=False, all_modes=bool(more))
-    writer.write(there, study, result, requirements.requirements(study, result), tables)
+    verdicts = requirements.requirements(study, result)
+    writer.write(there, study, result, verdicts, tables)
+    return result, verdicts
 
 
 def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:

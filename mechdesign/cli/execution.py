@@ -185,7 +185,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         journal.discard()
     shards.remove(directory)
     warnings = _placed(study, [*study.cautions, *result.warnings, *undrawn])
-    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
+    code, seconds = exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, table=result.main, reached=result.reached,
@@ -252,7 +252,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
         return None
     verdicts = [*judged, *on_warnings(study, warnings[len(study.warnings) :])]
     settle(directory)
-    code = _exit_code(failed, verdicts, table)
+    code = exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
         written=True, table=table,
@@ -265,7 +265,7 @@ def _placed(study: Study, warnings: Sequence[Caution]) -> list[Caution]:
     return [dataclasses.replace(warning, message=str(places.get(warning, warning))) for warning in warnings]
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+def exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
     cases = (int(part["exit_code"].max(initial=0)) for part in (table.blocks() if "exit_code" in table else ()))
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
