@@ -332,7 +332,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
 def _stale(study: Study, task: Task) -> int:
     """Tell of results of questions that the study no longer asks; the exit code, 1 where the study bars them."""
     code, asked = 0, questions(study)
-    for path in sorted(task.root.glob(f"*/{manifest.NAME}")):
+    for path in sorted(task.root.glob(f"*/{manifest.NAME}")) if os.path.isdir(task.root) else ():
         if manifest.is_stale(path.parent, study, asked):
             caution = Caution("stale", f"{path.parent} answers a question that the study does not ask; remove it")
             barred = fails(caution, study.barred)

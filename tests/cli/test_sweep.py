@@ -81,7 +81,8 @@ def test_run_answers_the_matrix_of_a_study(study, invoke):
     again = invoke("run", "press.yaml", "--no-plots", "--resume")
     assert again.exit_code == 1
     assert [row["outcome"] for row in rows(again.stdout)] == ["done (kept)", "requirement not met (kept)"]
-    assert invoke("run", "--verify", "results/press").exit_code == 0
+    verified = invoke("run", "--verify", "results/press")
+    assert (verified.exit_code, "NOT MET" in verified.stderr) == (1, True)
     wrong = invoke("check", "press.yaml", "--no-plots", "--set", "matrix.results=[kinematics.B.xx.max]")
     assert wrong.exit_code == 2
 
