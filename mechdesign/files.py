@@ -1,4 +1,4 @@
-"""Files written whole or not at all, those that may be replaced, folders locked by one process, formats of pictures."""
+"""Files written whole or not at all, folders locked by one process, and formats of pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import json
 import os
 import platform
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -25,11 +25,9 @@ except ImportError:
 
 # Formats of pictures; the first is the default.
 FORMATS = ("png", "svg", "pdf")
-# In a folder of results: the lock of the process that writes there, the names of files that are being replaced, and the
-# digests of files that no manifest of results lists, such as exports, reports and summaries.
+# In a folder of results: the lock of the process that writes there, and the names of files that are being replaced.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
-_RECORD = ".mechdesign.json"
 
 
 def formats_of(listed: str | None, option: str) -> str:
@@ -156,7 +154,7 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
         if any(fnmatchcase(name, pattern) for pattern in patterns):
             check_unread(directory / name, read)
             if name not in own or (directory / name).is_symlink():
-                raise _foreign(directory / name)
+                raise foreign(directory / name)
 
 
 def check_unread(path: Path, read: Iterable[Path]) -> None:
@@ -171,61 +169,9 @@ def check_unread(path: Path, read: Iterable[Path]) -> None:
         raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
 
 
-def check_replaceable(path: Path, read: Iterable[Path] = (), *, whole: bool = True) -> None:
-    """Check that a file may be replaced: it is as the record of its folder lists it, or empty, and none that is `read`.
-
-    Devices and pipes may be written to. A link to a file is not followed. Where it need not be `whole`, a file of a
-    name that the record lists may be damaged.
-
-    Raises
-    ------
-    StudyError
-        If another file stands there.
-    """
-    if flowing(path):
-        return
-    check_unread(path, read)
-    # A record of others would be replaced with the file.
-    listed = _entries(path.parent)
-    if not os.path.lexists(path) or _is_listed(path, listed, whole=whole):
-        return
-    if path.is_symlink() or path.is_dir() or path.stat().st_size:
-        raise _foreign(path, changed=path.name in listed)
-
-
 def flowing(path: Path) -> bool:
     """Whether a path is a device or a pipe, or a link to one."""
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
-
-
-def write_recorded(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, and list it in the record of its folder.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; an older file of that name is then as it was.
-    """
-    with _record(path.parent) as listed:
-        # Whichever of the two a killed process leaves is listed.
-        digests = digest(path), hashlib.sha256(data).hexdigest()
-        listed[path.name] = [*dict.fromkeys(filter(None, digests))]
-    replace(path, [data])
-
-
-def remove_recorded(path: Path) -> None:
-    """Remove a file that is as the record of its folder lists it; another file of that name stays.
-
-    Raises
-    ------
-    OSError
-        If it cannot be removed.
-    """
-    with suppress(StudyError):
-        if _is_listed(path, _entries(path.parent)):
-            path.unlink()
-            with _record(path.parent) as listed:
-                del listed[path.name]
 
 
 def digest(path: Path) -> str:
@@ -237,61 +183,8 @@ def digest(path: Path) -> str:
         return ""
 
 
-def _is_listed(path: Path, listed: Mapping[str, Sequence[str]], *, whole: bool = True) -> bool:
-    """Whether a path is a file, not a link, of a name, and where it is to be `whole` a digest, that are listed."""
-    if path.name not in listed or path.is_symlink() or not path.is_file():
-        return False
-    return not whole or digest(path) in listed[path.name]
-
-
-def _entries(directory: Path, text: str | None = None) -> dict[str, list[str]]:
-    """The digests that the record of a folder lists by the names of files; none where there is no record.
-
-    Raises
-    ------
-    StudyError
-        If what stands there is no record, or a link.
-    """
-    path = directory / _RECORD
-    try:
-        if path.is_symlink():
-            raise _foreign(path)
-        content = json.loads(path.read_text(encoding="utf-8") if text is None else text or "{}")
-        files = content.get("files", {})
-        if all(isinstance(digests, list) for digests in files.values()) and content.keys() <= {"tool", "files"}:
-            return dict(files)
-    except OSError:
-        return {}
-    except (ValueError, AttributeError, RecursionError):
-        pass
-    raise _foreign(path)
-
-
-@contextmanager
-def _record(directory: Path) -> Iterator[dict[str, list[str]]]:
-    """What the record of a folder lists, to be changed while no other process does; a record of nothing is removed."""
-    path = directory / _RECORD
-    while True:
-        with open(path, "a+", encoding="utf-8", opener=_unlinked) as stream:
-            if fcntl is not None:
-                with suppress(OSError):
-                    fcntl.lockf(stream, fcntl.LOCK_EX)
-            # Another process may have removed it in between.
-            if not os.path.exists(path) or not os.path.samestat(os.fstat(stream.fileno()), path.stat()):
-                continue
-            stream.seek(0)
-            listed = _entries(directory, stream.read())
-            yield listed
-            if listed:
-                text = json.dumps({"tool": "mechdesign", "files": listed}, indent=1, sort_keys=True) + "\n"
-                stream.truncate(0)
-                stream.write(text)
-            else:
-                path.unlink(missing_ok=True)
-            return
-
-
-def _foreign(path: Path, *, changed: bool = False) -> StudyError:
+def foreign(path: Path, *, changed: bool = False) -> StudyError:
+    """The error where a file of others would be replaced."""
     kind = "a link" if path.is_symlink() else "no result of mechdesign's"
     kind += ", or was changed since it was written" * changed
     return StudyError(f"{path}: is {kind}, and would be replaced; move it away, or write the results elsewhere")
@@ -352,10 +245,9 @@ def owned(directory: Path) -> Iterator[None]:
 def _locked(path: Path) -> TextIO:
     """The open lock file, locked by this process."""
     while True:
-        stream = open(path, "a+", encoding="utf-8", opener=_unlinked)  # noqa: SIM115
+        stream = open(path, "a+", encoding="utf-8", opener=unlinked)  # noqa: SIM115
         try:
-            if fcntl is not None:
-                fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(stream, wait=False)
         except BlockingIOError:
             with stream:
                 stream.seek(0)
@@ -371,7 +263,22 @@ def _locked(path: Path) -> TextIO:
         stream.close()
 
 
-def _unlinked(path: str, flags: int) -> int:
+def lock(stream: TextIO, *, wait: bool) -> None:
+    """Lock an open file for this process, where files can be locked.
+
+    Raises
+    ------
+    BlockingIOError
+        If another process has it, and this one does not `wait`.
+    OSError
+        If it cannot be locked.
+    """
+    if fcntl is not None:
+        fcntl.lockf(stream, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+
+
+def unlinked(path: str, flags: int) -> int:
+    """Opener of a file that follows no link."""
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 

@@ -18,7 +18,7 @@ from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import RESULTS, SUMMARY
 from mechdesign.errors import Interrupted, MechdesignError, counted, printable
-from mechdesign.files import check_replaceable
+from mechdesign.records import check_replaceable
 from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file

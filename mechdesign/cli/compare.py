@@ -16,7 +16,8 @@ from mechdesign.cli.execution import exit_code
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
-from mechdesign.files import FORMATS, check_replaceable, check_writable, digest, remove_recorded
+from mechdesign.files import FORMATS, check_writable, digest
+from mechdesign.records import check_replaceable, remove_recorded
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances

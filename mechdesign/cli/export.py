@@ -11,7 +11,8 @@ from mechdesign.cli.options import Options
 from mechdesign.cli.places import RESULTS
 from mechdesign.exporting.exports import export_named
 from mechdesign.exporting.view import View
-from mechdesign.files import check_replaceable, check_writable
+from mechdesign.files import check_writable
+from mechdesign.records import check_replaceable
 from mechdesign.report.manifest import read_by
 from mechdesign.report.requirements import on_warnings
 from mechdesign.report.writer import write_file

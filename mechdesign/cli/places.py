@@ -9,7 +9,7 @@ from pathlib import Path
 from mechdesign.cli.options import PDF, STYLES, Options
 from mechdesign.commands import MERGE, SWEEP
 from mechdesign.errors import StudyError
-from mechdesign.files import check_replaceable
+from mechdesign.records import check_replaceable
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages

@@ -15,7 +15,7 @@ from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError
 from mechdesign.experiments.schema.matrix import RANGE
-from mechdesign.files import check_replaceable
+from mechdesign.records import check_replaceable
 from mechdesign.report.writer import write_file
 from mechdesign.study.text.document import in_yaml, read
 

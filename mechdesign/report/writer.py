@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, explain
-from mechdesign.files import Transaction, check_replaceable, check_writable, flowing, write_recorded
+from mechdesign.files import Transaction, check_writable, flowing
 from mechdesign.progress import NULL, Progress
+from mechdesign.records import check_replaceable, write_recorded
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.names import ANIMATION, MECHANISM
@@ -136,11 +137,10 @@ def write_file(path: Path, data: bytes) -> None:
         If it cannot be written.
     """
     try:
-        check_replaceable(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
         if flowing(path):
             path.write_bytes(data)
         else:
+            path.parent.mkdir(parents=True, exist_ok=True)
             write_recorded(path, data)
     except OSError as error:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error

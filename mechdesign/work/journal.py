@@ -20,8 +20,8 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mechdesign.errors import OutputError
-from mechdesign.files import remove_recorded, write_recorded
 from mechdesign.numerics.arrays import Floats
+from mechdesign.records import remove_recorded, write_recorded
 
 NAME = "unfinished.npz"
 # Least seconds between two versions of the file, and the least ratio of this time to that of writing it.

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import OutputError, StudyError
-from mechdesign.files import remove_recorded, write_recorded
+from mechdesign.records import remove_recorded, write_recorded
 from mechdesign.work.chunks import Divided
 
 Compute = Callable[[Iterable[Any]], Iterator[Any]]
@@ -119,7 +119,8 @@ class Taken:
             "sha256": hashlib.sha256(content).hexdigest(),
         }
         try:
-            write_recorded(directory / FILE, json.dumps(head, sort_keys=True).encode() + b"\n" + content)
+            data = json.dumps(head, sort_keys=True).encode() + b"\n" + content
+            write_recorded(directory / FILE, data, whole=False)
         except OSError as error:
             raise OutputError(f"{directory}: the shard could not be written: {error.strerror or error}") from error
 

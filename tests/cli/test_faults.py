@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ import mechdesign
 from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, StudyError, explain
 from mechdesign.files import Transaction, owned
+from mechdesign.records import remove_recorded
 from mechdesign.report.writer import write_file
 from mechdesign.results import Column, Result, Table
 
@@ -405,6 +407,23 @@ def test_no_file_is_put_in_place_of_a_device_or_a_link(tmp_path):
     with pytest.raises(StudyError, match="link: is a link"):
         write_file(tmp_path / "link", b"words")
     assert not (tmp_path / "file").exists()
+
+
+def test_processes_that_write_beside_one_another_know_all_of_their_files(tmp_path):
+    """Of two jobs with a JUnit file each in one folder none takes that of the other for a stranger's."""
+    names = [f"report_{k}.xml" for k in range(3)]
+
+    def write(name):
+        for _ in range(30):
+            write_file(tmp_path / name, name.encode())
+        remove_recorded(tmp_path / name)
+        write_file(tmp_path / name, name.encode())
+        os._exit(0)
+
+    for pid in [forked(partial(write, name)) for name in names]:
+        assert os.waitpid(pid, 0)[1] == 0
+    listed = json.loads((tmp_path / ".mechdesign.json").read_text())["files"]
+    assert listed == {name: [hashlib.sha256(name.encode()).hexdigest()] for name in names}
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import OutputError, printable_lines
-from mechdesign.files import remove_recorded
+from mechdesign.records import remove_recorded
 
 HELP_PAGE = "howto/report"
 
