@@ -13,6 +13,7 @@ import pickle
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, is_dataclass
 from importlib import import_module
 from itertools import chain, islice
@@ -214,7 +215,9 @@ def remove(directory: Path) -> None:
     for path in files_in(directory):
         remove_recorded(path)
         path.unlink(missing_ok=True)
-        path.parent.rmdir()
+        with suppress(OSError):
+            # A folder with files of others stays.
+            path.parent.rmdir()
 
 
 def is_current(directory: Path, origin: Mapping[str, Any]) -> bool:

@@ -93,10 +93,13 @@ def test_what_is_not_divided_is_computed_once_by_the_merge_of_all_shards(studies
     done = invoke("merge", *asked)
     assert (done.exit_code, "shards are missing: 2/2" in done.stderr, len(computed)) == (2, True, 0)
     assert invoke("run", *asked, "--shard", "2/2").exit_code == 0
+    notes = Path("parts/kinematics/shard_1_of_2/notes.txt")
+    notes.write_text("of the user")
     for _ in range(2):
         assert invoke("merge", *asked).exit_code == 0
     assert len(computed) == 1
-    assert not [*Path("parts").rglob("shard_*")]
+    assert [*Path("parts").rglob("shard_*")] == [notes.parent]
+    assert [*notes.parent.iterdir()] == [notes]
 
 
 @pytest.mark.nightly
