@@ -47,6 +47,7 @@ KINDS = {
     "assumed": Kind("the study can be understood in several ways, and this one was taken", "reference/study/index"),
     "suspect": Kind("what is asked is likely a mistake", "reference/study/index"),
     "allocated": Kind("what an allocation of tolerances has chosen", "theory/reliability"),
+    "stale": Kind("results of a question that the study no longer asks stand beside the others", "howto/batch"),
     "undrawn": Kind("pictures that could not be drawn", "howto/report"),
 }
 ALL = "all"  # in place of the kinds: each of them

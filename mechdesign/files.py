@@ -28,7 +28,6 @@ FORMATS = ("png", "svg", "pdf")
 # In a folder of results: the lock of the process that writes there, and the names of files that are being replaced.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
-_MOST_BYTES = 10_000_000  # most bytes searched for the mark of a file
 
 
 def formats_of(listed: str | None, option: str) -> str:
@@ -83,7 +82,7 @@ class Transaction:
 
     def stage(self, name: str, blocks: Iterable[bytes]) -> str:
         """Write a file under a temporary name, and return its SHA-256."""
-        temporary = self._staged[name] = self.directory / f".{name}.{os.getpid()}.tmp"
+        temporary = self._staged[name] = self.directory / f".mechdesign.{name}.{os.getpid()}.tmp"
         digest = hashlib.sha256()
         with temporary.open("wb") as stream:
             for block in blocks:
@@ -150,32 +149,24 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
     StudyError
         If there is such a file; it is named.
     """
-    patterns = [*names, *map(glob.escape, own)]
-    there = [
-        directory / name for name in file_names(directory) if any(fnmatchcase(name, pattern) for pattern in patterns)
-    ]
-    kept = [file for file in read if os.path.exists(file)]
-    for path in there:
-        if os.path.exists(path) and any(path.samefile(file) for file in kept):
-            raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
-        if path.name not in own or path.is_symlink():
-            raise _foreign(path)
+    patterns, read = [*names, *map(glob.escape, own)], [*read]
+    for name in file_names(directory):
+        if any(fnmatchcase(name, pattern) for pattern in patterns):
+            check_unread(directory / name, read)
+            if name not in own or (directory / name).is_symlink():
+                raise foreign(directory / name)
 
 
-def check_marked(path: Path, mark: bytes) -> None:
-    """Check that a file may be replaced: it contains the mark of our files, or is empty.
-
-    Devices and pipes may be written to. A link to a file is not followed.
+def check_unread(path: Path, read: Iterable[Path]) -> None:
+    """Check that a file is none of those that are `read`.
 
     Raises
     ------
     StudyError
-        If there is one without the mark.
+        If it is one of them.
     """
-    if not os.path.lexists(path) or flowing(path) or marked(path, mark):
-        return
-    if path.is_symlink() or path.is_dir() or path.stat().st_size:
-        raise _foreign(path)
+    if os.path.exists(path) and any(os.path.exists(file) and path.samefile(file) for file in read):
+        raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
 
 
 def flowing(path: Path) -> bool:
@@ -183,19 +174,19 @@ def flowing(path: Path) -> bool:
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
-def marked(path: Path, mark: bytes) -> bool:
-    """Whether a path is a file, not a link, that contains a mark."""
+def digest(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
     try:
-        if path.is_symlink() or not path.is_file():
-            return False
         with path.open("rb") as stream:
-            return mark in stream.read(_MOST_BYTES)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:
-        return False
+        return ""
 
 
-def _foreign(path: Path) -> StudyError:
+def foreign(path: Path, *, changed: bool = False) -> StudyError:
+    """The error where a file of others would be replaced."""
     kind = "a link" if path.is_symlink() else "no result of mechdesign's"
+    kind += ", or was changed since it was written" * changed
     return StudyError(f"{path}: is {kind}, and would be replaced; move it away, or write the results elsewhere")
 
 
@@ -254,10 +245,9 @@ def owned(directory: Path) -> Iterator[None]:
 def _locked(path: Path) -> TextIO:
     """The open lock file, locked by this process."""
     while True:
-        stream = open(path, "a+", encoding="utf-8", opener=_unlinked)  # noqa: SIM115
+        stream = open(path, "a+", encoding="utf-8", opener=unlinked)  # noqa: SIM115
         try:
-            if fcntl is not None:
-                fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(stream, wait=False)
         except BlockingIOError:
             with stream:
                 stream.seek(0)
@@ -273,7 +263,22 @@ def _locked(path: Path) -> TextIO:
         stream.close()
 
 
-def _unlinked(path: str, flags: int) -> int:
+def lock(stream: TextIO, *, wait: bool) -> None:
+    """Lock an open file for this process, where files can be locked.
+
+    Raises
+    ------
+    BlockingIOError
+        If another process has it, and this one does not `wait`.
+    OSError
+        If it cannot be locked.
+    """
+    if fcntl is not None:
+        fcntl.lockf(stream, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+
+
+def unlinked(path: str, flags: int) -> int:
+    """Opener of a file that follows no link."""
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
@@ -292,7 +297,7 @@ def _held(stream: TextIO, path: Path) -> Iterator[None]:
 
 def _temporaries(directory: Path, name: str = ".+") -> list[Path]:
     """Temporary files of unfinished writes."""
-    pattern = re.compile(rf"\.{name}\.\d+\.tmp")
+    pattern = re.compile(rf"\.mechdesign\.{name}\.\d+\.tmp")
     try:
         return [path for path in directory.iterdir() if pattern.fullmatch(path.name)]
     except OSError:

@@ -14,7 +14,7 @@ from mechdesign.commands import QUESTIONS
 from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
 from mechdesign.files import formats_of, owned
 from mechdesign.report import writer
-from mechdesign.report.manifest import Extras, check_folder
+from mechdesign.report.manifest import Extras, check_folder, read_by
 from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import Verdict, requirements
 from mechdesign.results import Result
@@ -149,7 +149,7 @@ class Answer(Result):
             raise StudyError("plots=False and animate=True or formats contradict each other")
         output = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
         folder = Path(directory)
-        check_folder(folder, self.study, self.command, output)
+        check_folder(folder, self.command, output, read_by(self.study))
         with owned(folder):
             undrawn = writer.write(folder, self.study, self, self.verdicts, output)
         for warning in undrawn:

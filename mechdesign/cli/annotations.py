@@ -22,11 +22,11 @@ def annotate(level: str, problems: Iterable[Problem]) -> None:
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     for problem in problems:
-        # The name of a study given as a text is in brackets, that of an option begins with a dash.
-        file = "" if problem.file.startswith(("<", "-")) else problem.file
+        # An option, or the name in brackets of a study given as a text, is no file.
+        file = problem.file if os.path.exists(problem.file) else ""
         place = {"file": _in_repository(file), "line": problem.line or "", "col": problem.column or ""}
         where = ",".join(f"{name}={str(value).translate(_PROPERTY)}" for name, value in place.items() if value)
-        option = problem.file if problem.file.startswith("-") else ""
+        option = problem.file if problem.file.startswith("--") and not file else ""
         message = ": ".join(filter(None, (option, problem.key, problem.message)))
         terminal.say(f"::{level}{' ' * bool(where)}{where}::{message.translate(_DATA)}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -17,7 +18,7 @@ from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
-from mechdesign.errors import EXIT_CODES, Interrupted
+from mechdesign.errors import EXIT_CODES, Interrupted, StudyError
 
 # Typer brings its own Click, or is built on the one that is installed.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
@@ -46,6 +47,8 @@ class _Group(TyperGroup):
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         # Without arguments there is the help.
         with _usage() if args else nullcontext():
+            if "" in args:
+                raise typer.BadParameter("an argument is empty, as of a variable of the shell that is not set")
             return super().make_context(info_name, args, parent, **extra)
 
     def invoke(self, ctx: Any) -> Any:
@@ -70,6 +73,10 @@ app = typer.Typer(
 def _guard() -> Iterator[None]:
     """Turn an exception into a message on stderr and an exit code, without a traceback."""
     try:
+        try:
+            os.getcwd()
+        except OSError as error:
+            raise StudyError(f"the working folder is not there any more ({error.strerror}); change into one") from None
         yield
     except KeyboardInterrupt:
         print("interrupted; what was finished is whole", file=sys.stderr)

@@ -15,10 +15,13 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mechdesign.cautions import Caution, fails
 from mechdesign.cli import places, terminal
+from mechdesign.cli.annotations import annotate, of_warnings
 from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, name_of
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
+    HERE,
     Outcome,
     answer,
     drawing_ahead,
@@ -88,8 +91,10 @@ def source_of(path: Path | None, options: Options) -> Source:
     Raises
     ------
     StudyError
-        Also if it is a folder or pattern without studies.
+        Also if it is a folder or pattern without studies, or no study is named and none is here.
     """
+    if path is None and not HERE.exists():
+        raise StudyError(f"no study is named, and there is no {HERE} here")
     if path is not None and (path.is_dir() or (glob.has_magic(str(path)) and not path.exists())):
         raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
     return source(path, options)
@@ -119,6 +124,7 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
 def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str]) -> list[Task]:
     """Read and check the studies; only their texts are kept."""
     tasks: list[Task] = []
+    inputs: list[Path] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
         interrupts.check()
@@ -133,15 +139,26 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             if own != options:
                 study = load_source(origin, own)
             folders = _places(only or questions(study), root, own)
-            places.check_reports(root, own)
-            for command, directory in folders:
-                places.check(study, command, directory, own)
+            inputs += manifest.read_by(study)
             tasks.append(Task(number, origin, label, root, folders, own))
         except Exception as error:
             record.missing(number, failure(label, "check", Path(), error, study))
             if record.stopped:
-                break
-    return tasks
+                return tasks
+    record.check(inputs)
+    return [task for task in tasks if not record.stopped and _free(task, inputs, record)]
+
+
+def _free(task: Task, inputs: Sequence[Path], record: BatchRecord) -> bool:
+    """Whether a study's results replace no files of others, and none that one of the studies reads."""
+    try:
+        places.check_reports(task.root, task.options, inputs)
+        for command, directory in task.questions:
+            places.check(command, directory, task.options, inputs)
+    except Exception as error:
+        record.missing(task.number, failure(task.label, "check", Path(), error))
+        return False
+    return True
 
 
 def _as_in_shards(label: str, root: Path, options: Options) -> Options:
@@ -292,7 +309,7 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
             outcomes.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
-            ended = replace(ended, entry=_page(study, task, outcomes, several=several))
+            ended = replace(ended, entry=_page(study, task, outcomes, several=several), exit_code=_stale(study, task))
         except Exception as error:
             code, message = explained(error)
             terminal.say(f"{study.label}: report: {message}")
@@ -310,6 +327,19 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     except Exception as error:
         return failure(study.label, command, directory, error, study)
     return replace(outcome, table=None)
+
+
+def _stale(study: Study, task: Task) -> int:
+    """Tell of results of questions that the study no longer asks; the exit code, 1 where the study bars them."""
+    code, asked = 0, questions(study)
+    for path in sorted(task.root.glob(f"*/{manifest.NAME}")) if os.path.isdir(task.root) else ():
+        if manifest.is_stale(path.parent, study, asked):
+            caution = Caution("stale", f"{path.parent} answers a question that the study does not ask; remove it")
+            barred = fails(caution, study.barred)
+            terminal.say(f"{study.label}: warning: {caution} [{caution.kind}]", quiet=task.options.quiet and not barred)
+            annotate("error" if barred else "warning", of_warnings(study, path.parent.name, [caution]))
+            code = max(code, int(barred))
+    return code
 
 
 def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:

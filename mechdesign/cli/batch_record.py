@@ -16,9 +16,9 @@ from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
-from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
+from mechdesign.cli.places import RESULTS, SUMMARY
 from mechdesign.errors import Interrupted, MechdesignError, counted, printable
-from mechdesign.files import check_marked
+from mechdesign.records import check_replaceable
 from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
@@ -29,7 +29,6 @@ from mechdesign.work.pool import LostWorkerError
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
-_HEADER = to_csv(summary.summary(())).encode()  # first line of every summary
 _LOST = "run"  # in place of the commands of a study whose process was killed
 _LEFT = "the run ended before it"
 _KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
@@ -75,7 +74,7 @@ class BatchRecord:
         self.stopped = False  # no further question is started
         self._studies = studies
         self._root = options.out or RESULTS
-        self._check()
+        self.check(())
         self._outcomes: list[list[Outcome]] = [[] for _ in studies]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
@@ -85,14 +84,12 @@ class BatchRecord:
         self._left = len(studies)  # studies without an answer
         self._exit_code = 0
 
-    def _check(self) -> None:
-        """Check before the first study is answered that the summary, JUnit and index files replace no others."""
+    def check(self, read: Sequence[Path]) -> None:
+        """Check that the summary, JUnit and index files replace no others, and none that is `read`."""
         if self.options.junit is not None:
-            check_marked(self.options.junit, summary.mark(self.options.junit))
-        if self.several:
-            check_marked(self._root / SUMMARY, _HEADER)
-            if self.options.report:
-                check_marked(self._root / pages.INDEX, PAGE)
+            check_replaceable(self.options.junit, read)
+        for name in [SUMMARY, *[pages.INDEX] * bool(self.options.report)] * self.several:
+            check_replaceable(self._root / name, read)
 
     def missing(self, number: int, outcome: Outcome) -> None:
         """Record a study that could not be read, or whose process was killed."""
@@ -164,15 +161,15 @@ class BatchRecord:
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
-            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.mark(options.junit))
+            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode())
         table = summary.summary(outcomes)
         if self.several and any(outcome.written for outcome in outcomes):
-            self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)
+            self._file(self._root / SUMMARY, to_csv(table).encode())
         terminal.show(table, as_json=options.json)
         first = self._first_to_open()
         if any(entry.link for entry in self._entries.values()):
             path = self._root / pages.INDEX
-            if self._file(path, self._index(), PAGE):
+            if self._file(path, self._index()):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
                 first = path
         failures = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
@@ -215,10 +212,10 @@ class BatchRecord:
             label = name_of(path) if task is None else task.label
             yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
 
-    def _file(self, path: Path, data: bytes, mark: bytes) -> bool:
+    def _file(self, path: Path, data: bytes) -> bool:
         """Write a file about all studies; False, after a message, if that fails."""
         try:
-            write_file(path, data, mark)
+            write_file(path, data)
         except MechdesignError as error:
             terminal.say(str(error))
             self._exit_code = max(self._exit_code, explained(error)[0])

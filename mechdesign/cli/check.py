@@ -23,7 +23,7 @@ from mechdesign.questions.dynamics.question import weighed_beams
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import foresee, on_warnings
-from mechdesign.report.writer import write_sketch
+from mechdesign.report.writer import check_sketch, write_sketch
 from mechdesign.study import Study
 from mechdesign.work.threads import one_thread
 
@@ -38,6 +38,10 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
         try:
             study = load_source(source_of(path, options), options)
             label = study.label
+            if not options.no_plots:
+                claim(owners, study)
+                directory, output = folder(study, "check", options, several=len(files) > 1), extras("check", options)
+                check_sketch(directory, study, output)
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
@@ -54,10 +58,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                     worst = max(worst, 1)
             _foresee(study)
             if not options.no_plots:
-                claim(owners, study)
-                directory = folder(study, "check", options, several=len(files) > 1)
-                sentence = write_sketch(directory, study, extras("check", options))
-                terminal.say(f"{label}: {sentence}", quiet=options.quiet)
+                terminal.say(f"{label}: {write_sketch(directory, study, output)}", quiet=options.quiet)
                 if len(files) == 1:
                     terminal.suggest(directory / f"{MECHANISM}.{options.kinds.split(',')[0]}", quiet=options.quiet)
         except Exception as error:

@@ -12,15 +12,19 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cli import terminal
+from mechdesign.cli.execution import exit_code
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit_text, mark
+from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
-from mechdesign.files import FORMATS, check_marked, check_writable, marked
+from mechdesign.files import FORMATS, check_writable, digest
+from mechdesign.records import check_replaceable, remove_recorded
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
+from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import to_csv
+from mechdesign.results import Result
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
@@ -30,9 +34,8 @@ HELP_PAGE = "howto/batch"
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
-_HEADER = to_csv(Comparison().table).encode()
 # Changes that are printed as messages, not in the table.
-_SAID = ("verdict", "outcome")
+_SAID = ("verdict", "outcome", "stale")
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
 
@@ -63,11 +66,11 @@ def compare(
     default = Tolerance(rtol, atol)
     chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if junit is not None:
-        check_marked(junit, mark(junit))
+        check_replaceable(junit)
     if out is not None:
         check_writable(out)
-        check_marked(out / _TABLE, _HEADER)
-        check_marked(out / _PICTURE, writer.CREATOR.encode())
+        check_replaceable(out / _TABLE)
+        check_replaceable(out / _PICTURE)
     comparison = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, comparison)
@@ -79,7 +82,9 @@ def compare(
 
 @one_thread()
 def verify(studies: Sequence[Path] | None, options: Options) -> int:
-    """Repeat the computations of manifests and compare the tables; returns 1 if one differs, else 0.
+    """Repeat the computations of manifests, compare the tables and judge them; the exit code is 1 if one differs.
+
+    It is that of the run as well, where a requirement is not met or a pose cannot be assembled.
 
     Raises
     ------
@@ -97,22 +102,30 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--json, --quiet and --allow-files"
         )
     if options.junit is not None:
-        check_marked(options.junit, mark(options.junit))
+        check_replaceable(options.junit)
     root = path.parent if path.name == manifest.NAME else path
     recorded = folders.results(path)
     if not recorded:
         raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
-    total = Comparison()
+    total, code = Comparison(), 0
     for folder, content in recorded.items():
         with tempfile.TemporaryDirectory() as there:
             terminal.say(f"{root / folder}: {content.get('command')} again", quiet=options.quiet)
-            _repeat(Path(there), root / folder / manifest.NAME, content, options)
+            result, verdicts = _repeat(Path(there), root / folder / manifest.NAME, content, options)
+            for verdict in verdicts:
+                terminal.say(f"{root / folder}: requirement: {verdict}", quiet=options.quiet and verdict.met)
+            unmet = [verdict for verdict in verdicts if not verdict.met]
+            total.differences += [Difference(folder, "", verdict.requirement, "not met") for verdict in unmet]
+            code = max(code, exit_code(result.failed, verdicts, result.main))
             _verify(total, folder, root / folder, content, Path(there))
-    return _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet)
+    total.differences += folders.stale(recorded)
+    return max(code, _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet))
 
 
-def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
-    """Repeat the computation that a manifest describes and write its tables."""
+def _repeat(
+    there: Path, where: Path, content: dict[str, Any], options: Options
+) -> tuple[Result, Sequence[Verdict]]:  # fmt: skip
+    """Repeat the computation that a manifest describes, write its tables and judge them."""
     command = content.get("command")
     if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
@@ -122,6 +135,7 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
         inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
         about = content["study"]
         study = load_data(about["resolved"], (), content["seed"], inputs, about.get("drawn"))
+        study = dataclasses.replace(study, strict=content.get("strict", False))
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:
@@ -130,7 +144,9 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     with terminal.Bar(quiet=options.quiet) as bar:
         result = getattr(mechdesign, command)(study, jobs=options.jobs, progress=bar, **more)
     tables = Extras(plots=False, all_modes=bool(more))
-    writer.write(there, study, result, requirements.requirements(study, result), tables)
+    verdicts = requirements.requirements(study, result)
+    writer.write(there, study, result, verdicts, tables)
+    return result, verdicts
 
 
 def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
@@ -143,11 +159,11 @@ def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, 
     tables = {difference.table for difference in comparison.differences if difference.folder == folder}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
-        table, digest = name.removesuffix(".csv"), listed.get(name, "")
+        table = name.removesuffix(".csv")
         # Other texts and pictures also depend on the study's text, which the manifest does not contain.
         here_alone = (name in again) != (name in listed) and not name.endswith(drawn)
-        expected = again.get(name, "") if name in after["tables"] or here_alone else digest
-        digests = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
+        expected = again.get(name, "") if name in after["tables"] or here_alone else listed.get(name, "")
+        digests = {"in the manifest": listed.get(name, ""), "of the file": digest(kept / name)}
         wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in digests.items() if other != expected]
         if wrong and table not in tables:
             comparison.differences.append(
@@ -156,20 +172,16 @@ def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, 
 
 
 def _write(out: Path, comparison: Comparison) -> None:
-    creator = writer.CREATOR.encode()
-    writer.write_file(out / _TABLE, to_csv(comparison.table).encode(), _HEADER)
+    writer.write_file(out / _TABLE, to_csv(comparison.table).encode())
     if not comparison.moved:
         # Files of an older comparison are removed.
-        if marked(out / _PICTURE, creator):
-            (out / _PICTURE).unlink()
+        remove_recorded(out / _PICTURE)
         return
     from mechdesign.report.comparison.picture import differences_figure
     from mechdesign.report.figures import style
 
     with style.context():
-        writer.write_file(
-            out / _PICTURE, style.encoded(differences_figure(comparison.moved), "png", writer.CREATOR), creator
-        )
+        writer.write_file(out / _PICTURE, style.encoded(differences_figure(comparison.moved)))
 
 
 def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
@@ -187,7 +199,7 @@ def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: 
     else:
         terminal.show_lines([str(line) for line in comparison.differences if line.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(comparison, command).encode(), mark(junit))
+        writer.write_file(junit, _junit(comparison, command).encode())
     return 1 if comparison.differences else 0
 
 

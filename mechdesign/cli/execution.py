@@ -44,6 +44,7 @@ from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
+HERE = Path("study.yaml")  # the study where none is named
 PICTURES = "mechdesign.report.figures.pictures"  # with it all of Matplotlib that pictures need is imported
 _ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 OUTCOMES = {
@@ -99,9 +100,8 @@ def source(path: Path | None, options: Options) -> Source:
         If it cannot be read.
     """
     if path is None:
-        here = Path("study.yaml")
-        path = here if here.exists() else template_path()
-        label = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        path = HERE if HERE.exists() else template_path()
+        label = str(HERE) if HERE.exists() else f"the built-in two-link arm (no {HERE} here)"
         terminal.say(f"study: {label}", quiet=options.quiet)
     if path == STANDARD_INPUT:
         return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
@@ -133,7 +133,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
-    places.check(study, command, directory, options)
+    places.check(command, directory, options, manifest.read_by(study))
     if options.part is not None:
         return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
@@ -141,9 +141,9 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     before = under = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
-        manifest.check_folder(directory, study, command, output, before)
+        manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
-    share, merging = None, options.command == MERGE and command in DIVIDED
+    share, merging = None, options.command == MERGE
     if merging and shards.files_in(directory):
         share = shards.merge(directory, manifest.computed_from(study, command))
     elif (options.resume or merging) and (kept := _finished(study, command, directory, output)) is not None:
@@ -185,7 +185,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         journal.discard()
     shards.remove(directory)
     warnings = _placed(study, [*study.cautions, *result.warnings, *undrawn])
-    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
+    code, seconds = exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, table=result.main, reached=result.reached,
@@ -195,14 +195,16 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
 def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
     """Compute one shard of a command and keep it for `merge`; what is not divided is left to `merge`."""
     sentence, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
-    if command not in DIVIDED:
-        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
         return Outcome(study.label, command, directory, 0, 0, kept=True, shard=sentence)
     if is_long(study, command):
         requirements.foresee(study, [command])
     taken = shards.Taken(shard)
+    if command not in DIVIDED:
+        # By this merge knows that it is asked.
+        taken.write(directory, origin, options.command)
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
     try:
         with progress, divided(taken):
             getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
@@ -250,7 +252,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
         return None
     verdicts = [*judged, *on_warnings(study, warnings[len(study.warnings) :])]
     settle(directory)
-    code = _exit_code(failed, verdicts, table)
+    code = exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
         written=True, table=table,
@@ -263,7 +265,7 @@ def _placed(study: Study, warnings: Sequence[Caution]) -> list[Caution]:
     return [dataclasses.replace(warning, message=str(places.get(warning, warning))) for warning in warnings]
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+def exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
     cases = (int(part["exit_code"].max(initial=0)) for part in (table.blocks() if "exit_code" in table else ()))
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
@@ -357,12 +359,12 @@ def write_report(
     answers += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots), places.PAGE)
+    writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots))
     printed = ""
     if options.report == PDF:
         from mechdesign.report.page import printing
 
-        writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
+        writer.write_file(directory / pages.PRINTED, printing.pdf(path))
         printed = f", printed in {directory / pages.PRINTED}"
     terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
     return [number for answer in answers if answer.section is not None for number in answer.section["headlines"]]

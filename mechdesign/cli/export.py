@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from mechdesign.cli import terminal
@@ -10,11 +9,13 @@ from mechdesign.cli.annotations import annotate, of_warnings
 from mechdesign.cli.execution import load_study
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import RESULTS
-from mechdesign.errors import OutputError
 from mechdesign.exporting.exports import export_named
 from mechdesign.exporting.view import View
-from mechdesign.files import check_marked, replace
+from mechdesign.files import check_writable
+from mechdesign.records import check_replaceable
+from mechdesign.report.manifest import read_by
 from mechdesign.report.requirements import on_warnings
+from mechdesign.report.writer import write_file
 from mechdesign.work.threads import one_thread
 
 
@@ -23,6 +24,11 @@ def export(path: Path | None, to: str, said: tuple[str | None, str | None, str |
     """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `View`."""
     declared = export_named(to)
     study = load_study(path, options)
+    target = options.out or RESULTS / study.label / "export"
+    if options.out is None or target.is_dir() or target.suffix != Path(to).suffix:
+        target /= to
+    check_writable(target.parent)
+    check_replaceable(target, read_by(study))
     view = View(study, *said)
     content = declared.make(view)
     warnings = content.warnings + declared.ignored(view)
@@ -33,14 +39,6 @@ def export(path: Path | None, to: str, said: tuple[str | None, str | None, str |
     for verdict in unmet:
         terminal.say(f"{study.label}: requirement: {verdict}")
     data = content.data.encode() if isinstance(content.data, str) else content.data
-    target = options.out or RESULTS / study.label / "export"
-    if options.out is None or target.is_dir() or target.suffix != Path(to).suffix:
-        target /= to
-    try:
-        os.makedirs(target.parent, exist_ok=True)
-        check_marked(target, declared.mark)
-        replace(target, [data])
-    except OSError as error:
-        raise OutputError(f"{target}: {error.strerror or error}") from None
+    write_file(target, data)
     terminal.say(f"{study.label}: {target}", quiet=options.quiet)
     return 1 if unmet else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,7 +24,7 @@ def import_study(
     OutputError
         If it cannot be written.
     """
-    if out is not None and out.exists():
+    if out is not None and os.path.lexists(out):
         raise StudyError(f"{out} is there already; give --out another name")
     text = convert(source, drives=drives, unit=unit, scale=scale)
     if out is None:

@@ -27,7 +27,6 @@ STYLES = ("screen", "paper")
 RELATIVE = 1e-9
 # Options that fill fields of other names.
 _FIELDS = {"--set": "overrides", "--format": "formats"}
-_LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
 def _studies(incomplete: str) -> list[str]:
@@ -56,8 +55,7 @@ def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
 
 
 def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
-    text = f"{meaning} {_LEFT_OUT}"
-    argument = typer.Argument(metavar=metavar, help=text, show_default=False, autocompletion=_studies)
+    argument = typer.Argument(metavar=metavar, help=meaning, show_default=False, autocompletion=_studies)
     return _parameter("study", kind | None, None, argument)
 
 
@@ -93,9 +91,15 @@ def _out(meaning: str) -> Parameter:
     return _text(Path, "--out", "DIR", meaning)
 
 
-STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
+STUDY = _study(
+    Path,
+    "STUDY",
+    "The study file; - is standard input. Left out: study.yaml here, or else the built-in two-link arm.",
+)
 STUDIES = _study(
-    list[Path], "STUDY...", "The study files, folders of them (*.yaml, *.yml) or patterns; - is standard input."
+    list[Path],
+    "STUDY...",
+    "The study files, folders of them (*.yaml, *.yml) or patterns; - is standard input. Left out: study.yaml here.",
 )
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
 OUT_ALL = _out(

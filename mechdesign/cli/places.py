@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli.options import PDF, STYLES, Options
-from mechdesign.commands import SWEEP
+from mechdesign.commands import MERGE, SWEEP
 from mechdesign.errors import StudyError
-from mechdesign.files import check_marked
+from mechdesign.records import check_replaceable
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.study import Study
 from mechdesign.work import shards
-from mechdesign.work.journal import MARK, NAME
+from mechdesign.work.journal import NAME
 
-PAGE = pages.GENERATOR.encode()  # mark of our reports
 RESULTS = Path("results")  # default folder
 # Names of files about several studies, beside their folders.
 SUMMARY = "summary.csv"
@@ -59,8 +59,8 @@ def extras(command: str, options: Options) -> Extras:
     return Extras(not options.no_plots, options.kinds, animate, options.all_modes, bool(options.report), look)
 
 
-def check(study: Study, command: str, directory: Path, options: Options) -> None:
-    """Check before a computation that its files replace no others, and none that the study reads.
+def check(command: str, directory: Path, options: Options, read: Sequence[Path]) -> None:
+    """Check before a computation that its files replace no others, and none that is `read`.
 
     Raises
     ------
@@ -70,18 +70,19 @@ def check(study: Study, command: str, directory: Path, options: Options) -> None
         If the folder takes no files.
     """
     if options.part is not None:
-        check_marked(directory / shards.FILE, shards.MARK)
+        check_replaceable(directory / shards.FILE, read, whole=False)
         return
-    manifest.check_folder(directory, study, command, extras(command, options))
-    for part in shards.files_in(directory) if os.path.isdir(directory) else ():
-        check_marked(part, shards.MARK)
+    manifest.check_folder(directory, command, extras(command, options), read)
+    # A merge removes those that it has read.
+    for part in shards.files_in(directory) if os.path.isdir(directory) and options.command != MERGE else ():
+        check_replaceable(part, read, whole=False)
     if command in RESUMED:
-        check_marked(directory / NAME, MARK)
-    check_reports(directory, options)
+        check_replaceable(directory / NAME, read)
+    check_reports(directory, options, read)
 
 
-def check_reports(directory: Path, options: Options) -> None:
-    """Check that the reports that are asked replace no other files.
+def check_reports(directory: Path, options: Options, read: Sequence[Path]) -> None:
+    """Check that the reports that are asked replace no other files, and none that is `read`.
 
     Raises
     ------
@@ -89,4 +90,4 @@ def check_reports(directory: Path, options: Options) -> None:
         If they would; it names the file.
     """
     for name in [pages.REPORT] * bool(options.report) + [pages.PRINTED] * (options.report == PDF):
-        check_marked(directory / name, PAGE)
+        check_replaceable(directory / name, read)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import signal
 import sys
@@ -21,6 +22,8 @@ def run(command: Callable[[], Any]) -> None:
     Not in a library's process: signals and streams become the command's.
     """
     output = _open_streams()
+    # What it says of its cache and its fonts concerns no study.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     signals = Signals()
     code: Any = 0
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli.execution import Outcome
@@ -17,12 +16,6 @@ if TYPE_CHECKING:
     from junitparser import JUnitXml
 
 _SKIPPED = re.compile(r'(?<=") skipped="\d+"')
-_MARK = b'<testsuites name="mechdesign"'  # beginning of our JUnit files
-
-
-def mark(path: Path) -> bytes:
-    """Mark of files that a JUnit file may replace: older JUnit files of ours; any file if it is named ``*.xml``."""
-    return b"" if path.suffix == ".xml" else _MARK
 
 
 def in_brief(outcome: Outcome) -> str:

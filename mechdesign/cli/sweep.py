@@ -12,10 +12,10 @@ from typing import Any
 from mechdesign.cli.batch_record import failure, name_of
 from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit, mark
+from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError
 from mechdesign.experiments.schema.matrix import RANGE
-from mechdesign.files import check_marked
+from mechdesign.records import check_replaceable
 from mechdesign.report.writer import write_file
 from mechdesign.study.text.document import in_yaml, read
 
@@ -90,7 +90,7 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
     outcome, label = None, name_of(path)
     if options.junit is not None:
-        check_marked(options.junit, mark(options.junit))
+        check_replaceable(options.junit)
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         outcome = ask("sweep", path, replace(options, overrides=changes))
@@ -105,4 +105,4 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         return outcome.exit_code
     finally:
         if options.junit is not None and outcome is not None:
-            write_file(options.junit, junit([outcome]).encode(), mark(options.junit))
+            write_file(options.junit, junit([outcome]).encode())

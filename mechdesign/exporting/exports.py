@@ -37,8 +37,6 @@ class Export:
         What it holds, in a few words.
     order : int
         Its place in the list of what can be exported.
-    mark : bytes
-        What every file of the kind contains: only such a file is written over.
     make : callable
         Makes the content from a study and a pose.
     options : tuple of str
@@ -48,7 +46,6 @@ class Export:
     name: str
     meaning: str
     order: int
-    mark: bytes
     make: Callable[[View], Content]
     options: tuple[str, ...] = ()
 
@@ -61,10 +58,10 @@ class Export:
 
 
 def export(
-    name: str, meaning: str, order: int = 100, mark: bytes = b"mechdesign", options: tuple[str, ...] = ()
-) -> Callable[[Callable[[View], Content]], Export]:  # fmt: skip
+    name: str, meaning: str, order: int = 100, options: tuple[str, ...] = ()
+) -> Callable[[Callable[[View], Content]], Export]:
     """Declare that a function makes the file of this name from a view; see `Export` for the arguments."""
-    return lambda make: Export(name, meaning, order, mark, make, options)
+    return lambda make: Export(name, meaning, order, make, options)
 
 
 def drawings(

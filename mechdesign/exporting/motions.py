@@ -39,7 +39,7 @@ ROUNDING = 1e-9
 ORDERS = ("velocity", "acceleration")
 
 
-@export("curve.csv", "places of points and outputs, closely along the motion", order=60, mark=b"part,")
+@export("curve.csv", "places of points and outputs, closely along the motion", order=60)
 def curve_csv(view: View) -> Content:
     """A row a pose: the part of the motion, what the poses give, and outputs and coupler points."""
     study, mechanism, track = view.study, view.mechanism, view.track
@@ -61,7 +61,7 @@ def curve_csv(view: View) -> Content:
     return Content(to_csv(Table("curve", tuple(columns))), view.unmoved)
 
 
-@export("motion.csv", "drives over time at the rate of a controller", order=61, mark=b"time,", options=("rate",))
+@export("motion.csv", "drives over time at the rate of a controller", order=61, options=("rate",))
 def motion_csv(view: View) -> Content:
     """A row an instant: time, and position, velocity and acceleration of each drive."""
     step = step_of(view.rate or RATE, view.study.units)
@@ -80,6 +80,11 @@ def motion_csv(view: View) -> Content:
     return Content(to_csv(table))
 
 
+# A rate with the prefix of its unit.
+_RATE = re.compile(r"((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*([kKmMG]?)[hH][zZ]")
+_PREFIXES = {"": 1.0, "k": 1e3, "K": 1e3, "m": 1e-3, "M": 1e6, "G": 1e9}
+
+
 def step_of(text: str, units: Units) -> float:
     """Step of time in the study's unit, of a rate such as ``1 kHz`` or a step such as ``2 ms``.
 
@@ -88,10 +93,10 @@ def step_of(text: str, units: Units) -> float:
     StudyError
         If the text is neither, or not positive.
     """
-    rate = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(k?)hz\s*", text, re.IGNORECASE)
+    rate = _RATE.fullmatch(text.strip())
     try:
-        if rate is not None and float(rate[1]) > 0:
-            return units.convert(f"{1.0 / float(rate[1])!r} {'ms' if rate[2] else 's'}", "time")
+        if rate is not None and (hertz := float(rate[1]) * _PREFIXES[rate[2]]) > 0:
+            return units.convert(f"{1.0 / hertz!r} s", "time")
         step = units.convert(text, "time")
     except QuantityError:
         step = 0.0

@@ -31,7 +31,7 @@ MOST_NAMED = 3
 HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 
-@export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20, mark=b"item,kind,")
+@export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20)
 def layers_csv(view: View) -> Content:
     """A row for each plate, rod and pin: its layers, and where it begins and ends above the lowest layer.
 

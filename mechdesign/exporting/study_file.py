@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from typing import Any
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import View
 
+_NOT_IN_YAML = re.compile(r"[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
-@export(
-    "study.json", "the study with its overrides, for programs; mechdesign reads it too", order=70, mark=b'"mechanism"'
-)
+
+@export("study.json", "the study with its overrides, for programs; mechdesign reads it too", order=70)
 def study_json(view: View) -> Content:
     """The study as plain data, and a warning that names the files it needs."""
     study = view.study
@@ -20,10 +22,12 @@ def study_json(view: View) -> Content:
     if study.drawn is not None and study.mechanism.sketch_configuration.valid:
         # With overrides the assembly is that of the study without them: draw it, or the sketch may show another.
         data["mechanism"] = {**data["mechanism"], "sketch": _drawn(view)}
-    files = list(dict.fromkeys(str(path.relative_to(study.folder.path)) for _, path, _ in study.inputs()))
+    files = list(dict.fromkeys(os.path.relpath(path, study.folder.path) for _, path, _ in study.inputs()))
     named = f"it names files that are not in it ({', '.join(files)}): keep them beside it"
-    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    return Content(text, (Caution("incomplete", named),) * bool(files))
+    # Characters that YAML has no place for, or that end its lines, are written as escapes.
+    text = json.dumps(data, indent=2, ensure_ascii=False)
+    text = _NOT_IN_YAML.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return Content(text + "\n", (Caution("incomplete", named),) * bool(files))
 
 
 def _drawn(view: View) -> dict[str, list[float]]:

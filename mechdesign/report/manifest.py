@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from mechdesign.errors import StudyError
-from mechdesign.files import check_own, check_writable, file_names, proper, unsettled
+from mechdesign.files import check_own, check_writable, digest, file_names, proper, unsettled
 from mechdesign.report.names import names
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
@@ -29,6 +29,7 @@ HELP_PAGE = "howto/report"
 NAME = "manifest.json"
 _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"
+_OWN = "sha256"  # of the manifest itself
 _MOST_BYTES = 100_000_000  # of a manifest; a larger one might not fit into memory
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "moocore")
 
@@ -112,6 +113,7 @@ class _Manifest(BaseModel):
     warnings: list[_Warning]
     failed: str
     interrupted: str = ""
+    strict: bool = False
     requirements: list[_Verdict]
     tables: dict[_Name, _Table]
     files: dict[_Name, _Sha256]
@@ -209,6 +211,7 @@ def compose(
             "warnings": [warning.as_data() for warning in (*study.cautions, *result.warnings)],
             "failed": result.failed,
             **({"interrupted": result.interrupted} if result.interrupted else {}),
+            **({"strict": True} if study.strict else {}),
             "requirements": [plain(asdict(verdict)) for verdict in verdicts],
             "tables": {
                 f"{table.name}.csv": {
@@ -224,7 +227,13 @@ def compose(
             "files": dict(files),
         }
     )
-    return (json_text(content, indent=2) + "\n").encode()
+    return (json_text(content | {_OWN: _own_digest(content)}, indent=2) + "\n").encode()
+
+
+def _own_digest(content: Mapping[str, Any]) -> str:
+    """SHA-256 of a manifest without that of its own."""
+    text = json_text({key: value for key, value in content.items() if key != _OWN})
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read(directory: Path) -> dict[str, Any] | None:
@@ -253,13 +262,19 @@ def own(directory: Path) -> set[str]:
     return unsettled(directory).union(listed, [NAME] if listed else [])
 
 
-def check_folder(directory: Path, study: Study, command: str, output: Extras, before: Study | None = None) -> None:
+def read_by(*studies: Study) -> list[Path]:
+    """The files that studies read: themselves, and those that they name."""
+    named = [file for study in studies for _, file, _ in study.inputs()]
+    return named + [study.path for study in studies if study.path is not None]
+
+
+def check_folder(directory: Path, command: str, output: Extras, read: Iterable[Path]) -> None:
     """Check before a long computation that its results can be written into a folder; creates nothing.
 
     Raises
     ------
     StudyError
-        If they would replace a file that no manifest there lists, or that a study reads.
+        If they would replace a file that no manifest there lists, or one that is `read`.
     OutputError
         If the folder takes no files.
     """
@@ -268,10 +283,16 @@ def check_folder(directory: Path, study: Study, command: str, output: Extras, be
     # Pictures are named only where one of them may replace a file of others: that imports Matplotlib.
     others = output.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
     written = [NAME, *names(command, output.formats if others else "", animate=output.animate)]
-    studies = [study] if before is None else [study, before]
-    read = [file for read_study in studies for _, file, _ in read_study.inputs()]
-    read += [read_study.path for read_study in studies if read_study.path is not None]
     check_own(directory, [*written, pages.SECTION] if output.report else written, ours, read)
+
+
+def is_stale(directory: Path, study: Study, asked: Sequence[str]) -> bool:
+    """Whether a folder holds the answer to a question that is not asked, of another study or before a change of it."""
+    content = read(directory) or {}
+    command = content.get("command")
+    if not recorded_files(content) or not isinstance(command, str) or command in asked:
+        return False
+    return any(content.get(key) != value for key, value in computed_from(study, command).items())
 
 
 def is_current(directory: Path, study: Study, command: str, output: Extras) -> dict[str, Any] | None:
@@ -284,15 +305,9 @@ def is_current(directory: Path, study: Study, command: str, output: Extras) -> d
     without = [name for name in ("plots", "animate", "report") if not expected[name]]
     for name in (*without, *(("formats", "style") if not output.plots else ())):
         expected[name] = content.get(name)
-    if "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
+    # Verdicts and warnings of a manifest that was edited are no longer those of its tables.
+    if "interrupted" in content or content.get(_OWN) != _own_digest(content):
+        return None
+    if any(content.get(key) != value for key, value in expected.items()):
         return None
     return content if all(digest(directory / name) == sha256 for name, sha256 in content["files"].items()) else None
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file; empty where it cannot be read."""
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
-        return ""

@@ -6,13 +6,15 @@ import dataclasses
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, explain
-from mechdesign.files import Transaction, check_marked, check_writable, flowing, replace
+from mechdesign.files import Transaction, check_writable, flowing
 from mechdesign.progress import NULL, Progress
+from mechdesign.records import check_replaceable, write_recorded
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.names import ANIMATION, MECHANISM
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
 HELP_PAGE = "howto/report"
 
 DIMENSIONS = "dimensions"  # of `check`
-CREATOR = "mechdesign"  # mark of drawings that no manifest lists
 _GIGABYTE = 1e9  # bytes
 _UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")
 # Ending of the names of pictures as HTML.
@@ -125,8 +126,8 @@ def _check_room(directory: Path, result: Result) -> None:
         )
 
 
-def write_file(path: Path, data: bytes, mark: bytes = b"") -> None:
-    """Write one file whole or not at all, in place of none or one with a mark; a device or a pipe gets the bytes.
+def write_file(path: Path, data: bytes) -> None:
+    """Write one file whole or not at all, in place of none or one of ours; a device or a pipe gets the bytes.
 
     Raises
     ------
@@ -136,14 +137,25 @@ def write_file(path: Path, data: bytes, mark: bytes = b"") -> None:
         If it cannot be written.
     """
     try:
-        check_marked(path, mark)
-        path.parent.mkdir(parents=True, exist_ok=True)
         if flowing(path):
             path.write_bytes(data)
         else:
-            replace(path, [data])
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_recorded(path, data)
     except OSError as error:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
+
+
+def check_sketch(directory: Path, study: Study, output: Extras) -> None:
+    """Check that the drawings of a sketch replace no files in a directory but ours, and none that the study reads.
+
+    Raises
+    ------
+    StudyError
+        If they would.
+    """
+    for name, kind in product((MECHANISM, DIMENSIONS), output.formats.split(",")):
+        check_replaceable(directory / f"{name}.{kind}", manifest.read_by(study))
 
 
 def write_sketch(directory: Path, study: Study, output: Extras) -> str:
@@ -160,9 +172,6 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
     from mechdesign.report.figures.mechanism import sketch_figure
 
     kinds, messages = output.formats.split(","), []
-    for name in (MECHANISM, DIMENSIONS):
-        for kind in kinds:
-            check_marked(directory / f"{name}.{kind}", CREATOR.encode())
     drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
                 (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
     for name, sentence, make in drawings:
@@ -170,12 +179,12 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
         try:
             with style.context(output.style):
                 figure = make(study)
-                drawn = {path: style.encoded(figure, path.suffix[1:], CREATOR) for path in paths}
+                drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
         except Exception as error:
             messages.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
             continue
         for path, data in drawn.items():
-            write_file(path, data, CREATOR.encode())
+            write_file(path, data)
         messages.append(f"{sentence} in {', '.join(map(str, paths))}")
     return "; ".join(messages)
 

@@ -20,11 +20,10 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mechdesign.errors import OutputError
-from mechdesign.files import replace
 from mechdesign.numerics.arrays import Floats
+from mechdesign.records import remove_recorded, write_recorded
 
 NAME = "unfinished.npz"
-MARK = b"origin.npy"  # by which it is known
 # Least seconds between two versions of the file, and the least ratio of this time to that of writing it.
 _INTERVAL = 30.0
 _MIN_RATIO = 20.0
@@ -114,7 +113,7 @@ class Journal:
         )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            replace(self.path, [stream.getvalue()])
+            write_recorded(self.path, stream.getvalue())
         except OSError as error:
             raise OutputError(f"{self.path}: could not be written: {error.strerror or error}") from error
         self._written = time.monotonic()
@@ -122,4 +121,4 @@ class Journal:
 
     def discard(self) -> None:
         """Remove the file: the computation is finished, or begins anew."""
-        self.path.unlink(missing_ok=True)
+        remove_recorded(self.path)

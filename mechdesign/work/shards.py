@@ -13,6 +13,7 @@ import pickle
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, is_dataclass
 from importlib import import_module
 from itertools import chain, islice
@@ -20,13 +21,12 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import OutputError, StudyError
-from mechdesign.files import replace
+from mechdesign.records import remove_recorded, write_recorded
 from mechdesign.work.chunks import Divided
 
 Compute = Callable[[Iterable[Any]], Iterator[Any]]
 
 FILE = "chunks"  # in a folder of its own
-MARK = b'"shard": ['  # by which it is known
 _SHARD = re.compile(r"([1-9]\d{0,5})/([1-9]\d{0,5})")
 # Types that a file may have besides dataclasses and named tuples of this package.
 _ARRAYS = {
@@ -120,7 +120,8 @@ class Taken:
             "sha256": hashlib.sha256(content).hexdigest(),
         }
         try:
-            replace(directory / FILE, [json.dumps(head, sort_keys=True).encode() + b"\n", content])
+            data = json.dumps(head, sort_keys=True).encode() + b"\n" + content
+            write_recorded(directory / FILE, data, whole=False)
         except OSError as error:
             raise OutputError(f"{directory}: the shard could not be written: {error.strerror or error}") from error
 
@@ -212,8 +213,11 @@ def missing(directory: Path) -> StudyError:
 def remove(directory: Path) -> None:
     """Remove the shards in a folder, once they are merged."""
     for path in files_in(directory):
-        path.unlink()
-        path.parent.rmdir()
+        remove_recorded(path)
+        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            # A folder with files of others stays.
+            path.parent.rmdir()
 
 
 def is_current(directory: Path, origin: Mapping[str, Any]) -> bool:

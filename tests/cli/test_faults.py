@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ import mechdesign
 from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, StudyError, explain
 from mechdesign.files import Transaction, owned
+from mechdesign.records import remove_recorded
 from mechdesign.report.writer import write_file
 from mechdesign.results import Column, Result, Table
 
@@ -360,7 +362,7 @@ def test_a_folder_is_of_one_process(here, analysis, invoke):
     arguments = ("run", "slider.yaml", "--no-plots", "--out", "out")
     pid = forked(lambda: invoke(*arguments))
     os.read(reader, 1)
-    (here / "out/kinematics/.t0.csv.99999999.tmp").write_text("half")
+    (here / "out/kinematics/.mechdesign.t0.csv.99999999.tmp").write_text("half")
     analysis(lambda study, **options: quick)
     done = invoke(*arguments)
     assert done.exit_code == 4
@@ -405,6 +407,23 @@ def test_no_file_is_put_in_place_of_a_device_or_a_link(tmp_path):
     with pytest.raises(StudyError, match="link: is a link"):
         write_file(tmp_path / "link", b"words")
     assert not (tmp_path / "file").exists()
+
+
+def test_processes_that_write_beside_one_another_know_all_of_their_files(tmp_path):
+    """Of two jobs with a JUnit file each in one folder none takes that of the other for a stranger's."""
+    names = [f"report_{k}.xml" for k in range(3)]
+
+    def write(name):
+        for _ in range(30):
+            write_file(tmp_path / name, name.encode())
+        remove_recorded(tmp_path / name)
+        write_file(tmp_path / name, name.encode())
+        os._exit(0)
+
+    for pid in [forked(partial(write, name)) for name in names]:
+        assert os.waitpid(pid, 0)[1] == 0
+    listed = json.loads((tmp_path / ".mechdesign.json").read_text())["files"]
+    assert listed == {name: [hashlib.sha256(name.encode()).hexdigest()] for name in names}
 
 
 @pytest.mark.parametrize(
@@ -487,6 +506,38 @@ def test_every_command_tells_github_with_paths_from_its_workspace(here, invoke, 
     lines = told("kinematics", "slider.yaml", "--set", "kinematics={poses: [{theta: 0}, {B.x: 900}]}")
     (line,) = [line for line in lines if line.startswith("::error")]
     assert line.startswith(f"{place}slider.yaml::pose B.x = 900 mm")
+
+
+def test_github_is_told_of_a_file_whatever_its_name(here, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    wrong = SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]")
+    for name in ("<odd>.yaml", "-odd.yaml", "--set x.yaml"):
+        (here / name).write_text(wrong)
+        lines = invoke("check", f"./{name}", "--no-plots").stderr.splitlines()
+        assert any(line.startswith(f"::error file={name},line=6,col=19::mechanism.links.crank") for line in lines), (
+            lines
+        )
+
+
+@pytest.mark.parametrize("arguments", [("run", "slider.yaml"), ("kinematics",), ("check", "slider.yaml")])
+def test_a_working_folder_that_was_removed_is_told(here, arguments):
+    (here / "gone").mkdir()
+    text = "import os, sys; os.chdir('gone'); os.rmdir('../gone'); import mechdesign.__main__"
+    command = [sys.executable, "-c", f"{text}; sys.argv = ['mechdesign', *{arguments!r}]; mechdesign.__main__.main()"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert done.stderr.startswith("the working folder is not there any more"), done.stderr
+
+
+@pytest.mark.parametrize("name", ["MPLCONFIGDIR", "HOME"])
+def test_matplotlib_says_nothing_of_its_cache(here, name):
+    nowhere = {"MPLCONFIGDIR": "", "XDG_CACHE_HOME": "", "XDG_CONFIG_HOME": "", name: "/proc/nowhere"}
+    environment = os.environ | {key: value for key, value in nowhere.items() if value}
+    for key in nowhere.keys() - {key for key, value in nowhere.items() if value}:
+        environment.pop(key, None)
+    command = [*COMMAND, "kinematics", "slider.yaml", "--out", "out"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "slider: kinematics: 3 rows in out\n")
 
 
 def test_inputs_of_one_name_are_told_apart(here, invoke):

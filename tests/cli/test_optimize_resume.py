@@ -88,7 +88,7 @@ def test_resumed_results_are_those_of_an_uninterrupted_run(study, invoke, interr
     finished = sum(calls)
     rows = (Path("again") / "designs.csv").read_text().splitlines()
     assert len(rows) == finished + 1
-    assert {path.name for path in Path("again").iterdir()} == {"designs.csv", "manifest.json", NAME}
+    assert {path.name for path in Path("again").iterdir()} == {".mechdesign.json", "designs.csv", "manifest.json", NAME}
     assert json.loads((Path("again") / "manifest.json").read_text())["interrupted"]
     # A second interrupt loses nothing of the first run.
     interrupt(0)

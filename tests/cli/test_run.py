@@ -127,6 +127,31 @@ def test_a_folder_without_studies_is_an_error_of_its_own(studies, invoke):
     assert JUnitXml.fromfile("report.xml").errors == 1
 
 
+@pytest.mark.parametrize("command", ["run", "merge", "check"])
+def test_a_gate_without_a_study_does_not_pass(folder, analysis, invoke, command):
+    """Where the file was renamed, or the variable with its name is not set."""
+    (folder / "slider.yaml").rename(folder / "renamed.yaml")
+    for arguments, words in (
+        ((), "no study is named, and there is no study.yaml here"),
+        (("",), "an argument is empty"),
+        (("renamed.yaml", "--set", ""), "an argument is empty"),
+        ((" ",), "No such file"),
+        (("*.yml",), "there are no studies"),
+    ):
+        done = invoke(command, *arguments, "--no-plots")
+        assert (done.exit_code, words in done.stderr) == (2, True), (arguments, done.stderr)
+        assert not (folder / "results").exists()
+    (folder / "renamed.yaml").rename(folder / "study.yaml")
+    done = invoke(command, "--no-plots")
+    assert done.exit_code == (2 if command == "merge" else 0), done.stderr
+    assert "study: study.yaml" in done.stderr
+
+
+def test_a_run_without_a_study_is_in_the_junit_file(folder, invoke):
+    assert invoke("run", "--junit", "report.xml", "--no-plots").exit_code == 2
+    assert JUnitXml.fromfile("report.xml").errors == 1
+
+
 def test_two_studies_of_one_name_do_not_overwrite_each_other(studies, invoke):
     (studies / "deep").mkdir()
     (studies / "deep/slider.yaml").write_text(SLIDER)

@@ -12,6 +12,8 @@ import mechdesign
 from mechdesign.work import shards
 from mechdesign.work.shards import FILE, Shard
 
+from .conftest import SLIDER, answer
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 # The second chunk of samples is not whole.
 ARM = ["--set", "reliability.samples=30000", "--set", "reliability.methods=[analytic, monte_carlo, form]"]
@@ -27,8 +29,8 @@ def studies(folder):
 
 
 def content(folder):
-    """Every file of a folder; what a summary says of the folder itself is that of any."""
-    found = {file.relative_to(folder): file.read_bytes() for file in Path(folder).rglob("*") if file.is_file()}
+    """Every file of a folder but its record; what a summary says of the folder itself is that of any."""
+    found = {file.relative_to(folder): file.read_bytes() for file in Path(folder).rglob("[!.]*") if file.is_file()}
     return {name: data.replace(str(folder).encode() + b"/", b"") for name, data in found.items()}
 
 
@@ -56,6 +58,48 @@ def test_four_shards_merged_are_one_run(studies, invoke):
     again = invoke("merge", *names, "--no-plots", "--out", "parts")
     assert again.exit_code == 0
     assert "they are whole" in again.stderr
+
+
+@pytest.mark.parametrize("made", ["nothing", "results", "shards elsewhere"])
+def test_without_shards_nothing_is_merged_and_nothing_computed(studies, invoke, analysis, made):
+    """Not even what no shard would have a part of: a job that looks in a wrong folder is not green."""
+    (studies / "plain.yaml").write_text(SLIDER)
+    if made == "results":
+        # Of another study, so that they are not those of a merge.
+        (studies / "plain.yaml").write_text(SLIDER + "# older\n")
+        assert invoke("run", "plain.yaml", "--no-plots", "--out", "parts").exit_code == 0
+        (studies / "plain.yaml").write_text(SLIDER)
+    elif made == "shards elsewhere":
+        for k in (1, 2):
+            assert invoke("run", "plain.yaml", "--no-plots", "--out", "other", "--shard", f"{k}/2").exit_code == 0
+
+    def fail(study, **options):
+        raise AssertionError("it was computed")
+
+    analysis(fail)
+    before = content("parts") if Path("parts").exists() else {}
+    done = invoke("merge", "plain.yaml", "--no-plots", "--out", "parts")
+    assert done.exit_code == 2
+    assert "parts/kinematics: there are no shards" in done.stderr
+    assert (content("parts") if Path("parts").exists() else {}) == before
+
+
+def test_what_is_not_divided_is_computed_once_by_the_merge_of_all_shards(studies, invoke, analysis):
+    (studies / "plain.yaml").write_text(SLIDER)
+    asked = ("plain.yaml", "--no-plots", "--out", "parts")
+    computed = []
+    analysis(lambda study, **options: computed.append(study) or answer())
+    assert invoke("run", *asked, "--shard", "1/2").exit_code == 0
+    done = invoke("merge", *asked)
+    assert (done.exit_code, "shards are missing: 2/2" in done.stderr, len(computed)) == (2, True, 0)
+    assert invoke("run", *asked, "--shard", "2/2").exit_code == 0
+    notes = Path("parts/kinematics/shard_1_of_2/notes.txt")
+    notes.write_text("of the user")
+    for _ in range(2):
+        assert invoke("merge", *asked).exit_code == 0
+    assert len(computed) == 1
+    assert [*Path("parts").rglob("shard_*")] == [notes.parent]
+    assert [*notes.parent.iterdir()] == [notes]
 
 
 @pytest.mark.nightly

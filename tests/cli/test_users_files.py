@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 import mechdesign
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import StudyError
+from mechdesign.exporting.exports import exports
 from mechdesign.reference.tables import tables
 from mechdesign.report.names import names
 
@@ -177,16 +179,150 @@ def test_own_files_are_replaced(folder, analysis, invoke, kind):
         done = invoke("compare", "one", "two", "--out", "drawn", "--junit", "junit.xml", "--quiet")
         assert done.exit_code == 1, done.stderr
     assert {path.name for path in (folder / "drawn").iterdir()} == {
+        ".mechdesign.json",
         f"mechanism.{kind}", f"dimensions.{kind}", "differences.csv", "differences.png"}  # fmt: skip
 
 
-def test_a_junit_file_replaces_its_like(folder, analysis, invoke):
+def test_a_junit_file_replaces_none_an_empty_one_or_its_own(folder, analysis, invoke):
     assert invoke("run", "slider.yaml", "--no-plots", "--junit", "/dev/null").exit_code == 0
     (folder / "empty").touch()
-    (folder / "other.xml").write_text("<testsuites/>")
-    for name in ("empty", "other.xml", "empty"):
+    for name in ("empty", "new.xml", "empty"):
         assert invoke("run", "slider.yaml", "--no-plots", "--junit", name).exit_code == 0
         assert "mechdesign" in (folder / name).read_text()
+    text = (folder / "new.xml").read_text() + "<!-- by hand -->"
+    (folder / "new.xml").write_text(text)
+    done = invoke("run", "slider.yaml", "--no-plots", "--junit", "new.xml")
+    assert refused(done, "new.xml: is no result of mechdesign's, or was changed since it was written")
+    assert (folder / "new.xml").read_text() == text
+
+
+# A study of which everything can be exported, whose drives take its motion from a file.
+CUT = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, 25]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [25, 0], B: [75, 55]}
+  plates: {width: 14, pin: 5}
+kinematics: {sweep: {theta: {from: 0, to: 90, step: 45}}, rates: {theta: 60 rpm}, outputs: [P]}
+"""
+WRITERS = [
+    ("kinematics", "cut.yaml", "--out", "FOLDER", "--format", "png,svg,pdf", "--report", "--animate"),
+    (
+        "sweep",
+        "cut.yaml",
+        "--out",
+        "FOLDER",
+        "--report",
+        "--vary",
+        "mechanism.plates.pin=4,5",
+        "--results",
+        "kinematics.P.x.max",
+    ),
+    ("run", "cut.yaml", "slider.yaml", "--out", "FOLDER", "--no-plots", "--report"),
+    ("check", "cut.yaml", "--out", "FOLDER", "--format", "png,svg,pdf"),
+    ("compare", "old", "new", "--out", "FOLDER"),
+    *(("export", "cut.yaml", "--to", name, "--out", "FOLDER") for name in exports()),
+    ("export", "cut.yaml", "--to", "study.json", "--out", "FOLDER/mine.json"),
+    ("import", "slider.dxf", "--out", "FOLDER/study.yaml"),
+    ("run", "slider.yaml", "--no-plots", "--junit", "FOLDER/report.xml"),
+]
+
+
+def files_of(place):
+    return {path.relative_to(place): path.read_bytes() for path in place.rglob("*") if path.is_file()}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("arguments", WRITERS, ids=" ".join)
+def test_files_of_the_user_that_look_like_ours_stay(folder, invoke, arguments):
+    """Whoever keeps copies of what mechdesign writes, or writes such files by hand, finds them as they were."""
+    (folder / "cut.yaml").write_text(CUT)
+    for name, end in (("old", 90), ("new", 45)):
+        override = f"kinematics.sweep.theta.to={end}"
+        assert invoke("kinematics", "slider.yaml", "--no-plots", "--out", name, "--set", override).exit_code == 0
+
+    def ask(place):
+        return invoke(*(word.replace("FOLDER", place) for word in arguments))
+
+    (folder / "ours").mkdir()
+    if arguments[0] == "import":
+        (folder / "ours/study.yaml").write_text(SLIDER)
+    else:
+        done = ask("ours")
+        assert done.exit_code in (0, 1), done.stderr
+        # Its own files it replaces.
+        assert ask("ours").exit_code == done.exit_code
+    copies = {path: data for path, data in files_of(folder / "ours").items()
+              if path.name not in ("manifest.json", ".mechdesign.json")}  # fmt: skip
+    assert copies
+    for path in copies:
+        (folder / "mine").mkdir()
+        (folder / "mine" / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "mine" / path).write_bytes(copies[path])
+        done = ask("mine")
+        assert done.exit_code == 2, (path, done.stderr)
+        assert path.name in done.stderr
+        left = files_of(folder / "mine")
+        # One of several studies does not stop the others.
+        assert left[path] == copies[path], path
+        assert arguments[0] == "run" or len(left) == 1, path
+        shutil.rmtree(folder / "mine")
+
+
+def test_an_export_replaces_nothing_that_the_study_reads(folder, invoke):
+    """Not even a file that it wrote itself."""
+    (folder / "motion.csv").write_bytes(MINE)
+    (folder / "by_file.yaml").write_text(BY_FILE)
+    assert refused(invoke("export", "by_file.yaml", "--to", "motion.csv", "--out", "."), "motion.csv: is read here")
+    assert (folder / "motion.csv").read_bytes() == MINE
+    assert invoke("export", "slider.yaml", "--to", "study.json", "--out", ".").exit_code == 0
+    data = (folder / "study.json").read_bytes()
+    assert invoke("export", "slider.yaml", "--to", "study.json", "--out", ".").exit_code == 0
+    done = invoke("export", "study.json", "--to", "study.json", "--out", ".", "--set", "mechanism.parameters.r=41")
+    assert refused(done, "study.json: is read here")
+    assert (folder / "study.json").read_bytes() == data
+
+
+def test_an_export_that_was_edited_stays(folder, invoke):
+    arguments = ("export", "slider.yaml", "--to", "mechanism.svg", "--out", "drawn")
+    assert invoke(*arguments).exit_code == 0
+    edited = (folder / "drawn/mechanism.svg").read_bytes() + b"<!-- by hand -->"
+    (folder / "drawn/mechanism.svg").write_bytes(edited)
+    assert refused(invoke(*arguments), "mechanism.svg: is no result of mechdesign's, or was changed")
+    assert (folder / "drawn/mechanism.svg").read_bytes() == edited
+
+
+def test_results_that_another_study_of_the_same_run_reads_stay(folder, invoke):
+    assert invoke("run", "slider.yaml", "--no-plots").exit_code == 0
+    made = folder / "results/slider/kinematics/motion.csv"
+    angles = "results/slider/kinematics/angles.csv"
+    made.with_name("angles.csv").write_bytes(MINE)
+    content = json.loads(made.with_name("manifest.json").read_text())
+    content["files"]["angles.csv"] = ""
+    made.with_name("manifest.json").write_text(json.dumps(content))
+    (folder / "second.yaml").write_text(BY_FILE.replace("motion.csv", angles))
+    done = invoke("run", "slider.yaml", "second.yaml", "--no-plots")
+    assert (done.exit_code, "angles.csv: is read here" in done.stderr) == (2, True)
+    assert made.with_name("angles.csv").read_bytes() == MINE
+
+
+def test_temporary_files_of_others_stay(folder, analysis, invoke):
+    (folder / "out").mkdir()
+    for name in (".notes.csv.99999999.tmp", ".mechdesign.motion.csv.99999999.tmp"):
+        (folder / "out" / name).write_bytes(MINE)
+    assert invoke("kinematics", "slider.yaml", "--no-plots", "--out", "out").exit_code == 0
+    assert [path.name for path in (folder / "out").glob(".*")] == [".notes.csv.99999999.tmp"]
+
+
+def test_a_record_of_another_program_stays(folder, invoke):
+    (folder / ".mechdesign.json").write_bytes(MINE)
+    done = invoke("export", "slider.yaml", "--to", "mechanism.svg", "--out", ".")
+    assert refused(done, ".mechdesign.json")
+    assert (folder / ".mechdesign.json").read_bytes() == MINE
 
 
 def test_an_answer_in_python_leaves_them_too(folder):

@@ -63,10 +63,9 @@ def exported(text, name, at=None, **changes):
 
 
 @pytest.mark.parametrize("name", sorted(exports()))
-def test_everything_that_is_declared_is_made_with_its_mark(name):
+def test_everything_that_is_declared_is_made(name):
     content = export_named(name).make(view(FOUR_BAR))
-    data = content.data if isinstance(content.data, bytes) else content.data.encode()
-    assert exports()[name].mark in data
+    assert content.data
     assert content.warnings == ()
 
 

@@ -15,7 +15,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Column, Table
 
 # What is otherwise; of `bytes` a file that is to be the same again.
-Change = Literal["moved", "missing", "new", "unit", "verdict", "outcome", "bytes"]
+Change = Literal["moved", "missing", "new", "unit", "verdict", "outcome", "bytes", "stale", "not met"]
 
 
 class Tolerance(NamedTuple):
@@ -69,6 +69,8 @@ class Difference:
             whole = "column" if self.column else "table" if self.table else "result"
             noun = counted(self.rows, "row") if self.rows else whole
             return f"{place}: {noun} {self.change}{f', the first{at}' if at else ''}"
+        if self.change in ("stale", "not met"):
+            return f"{place}: {self.change}{': ' * bool(self.new)}{self.new}"
         size = "" if math.isnan(self.largest) else f" by {self.largest:.3g} {self.unit}".rstrip()
         size += "" if math.isnan(self.relative) else f" (relative {self.relative:.2g})"
         rows = f" ({self.rows} rows)" if self.rows > 1 else ""
@@ -98,7 +100,8 @@ class Comparison:
             "folder": "of the result, below those compared",
             "table": "its table; empty where it is the whole result",
             "column": "its column; empty where it is the whole table or rows of it",
-            "change": "moved, missing, new; unit, verdict or outcome: another one",
+            "change": "moved, missing, new; unit, verdict or outcome: another one; not met: a requirement; stale: of a "
+            "question that the study of the results beside it does not ask",
             "rows": "how many rows",
             "largest": "largest absolute difference, in `unit`; inf between a number and nan; nan of words",
             "relative": "that difference over the old value of the same row",

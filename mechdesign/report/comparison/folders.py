@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from mechdesign.commands import SWEEP
+from mechdesign.commands import COMMANDS, QUESTIONS, SWEEP
 from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
@@ -20,6 +20,7 @@ from mechdesign.results import VARIED, Table
 from mechdesign.rows import UnknownColumnError, in_unit
 from mechdesign.study.text.document import leaves, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.terms import command_of
 
 HELP_PAGE = "howto/batch"
 
@@ -52,6 +53,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
             noted[note].append(folder)
         pair = (old / folder, before[folder]), (new / folder, after[folder])
         unused -= compare_results(comparison, folder, *pair, tolerances)
+    comparison.differences += stale(after)
     everywhere = len(before.keys() & after.keys())
     comparison.notes += [
         note if len(folders) == everywhere else f"{', '.join(folders)}: {note}" for note, folders in noted.items()
@@ -79,6 +81,27 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
         raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
     folders = [path.parent for path in sorted(root.rglob(manifest.NAME))]
     return {folder.relative_to(root).as_posix(): manifest.whole(folder) for folder in folders}
+
+
+def stale(contents: Mapping[str, Mapping[str, Any]]) -> Iterator[Difference]:
+    """Results in folders named by their commands, of questions that another text of their study beside them lacks."""
+    for folder, content in contents.items():
+        command, study = content["command"], content["study"]
+        for other, beside in contents.items():
+            same = beside["study"]["name"] == study["name"] and Path(other).parent == Path(folder).parent
+            if not (same and Path(folder).name == command and Path(other).name == beside["command"]):
+                continue
+            if beside["study"]["sha256"] != study["sha256"] and not _asks(beside["study"]["resolved"], command):
+                yield Difference(folder, "", "", "stale", new=f"the study of {other} does not ask it")
+                break
+
+
+def _asks(resolved: Mapping[str, Any], command: str) -> bool:
+    """Whether a study asks a question, by a section or a requirement."""
+    required = resolved.get("requirements") or []
+    judged = {command_of(str(entry.get("result"))) for entry in required if isinstance(entry, dict)}
+    given = {name for name, question in QUESTIONS.items() if resolved.get(question.section or name) is not None}
+    return command in judged | given or (command == "kinematics" and not (judged | given) & COMMANDS.keys())
 
 
 def tolerances_from(path: Path, default: Tolerance) -> Tolerances:

@@ -28,7 +28,6 @@ from matplotlib.textpath import text_to_path
 from matplotlib.ticker import LogFormatter, MaxNLocator, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from mechdesign.numerics.arrays import Complexes, Floats
 
@@ -369,13 +368,13 @@ def raised(power: int) -> str:
 
 
 def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:
-    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made it.
+    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made a PDF.
 
     A PNG has at most 256 colours, a third of the size.
     """
     stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
     if kind == "svg":
-        figure.savefig(stream, format=kind, metadata={"Date": None} | ({"Creator": creator} if creator else {}))
+        figure.savefig(stream, format=kind, metadata={"Date": None})
         return _reduced(stream.getvalue(), _reduction())
     if kind == "pdf":
         # Its modules take a fifth of a second to import.
@@ -384,10 +383,7 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
         return pdf(figure, creator, _reduction())
     figure.canvas.draw()
     few = _in_few_colours(np.asarray(cast(Any, figure.canvas).buffer_rgba()))
-    words = PngInfo()
-    if creator is not None:
-        words.add_text("Software", creator)
-    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL, pnginfo=words)
+    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL)
     return stream.getvalue()
 
 

@@ -35,7 +35,7 @@ from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.dark import dark
 from mechdesign.report.page.headlines import shown
-from mechdesign.report.page.pages import GENERATOR, harmless
+from mechdesign.report.page.pages import harmless
 from mechdesign.report.page.tracks import joined
 from mechdesign.report.requirements import Verdict, judged_by, named
 from mechdesign.study import Study
@@ -235,7 +235,6 @@ def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] =
     policy += [f"script-src {_hash(script)}"]
     text = environment.get_template(template).render(
         **content,
-        generator=Markup(GENERATOR),
         policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
         # These texts are files of the package, and none contains the end tag of its element.
         styles=Markup(styles),

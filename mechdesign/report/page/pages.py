@@ -1,4 +1,4 @@
-"""Names of the files of a report, and how a page of mechdesign is recognised."""
+"""Names of the files of a report."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import OutputError, printable_lines
-from mechdesign.files import marked
+from mechdesign.records import remove_recorded
 
 HELP_PAGE = "howto/report"
 
@@ -14,8 +14,6 @@ REPORT = "report.html"
 PRINTED = "report.pdf"
 INDEX = "index.html"
 SECTION = "report.json"  # what a page says of a result
-# A page of mechdesign is recognised by this mark.
-GENERATOR = '<meta name="generator" content="mechdesign">'
 
 
 def harmless(value: Any) -> Any:
@@ -31,8 +29,7 @@ def remove(path: Path) -> None:
     OutputError
         If it cannot be removed.
     """
-    if marked(path, GENERATOR.encode()):
-        try:
-            path.unlink()
-        except OSError as error:
-            raise OutputError(f"{path}: could not be removed: {error.strerror or error}") from error
+    try:
+        remove_recorded(path)
+    except OSError as error:
+        raise OutputError(f"{path}: could not be removed: {error.strerror or error}") from error

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mechdesign.errors import OutputError, StudyError
-from mechdesign.report.page.pages import GENERATOR
 
 HELP_PAGE = "howto/report"
 
@@ -46,7 +45,7 @@ def browser() -> str:
 
 
 def pdf(page: Path) -> bytes:
-    """A page as it is printed, the same at any time, with the mark of our pages at its end.
+    """A page as it is printed, the same at any time.
 
     Raises
     ------
@@ -75,4 +74,4 @@ def pdf(page: Path) -> bytes:
     # Numbers of the page's elements differ from run to run: they are counted in the order of the file.
     nodes = {node: b"node%08d" % k for k, node in enumerate(dict.fromkeys(_NODE.findall(data)), start=1)}
     data = _NODE.sub(lambda node: nodes[node[0]], data)
-    return _DATE.sub(b"D:19700101000000", data) + f"% {GENERATOR}\n".encode()
+    return _DATE.sub(b"D:19700101000000", data)
