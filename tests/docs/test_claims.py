@@ -114,3 +114,12 @@ def test_every_name_of_the_package_is_on_its_page() -> None:
     page = read("docs/api.md")
     for name in mechdesign.__all__:
         assert name.startswith("__") or re.search(rf"::\s+mechdesign\.{name}\b", page), name
+
+
+def test_pages_for_contributors_name_every_folder_and_files_that_exist() -> None:
+    overview = read("docs/contributing/index.md")
+    for folder in (ROOT / "mechdesign").iterdir():
+        assert not (folder / "__init__.py").exists() or f"`mechdesign/{folder.name}/`" in overview
+    for page in ("index", "adding", "testing"):
+        for path in re.findall(r"`((?:mechdesign|tests|docs|configs)/[\w./-]+)`", read(f"docs/contributing/{page}.md")):
+            assert (ROOT / path).exists(), path
