@@ -226,8 +226,8 @@ _add(
         given.EXECUTOR,
     ),
     "Put together what runs with --shard computed.",
-    "Put together what runs with --shard computed: what a run without it gives, byte by byte. Options that change "
-    "numbers, such as --set and --seed, and --out are given again.",
+    "Put together what runs with --shard computed: what a run without it gives, byte by byte. What they changed, "
+    "such as by --set and --seed, is kept with them; --out is given again.",
 )  # fmt: skip
 _add(
     _check,

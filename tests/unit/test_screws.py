@@ -102,7 +102,7 @@ def test_wrenches_do_no_work_on_the_free_joints(passive: list[np.ndarray], rank:
     assert np.all(joint_rank(passive, LENGTH) == rank)
     wrenches = reciprocal_wrenches(passive, rank, LENGTH, 1)[:, :, 0]
     assert wrenches.shape == (3, 3 - rank)
-    assert np.linalg.matrix_rank(wrenches) == 3 - rank
+    assert rank == 3 or np.linalg.matrix_rank(wrenches) == 3 - rank
     for twist in passive:
         assert twist[:, 0] @ wrenches == pytest.approx(np.zeros(3 - rank), abs=1e-12)
 

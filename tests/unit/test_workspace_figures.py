@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from helpers.pictures import figure_of
@@ -11,6 +13,7 @@ from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.boundary import inscribed_figure
 from mechdesign.questions.workspace.figures.index_maps import index_columns
 from mechdesign.questions.workspace.figures.ranged import loops
@@ -33,6 +36,14 @@ mechanism:
   limits: [{distance: [B1, C], max: 0.6}]
   sketch: {D1: [-0.33, 0.17], D2: [0.33, 0.17], C: [0, 0.4]}
 workspace: {point: C, scan: {about: [0, 0], from: 0, to: 180, rays: 40}}
+"""
+REACH = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, A, 100], lower: [A, P, 70]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  limits: [{angle: [ground, upper], min: 20, max: 150}]
+  sketch: {A: [60, 80], P: [130, 80]}
+workspace: {point: P}
 """
 ARM = """
 mechanism:
@@ -65,6 +76,67 @@ def test_maps_have_equal_axes_named_levels_and_a_legend_of_what_ends_the_region(
     words = {text.get_text() for text in page.legends[0].get_texts()}
     assert {"ends at a limit", "a leg is stretched"} <= words
     assert axes.get_xlabel() == "x [m]"
+
+
+def elbow(base: complex, tip: Complexes, inner: float, outer: float, side: int) -> Complexes:
+    """The elbow of a leg on one side of the line from its base to its tip, by the law of cosines."""
+    reach = np.abs(tip - base)
+    with np.errstate(invalid="ignore"):
+        turn = np.arccos((inner**2 + reach**2 - outer**2) / (2 * inner * reach))
+    return base + inner * (tip - base) / reach * np.exp(1j * side * turn)
+
+
+def five_bar_jacobian(tip: Complexes) -> Floats:
+    """Each upper link keeps its length: the tip moves along it as the lower link's end does."""
+    bases = (-0.15, 0.15)
+    elbows = [elbow(base, tip, 0.25, 0.4, side) for base, side in zip(bases, (1, -1), strict=True)]
+    upper = np.stack([np.stack([(tip - d).real, (tip - d).imag], axis=-1) for d in elbows], axis=-2)
+    lower = [((tip - d) * np.conj(1j * (d - b))).real for d, b in zip(elbows, bases, strict=True)]
+    upper[np.isnan(upper).any(axis=(1, 2))] = np.eye(2) * np.nan
+    return np.linalg.solve(upper, np.stack(lower, axis=-1)[..., None] * np.eye(2))
+
+
+def arm_jacobian(tip: Complexes) -> Floats:
+    ways = 1j * tip, 1j * (tip - elbow(0, tip, 100, 70, 1))
+    return np.stack([np.stack([way.real, way.imag], axis=-1) for way in ways], axis=-1)
+
+
+INDICES = {
+    "inverse_condition": lambda most, least: least / most, "resistivity": lambda most, least: 1 / (most * least),
+    "manipulability": lambda most, least: most * least, "sigma_min": lambda _, least: least,
+    "sigma_max": lambda most, _: most,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "jacobian", "look"), [
+    pytest.param(FIVE_BAR, five_bar_jacobian, "paper", marks=pytest.mark.slow),
+    pytest.param(FIVE_BAR, five_bar_jacobian, "screen", marks=pytest.mark.nightly),
+    pytest.param(REACH, arm_jacobian, "paper", marks=pytest.mark.nightly),
+    pytest.param(REACH, arm_jacobian, "screen", marks=pytest.mark.nightly),
+])  # fmt: skip
+def test_every_name_of_a_level_stands_where_the_index_has_that_value(
+    text: str, jacobian: Callable[[Complexes], Floats], look: str
+) -> None:
+    """Within two points on paper: over such a disc the closed form has values above and below the level."""
+    study = study_of(text)
+    result = mechdesign.workspace(study)
+    disc = np.outer([0, 1, 2], np.exp(2j * np.pi * np.arange(16) / 16)).ravel()
+    for name, index in INDICES.items():
+        with style.context(look):
+            page = figure_of(study, result, name)
+            page.canvas.draw()
+        axes, bar = page.axes
+        ten = 10.0 ** style.power(float(bar.get_yticks().max()))
+        for words in axes.texts:
+            box = words.get_window_extent()
+            about = (box.min + box.max) @ np.array([0.5, 0.5j]) + disc * page.dpi / 72
+            tips = axes.transData.inverted().transform(np.column_stack([about.real, about.imag])) @ np.array([1, 1j])
+            matrices = jacobian(tips)
+            field = index(*np.linalg.svd(matrices[np.isfinite(matrices).all(axis=(1, 2))], compute_uv=False).T)
+            level = float(words.get_text()) * ten
+            assert "e" not in words.get_text()
+            assert field.min() <= level <= field.max(), (name, level, field[0])
+        assert axes.texts, name
 
 
 @pytest.mark.nightly

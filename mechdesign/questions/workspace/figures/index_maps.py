@@ -80,9 +80,10 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         return page.figure
     norm = _norm(every)
     page = sheet(study, places, titles, title, bar=True)
+    # First, since the legend makes a narrow page higher.
+    page.ends(regions)
     for axes, patches in zip(page.axes, shown, strict=True):
         contours(axes, patches, norm, labels=len(regions) == 1)
-    page.ends(regions)
     page.color_bar(ScalarMappable(norm, style.COLORMAP), label, ticks=norm.boundaries)
     return page.figure
 
@@ -108,11 +109,12 @@ def label_levels(axes: Axes, drawn: Sequence[Sequence[Complexes]], norm: Boundar
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
     for k, level in enumerate(levels):
-        places = [(part[j], part[j + 1] - part[j - 1]) for part in lines[k] if len(part) > 4
+        places = [(line[j], part[j], part[j + 1] - part[j - 1])
+                  for line, part in zip(drawn[k], lines[k], strict=True) if len(part) > 4
                   for j in range(2, len(part) - 2, max(1, len(part) // 40)) if part[j + 1] != part[j - 1]]  # fmt: skip
         if not places:
             continue
-        at, along = np.array(places).T
+        anchors, at, along = np.array(places).T
         others = np.concatenate([*every[:k], *every[k + 1 :], blocked])
         room = np.minimum(_nearest(at, others) / CLEAR_OF_LINES, _nearest(at, taken) / CLEAR_OF_NAMES)
         # Upright names read best where there is room.
@@ -122,9 +124,9 @@ def label_levels(axes: Axes, drawn: Sequence[Sequence[Complexes]], norm: Boundar
         taken = np.append(taken, at[best])
         turn = float(np.degrees(np.angle(along[best])))
         back = colormaps[style.COLORMAP](norm(level))
-        place = (at[best].real, at[best].imag)
-        axes.annotate(
-            f"{level / ten:.4g}", place, xycoords="figure points", fontsize=7.5, ha="center", va="center",
+        # A place of the drawing, not of the page, whose layout may still change.
+        axes.text(
+            anchors[best].real, anchors[best].imag, f"{level / ten:.6g}", fontsize=7.5, ha="center", va="center",
             rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
             zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
         )  # fmt: skip
