@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, overload
 
 import numpy as np
@@ -18,6 +20,10 @@ from mechdesign.study import Study
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import Changes, faults
+
+_DECIMAL = re.compile(r"-?[0-9.]+(e[-+]?[0-9]+)?")
+# Cases among which those with a value are looked for, and those that are tried where the value alone is wrong.
+_MOST_SEARCHED, _MOST_TRIED = 10_000, 16
 
 
 class Design(Sequence[Changes]):
@@ -129,11 +135,34 @@ def cases_of(study: Study) -> Design:
         assert matrix.samples is not None
         cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
         design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube)
-    for place, name in enumerate(design.names):
-        # Quantities are tried as they are written: the units must fit the entry.
-        written = study.resolved["matrix"]["vary"][name] if matrix.vary is not None else ()
-        _try(study, name, [*design.distinct(place), *_parts(written)])
+    keys = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
+    problems = [
+        study.problem(f"{name}={in_yaml(value)}: {message}", *keys, *([name] if matrix.vary is not None else []))
+        for name, value in tried(study, design)
+        for message in _wrong(study, design, name, value)
+    ]
+    if problems:
+        raise StudyError(problems)
     return design
+
+
+def tried(study: Study, design: Design) -> Iterator[tuple[str, Any]]:
+    """Entries with each word or structure that one takes in some case, and one quantity of each unit as written."""
+    for place, name in enumerate(design.names):
+        written = study.resolved["matrix"]["vary"][name] if not isinstance(design, Listed) else ()
+        values = [*design.distinct(place), *_parts(written)]
+        words = [value for value in values if isinstance(value, bool) or not _DECIMAL.fullmatch(str(value))]
+        units = {(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}
+        yield from ((name, value) for value in units.values())
+
+
+def _wrong(study: Study, design: Design, name: str, value: Any) -> list[str]:
+    """Why an entry cannot have a value: neither with the others as they are, nor as the first cases have them."""
+    messages = [*faults(study, [(name, value)], name)]
+    place = design.names.index(name)
+    same = (design[k] for k in range(min(len(design), _MOST_SEARCHED)) if design.value(k, place) == value)
+    right = messages and any(not [*faults(study, case, name)] for case in islice(same, _MOST_TRIED))
+    return [] if right else messages
 
 
 def _parts(written: Any) -> Iterable[Any]:
@@ -157,22 +186,3 @@ def _cube(method: str, dimensions: int, samples: int, seed: int) -> Floats:
     # The sequence is even over powers of two: the next larger one is drawn, and its first points are used.
     sobol = qmc.Sobol(dimensions, scramble=True, rng=random)
     return np.asarray(sobol.random_base2((samples - 1).bit_length()))[:samples]
-
-
-def _try(study: Study, name: str, values: Sequence[Any]) -> None:
-    """Load the study with each word or structure that an entry takes in some case, the other entries as they are.
-
-    Raises
-    ------
-    StudyError
-        Where the entry itself is wrong. A mistake that needs several entries is reported by its case.
-    """
-    words = [value for value in values if not isinstance(value, int | float) or isinstance(value, bool)]
-    # One quantity of each unit is tried.
-    tried = [*{(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}.values()]
-    keys = ("matrix", "vary", name) if study.matrix and study.matrix.vary is not None else ("matrix", "cases")
-    problems = [
-        study.problem(f"{name}={in_yaml(tried[k])}: {message}", *keys) for k, message in faults(study, name, tried)
-    ]  # fmt: skip
-    if problems:
-        raise StudyError(problems)

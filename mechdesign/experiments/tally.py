@@ -60,8 +60,8 @@ class Tally:
             before.cases += warned.cases
         new = [replace(other, case=begin + other.case, first=begin + other.first) for other in answered.worst]
         for worst, other in zip(self.worst, new, strict=bool(self.worst)):
-            if _margin(other.verdict) < _margin(worst.verdict):
-                worst.case, worst.verdict = other.case, other.verdict
+            if other.margin < worst.margin:
+                worst.case, worst.verdict, worst.margin = other.case, other.verdict, other.margin
             worst.first = worst.first if worst.unmet else other.first
             worst.unmet += other.unmet
         self.worst = self.worst or new
@@ -145,7 +145,3 @@ class Tally:
 
     def _key(self, begin: int, end: int) -> bytes:
         return digest([np.array([begin, end], dtype=float)])
-
-
-def _margin(verdict: Verdict) -> float:
-    return -np.inf if np.isnan(verdict.margin) else verdict.margin

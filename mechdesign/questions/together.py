@@ -45,6 +45,7 @@ class Group:
     result: Result
     ends: Sequence[End]
     uneven: Mapping[str, Sequence[int] | Ints] = field(default_factory=dict)
+    _answers: dict[int, Result] = field(default_factory=dict, init=False)
 
     @classmethod
     def alone(cls, result: Result) -> Group:
@@ -70,10 +71,12 @@ class Group:
             return end.error
         if len(self.ends) == 1:
             return self.result
-        tables = {name: self._of(table, k, end) for name, table in self.result.tables.items()}
-        return replace(
-            self.result, tables=tables, warnings=list(end.warnings), counts=end.counts, failed=end.failed
-        )  # fmt: skip
+        if k not in self._answers:
+            tables = {name: self._of(table, k, end) for name, table in self.result.tables.items()}
+            self._answers[k] = replace(
+                self.result, tables=tables, warnings=list(end.warnings), counts=end.counts, failed=end.failed
+            )  # fmt: skip
+        return self._answers[k]
 
     def _of(self, table: Table, k: int, end: End) -> Table:
         counts = self.uneven.get(table.name)

@@ -80,6 +80,7 @@ class Along:
         columns |= {s.name: s.size for s in question.statics if s.name not in EFFICIENCIES}
         columns |= dict.fromkeys(question.clearances, sizes["length"])
         self._requests, self._within = requests, dict[Part, Along]()
+        self._worst = dict[tuple[str, int, bool, float], tuple[Floats, Floats]]()
         whole = [request for request in requests if not request.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
         judged = dict.fromkeys([*also, *(request.column for request in whole)])
@@ -295,6 +296,12 @@ class Along:
         The value is that of the function, absolute where that is judged; nan where it has none. Of values within
         `still` the first along the motion counts.
         """
+        key = name, sign, absolute, still
+        if key not in self._worst:
+            self._worst[key] = self._worst_of(*key)
+        return self._worst[key]
+
+    def _worst_of(self, name: str, sign: int, absolute: bool, still: float) -> tuple[Floats, Floats]:
         if absolute and sign < 0:
             values, places = self.least([name], still)
             return values[0], places[0]

@@ -436,10 +436,10 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
                 check_result(checker, term, path, required=required)
             return
     command, _, rest = name.partition(".")
-    statistics = _statistics()
     if rest:
         checker.check_name(command, COMMANDS, "command", path)
-    elif required or name not in statistics:
+    elif required or name not in _statistics():
+        statistics = _statistics()
         names = statistics if required else (*statistics, *checker.parameters.nominal)
         hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")

@@ -69,6 +69,8 @@ def check_varied(matrix: MatrixSection, checker: Checker) -> None:
             continue
         if path[0] == "matrix":
             checker.report(place, "a matrix does not vary itself", at_key=True)
+        if path[0] == "units":
+            checker.report(place, "cases are compared in the units of the study, which no case changes", at_key=True)
         varied.add(path, name, place)
 
 
