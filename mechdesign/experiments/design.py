@@ -30,6 +30,7 @@ class Design(Sequence[Changes]):
     """The cases of a matrix in their order; each gives every varied entry (`names`) a value."""
 
     names: tuple[str, ...]
+    labels: Sequence[str] = ()  # of the cases; empty where they have none
 
     @abstractmethod
     def value(self, k: int, place: int) -> Any:
@@ -105,6 +106,7 @@ class Listed(Design):
 
     names: tuple[str, ...]
     rows: Sequence[tuple[Any, ...]]
+    labels: Sequence[str] = ()
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -165,7 +165,8 @@ def _goals(study: Study) -> dict[str, int]:
 def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
-    yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
+    labels = {"label": np.array(cases.labels[:count])} if cases.labels else {}
+    yield from SWEEP.columns({}, case=np.arange(1, count + 1), **labels, exit_code=table[:, 0].astype(np.intp))
     for place, name in enumerate(cases.names):
         values = cases.column(place, count, partial(_array, study.units))
         yield SWEEP["<entry>"].column(values, entry_unit(study, name), entry=name)

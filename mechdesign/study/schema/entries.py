@@ -55,7 +55,7 @@ def check_varied(matrix: MatrixSection, checker: Checker) -> None:
     """Check that the entries that a matrix varies exist, and that none equals or contains another."""
     at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     try:
-        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
+        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder).names
     except StudyError as error:
         checker.report(at, str(error))
         return
