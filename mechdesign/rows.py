@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import nearest, suggestion
+from mechdesign.errors import counted, nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Result, Strands, Table
 from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread, Several
@@ -60,6 +60,16 @@ class Chosen:
         """Whether it speaks of the poses alone, though rows of a motion are judged."""
         scope = self.table.scope
         return scope is not None and (scope.poses_only or not (scope.follow is None or self.picked or self.courses))
+
+    @property
+    def lacking(self) -> str:
+        """Where a row that counts, or the motion between the rows, has no value, in words; empty where it has."""
+        if self.table.lacking is not None:
+            return next(filter(None, self.table.lacking[self.counts].tolist()), "")
+        lost = np.count_nonzero(np.isnan(self.values[self.counts]))
+        if lost and self.table.scope is not None and len(self.table) > 1:
+            return no_value(lost, int(np.count_nonzero(self.counts)))
+        return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")
 
     @cached_property
     def courses(self) -> Mapping[str, Course]:
@@ -126,7 +136,8 @@ class Chosen:
                 return rows
             courses = [*self.courses.values()]
             lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
-            return np.where(lost, rows, statistic(Several(courses, spread)))
+            numbers = np.where(lost, rows, statistic(Several(courses, spread)))
+            return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
 
     def _several(self, count: int) -> str:
         words = [*STATISTICS]
@@ -144,6 +155,16 @@ class Chosen:
             If it is a quantity of another kind.
         """
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
+
+
+def no_value(number: int, count: int) -> str:
+    """That some of the poses that count have no value, in words."""
+    return f"no value in {number} of {counted(count, 'pose')}"
+
+
+def no_value_along(part: float) -> str:
+    """That a part of a motion has no value, in words."""
+    return f"no value on {100 * part:.3g} % of the motion"
 
 
 @runtime_checkable
@@ -209,6 +230,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         worded = worded if table.column(name).numeric else worded & equal
     _one_unit(table, column, counts)
     numbers = values.astype(float)
+    if table.lacking is not None:
+        numbers = np.where(table.lacking == "", numbers, np.nan)
     missing = "" if counts.any() or part else _missing(table, rows, where)
     return Chosen(
         table, column, np.abs(numbers) if absolute else numbers, counts, missing, statistic, tuple(part),

@@ -188,6 +188,10 @@ class Course(Spread, Protocol):
     def followed(self) -> Flags:
         """Which motions are followed between their poses, shape (designs,)."""
 
+    @property
+    def lost(self) -> Floats:
+        """Part of each motion on which it has no value, shape (designs,)."""
+
     def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
         """The largest value times the sign (of absolute values, where these count) and its place in rows.
 

@@ -36,6 +36,9 @@ MOST_LOST = 4
 # Rounding of a quotient at a node, as a part of its value, with which the node says nothing of it.
 NOISE = 2e-8
 
+# A part of a motion on which a function has no value is rounding, such as of a root of zero, if it is shorter.
+LOST = 1e-6
+
 # Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
 
@@ -89,6 +92,13 @@ class Series:
     def at(self, line: Ints, s: Floats) -> Floats:
         """Values of all functions at places of lines, shape (functions, n)."""
         return self._values(line, s)[0]
+
+    def lost(self, name: str) -> Floats:
+        """Part of each motion on which a function has no value, shape (lines,); 0 where that is rounding."""
+        pieces = self.pieces
+        empty = np.isnan(self._table[self.names[name]]).sum(axis=1) > chebyshev.COUNT // 2
+        length = np.bincount(pieces.line, (pieces.end - pieces.begin) * empty, self.curve.lines)
+        return np.where(length > LOST * self.curve.poses.end, length / self.curve.poses.end, 0.0)
 
     def _values(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]

@@ -86,7 +86,8 @@ class Group:
             Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
         )
         scope = table.scope and replace(table.scope, missing=end.missing, follow=_follow_of(table.scope, k))
-        return replace(table, columns=columns, scope=scope)
+        lacking = None if table.lacking is None else table.lacking[begin : begin + number]
+        return replace(table, columns=columns, scope=scope, lacking=lacking)
 
 
 def _follow_of(scope: Scope, design: int) -> Follow | None:

@@ -234,7 +234,7 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: 
         raise UnknownColumnError(missing)
     if worst is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return worst if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
+    return _scoped(worst, chosen, requirement) if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
 
 
 def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
@@ -265,6 +265,8 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
             where = ", ".join(filter(None, (course.shown(place), words)))
             between = _verdict(requirement, bounds, value, where, verdict.unit)
             verdict = between if not between.margin >= verdict.margin else verdict
+    if chosen.lacking:
+        verdict = _verdict(requirement, bounds, float("nan"), "", verdict.unit)
     return _scoped(verdict, chosen, requirement)
 
 
@@ -278,7 +280,8 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
     courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     ends = [scope.until for scope in scopes if scope is not None and scope.until]
-    return replace(verdict, note="; ".join([*notes, *dict.fromkeys([*missing, *ends])]))
+    lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(verdict.worst) else []
+    return replace(verdict, note="; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))]))
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:

@@ -347,6 +347,10 @@ class Along:
         table, conditioning = self._evaluate(line, s)
         return table[[self._names.index(name)]] ** 2, conditioning
 
+    def lost(self, name: str) -> Floats:
+        """Part of each motion on which a column has no value, shape (lines,)."""
+        return self.functions.lost(name)
+
     def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
         """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""
         return self.functions.means(self._means.get(name, name), power, _PACE, absolute=absolute)

@@ -67,6 +67,11 @@ class Followed:
         """Which motions are followed between their poses, shape (designs,)."""
         return ~self.along.curve.spent[self._designs]
 
+    @property
+    def lost(self) -> Floats:
+        """Part of each motion on which it has no value, shape (designs,)."""
+        return self.along.lost(self.name)[self._designs]
+
     def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
         """The largest value times the sign, and its place in rows, shape (designs,)."""
         value, place = self.along.worst(self.name, sign, absolute=absolute)
