@@ -71,6 +71,13 @@ class Chosen:
             return no_value(lost, int(np.count_nonzero(self.counts)))
         return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")
 
+    @property
+    def gaps(self) -> tuple[str, ...]:
+        """Which poses, parts of the motion or samples are missing, in words; empty where none is."""
+        words = self.table.unassembled.get(self.column)
+        rows = [] if words is None else [word for word in words[self.counts].tolist() if word][:1]
+        return tuple(filter(None, [self.table.scope.missing if self.table.scope is not None else "", *rows]))
+
     @cached_property
     def courses(self) -> Mapping[str, Course]:
         """The column between the rows, where these are poses of a motion that is followed.

@@ -115,8 +115,15 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
     values, margins = (np.stack(part) for part in zip(*pairs, strict=True))
     nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
     worst, margin = (np.take_along_axis(part, nearer, axis=0)[0] for part in (values, margins))
-    partly = group.missing if any(part.table.scope for part in terms.parts) and one.unassembled is None else False
-    return Judged(worst, margin, (margin >= 0) & ~np.asarray(partly), terms.unit)
+    partly = incomplete(group, terms) & (one.unassembled is None)
+    return Judged(worst, margin, (margin >= 0) & ~partly, terms.unit)
+
+
+def incomplete(group: Group, terms: Chosen | Sum) -> Flags:
+    """Designs of which poses, samples or a part of the motion are missing in what is judged."""
+    if len(group.ends) == 1:
+        return np.array([any(part.gaps for part in terms.parts)])
+    return group.missing & any(part.table.scope for part in terms.parts)
 
 
 def _subject(requirement: Requirement) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Ints
-from mechdesign.results import Column, Result, Scope, Table
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Course, Follow, Request
 
 
@@ -82,12 +82,9 @@ class Group:
         counts = self.uneven.get(table.name)
         size = len(table) // len(self.ends)
         begin, number = (k * size, size) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
-        columns = tuple(
-            Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
-        )
+        own = table.take(np.arange(begin, begin + number))
         scope = table.scope and replace(table.scope, missing=end.missing, follow=_follow_of(table.scope, k))
-        lacking = None if table.lacking is None else table.lacking[begin : begin + number]
-        return replace(table, columns=columns, scope=scope, lacking=lacking)
+        return replace(own, scope=scope)
 
 
 def _follow_of(scope: Scope, design: int) -> Follow | None:

@@ -273,7 +273,7 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
 def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
     scopes = [chosen.table.scope for chosen in terms.parts]
-    missing = [scope.missing for scope in scopes if scope is not None and scope.missing]
+    missing = [gap for chosen in terms.parts for gap in chosen.gaps]
     if missing and not requirement.unassembled:
         verdict = replace(verdict, met=False)
     notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
@@ -322,7 +322,8 @@ def in_words(requirement: Requirement) -> str:
     where = ", ".join(f"{column} {cell}" for column, cell in requirement.where.items())
     limits = (("at least", requirement.at_least), ("at most", requirement.at_most))
     bounds = [f"{words} {written(bound)}" for words, bound in limits if bound is not None]
-    return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
+    allowed = ", unassembled allowed" if requirement.unassembled else ""
+    return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}{allowed}"
 
 
 def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) -> str:
