@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from typing import Any, overload
 
@@ -19,7 +20,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import Changes, faults
+from mechdesign.study.variants import Changes, faults, is_judged
 
 _DECIMAL = re.compile(r"-?[0-9.]+(e[-+]?[0-9]+)?")
 # Cases among which those with a value are looked for, and those that are tried where the value alone is wrong.
@@ -31,6 +32,7 @@ class Design(Sequence[Changes]):
 
     names: tuple[str, ...]
     labels: Sequence[str] = ()  # of the cases; empty where they have none
+    written: Mapping[str, Callable[[Any], Any]] = {}  # entries with quantities that are judged: a value as written
 
     @abstractmethod
     def value(self, k: int, place: int) -> Any:
@@ -53,7 +55,10 @@ class Design(Sequence[Changes]):
             return [self[case] for case in range(*k.indices(len(self)))]
         if not 0 <= k < len(self):
             raise IndexError(k)
-        return tuple((name, self.value(k, place)) for place, name in enumerate(self.names))
+        return tuple(
+            (name, self.written.get(name, lambda value: value)(self.value(k, place)))
+            for place, name in enumerate(self.names)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,7 @@ class Grid(Design):
 
     names: tuple[str, ...]
     values: tuple[tuple[Any, ...], ...]
+    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return math.prod(map(len, self.values))
@@ -88,6 +94,7 @@ class Spread(Design):
     names: tuple[str, ...]
     values: tuple[Values, ...]
     cube: Floats
+    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.cube)
@@ -131,12 +138,14 @@ def cases_of(study: Study) -> Design:
     design: Design
     if matrix.vary is None:
         design = Listed(*matrix.table(study.folder))
-    elif matrix.method == GRID:
-        design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()))
     else:
-        assert matrix.samples is not None
-        cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
-        design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube)
+        written = {name: partial(_as_written, study, name) for name in matrix.vary if is_judged(name)}
+        if matrix.method == GRID:
+            design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()), written)
+        else:
+            assert matrix.samples is not None
+            cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
+            design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube, written)
     keys = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     problems = [
         study.problem(f"{name}={in_yaml(value)}: {message}", *keys, *([name] if matrix.vary is not None else []))
@@ -146,6 +155,17 @@ def cases_of(study: Study) -> Design:
     if problems:
         raise StudyError(problems)
     return design
+
+
+def _as_written(study: Study, name: str, value: Any) -> Any:
+    """A value of an entry that is judged, as a quantity where it is written as one, since columns have own units."""
+    for part in _parts(study.resolved["matrix"]["vary"][name]):
+        if isinstance(part, str) and QUANTITY.fullmatch(part) and isinstance(value, int | float):
+            if not isinstance(study.resolved["matrix"]["vary"][name], list):
+                return study.units.as_written(value, part)
+            if study.units.convert(part) == value:
+                return part
+    return value
 
 
 def tried(study: Study, design: Design) -> Iterator[tuple[str, Any]]:

@@ -27,7 +27,7 @@ from mechdesign.results import Column, Result
 from mechdesign.study import Study
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
-from mechdesign.study.variants import entry_unit, split, with_entries
+from mechdesign.study.variants import entry_unit, is_judged, with_entries
 from mechdesign.work.journal import Journal
 from mechdesign.work.threads import one_thread
 
@@ -69,7 +69,7 @@ def _foresee_limits(study: Study, cases: Design) -> None:
         With the entry, its value and the reason.
     """
     for name, value in tried(study, cases):
-        if split([(name, value)])[1] and QUANTITY.fullmatch(str(value)):
+        if is_judged(name) and QUANTITY.fullmatch(str(value)):
             try:
                 foresee(with_entries(study, [(name, value)]), ())
             except StudyError as error:

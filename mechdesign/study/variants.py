@@ -67,11 +67,16 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
     return load_document(document, study.source, (*study.overrides, *texts), original=original)
 
 
+def is_judged(name: str) -> bool:
+    """Whether an entry is one by which answers are judged."""
+    return name.partition(".")[0] in JUDGED
+
+
 def split(changes: Changes) -> tuple[list[tuple[str, Any]], list[tuple[str, Any]]]:
     """Changes of what is computed, and of what is judged alone."""
     sides: tuple[list[tuple[str, Any]], list[tuple[str, Any]]] = ([], [])
     for change in changes:
-        sides[change[0].partition(".")[0] in JUDGED].append(change)
+        sides[is_judged(change[0])].append(change)
     return sides
 
 

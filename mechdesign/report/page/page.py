@@ -261,7 +261,10 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     rows: list[tuple[bool, int, dict[str, Any]]] = []
     rules = [
         *map(_in_words, study.requirements),
-        *({"result": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
+        *(
+            {"result": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0", "bare": True}
+            for kind in study.barred
+        ),
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for answer in answers:
@@ -287,6 +290,8 @@ def _in_words(requirement: Requirement) -> dict[str, str]:
         "result": f"|{path}|" if requirement.abs else path,
         "where": ", ".join(f"{column} {value}" for column, value in requirement.where.items()),
         "limit": ", ".join(f"{sign} {text_of(bound) or shown(bound)}" for sign, bound in bounds if bound is not None),
+        # A quantity has its unit already.
+        "bare": not any(text_of(bound) for _, bound in bounds),
     }
 
 
