@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import counted, nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.rounding import cleared
 from mechdesign.results import Result, Strands, Table
 from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread, Several
 
@@ -144,6 +145,8 @@ class Chosen:
             courses = [*self.courses.values()]
             lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
             numbers = np.where(lost, rows, statistic(Several(courses, spread)))
+            if not STATISTICS[self.statistic].pure:
+                numbers = cleared(numbers, max(course.rounding for course in courses))
             return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
 
     def _several(self, count: int) -> str:

@@ -112,15 +112,15 @@ class RowSpread:
 class Several:
     """Values of several columns along motions, of as many values each, as those of one, and of the rows among them."""
 
-    parts: Sequence[Spread]
+    parts: Sequence[Course]
     rows: RowSpread
 
     def end(self, sign: int) -> Floats:
         """The largest value of all, or with the sign -1 the smallest: that of a row where it is farther out."""
         between = sign * np.max([sign * part.end(sign) for part in self.parts], axis=0)
-        row = self.rows.end(sign)
+        row, rounding = self.rows.end(sign), max(part.rounding for part in self.parts)
         with np.errstate(invalid="ignore"):
-            return np.where(sign * (row - between) > AT_END * np.abs(between), row, between)
+            return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), rounding), row, between)
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of all values."""
@@ -187,6 +187,10 @@ class Course(Spread, Protocol):
     @property
     def followed(self) -> Flags:
         """Which motions are followed between their poses, shape (designs,)."""
+
+    @property
+    def rounding(self) -> float:
+        """Values up to this are rounding."""
 
     @property
     def lost(self) -> Floats:

@@ -93,6 +93,10 @@ class Series:
         """Values of all functions at places of lines, shape (functions, n)."""
         return self._values(line, s)[0]
 
+    def size(self, name: str) -> float:
+        """What a function's rounding is judged by, whatever its values are."""
+        return float(self._sizes[self.names[name]])
+
     def lost(self, name: str) -> Floats:
         """Part of each motion on which a function has no value, shape (lines,); 0 where that is rounding."""
         pieces = self.pieces

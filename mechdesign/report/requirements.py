@@ -296,6 +296,8 @@ def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str
     most, place = float(values[row]), place_of(chosen.table, row, chosen.column, freedom)
     for words, course in chosen.courses.items():
         end, at = (float(part[0]) for part in course.worst(sign, absolute=statistic.absolute))
+        if abs(most) <= course.rounding and np.isnan(at):
+            return ""
         if np.isfinite(at) and sign * end >= most - AT_END * abs(most):
             most, place = sign * end, ", ".join(filter(None, (course.shown(at), words)))
     return place
@@ -321,6 +323,10 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
             where = ", ".join(filter(None, (course.shown(place), words)))
             between = _verdict(requirement, bounds, value, where, verdict.unit)
             verdict = between if not between.margin >= verdict.margin else verdict
+    if any(abs(verdict.worst) <= course.rounding for course in chosen.courses.values()):
+        # Where the motion has no place of its extremes, all of it is rounding.
+        ends = [float(course.worst(sign)[1][0]) for course in chosen.courses.values() for sign in (1, -1)]
+        verdict = _verdict(requirement, bounds, 0.0, verdict.place if np.isfinite(ends).any() else "", verdict.unit)
     if chosen.lacking:
         verdict = _verdict(requirement, bounds, float("nan"), "", verdict.unit)
     return _scoped(verdict, chosen, requirement)
@@ -394,9 +400,10 @@ def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) 
     """
     places = {before.name: column for before, column in pairwise(table.columns) if column.kind in _PLACES}
     place = places.get(judged)
-    if place is not None and np.isfinite(place.values[row]):
+    if place is not None:
         words = [f"{column.name} {column.values[row]}" for column in table.columns[:1] if not column.numeric]
-        return ", ".join([*words, f"{place.meaning.partition(' at the ')[0]} {place.values[row]:.6g}"])
+        at = [f"{place.meaning.partition(' at the ')[0]} {place.values[row]:.6g}"]
+        return ", ".join([*words, *(at if np.isfinite(place.values[row]) else [])])
     parts: list[str] = []
     for column in table.columns:
         if column.numeric:

@@ -21,6 +21,7 @@ from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.rounding import STILL, cleared, larger
 from mechdesign.questions.columns import GIVEN
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import APART
@@ -306,11 +307,13 @@ class Along:
             values, places = self.least([name], still)
             return values[0], places[0]
         peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
-        (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
+        low, high = cleared(peaks.value[:, 0], STILL * self.functions.size(name))
+        # What is rounding everywhere has no place.
+        low_at, high_at = np.where((low == 0) & (high == 0), np.nan, peaks.place[:, 0])
         if not absolute:
             return (high, high_at) if sign > 0 else (low, low_at)
-        larger = high >= -low
-        return np.where(larger, high, -low), np.where(larger, high_at, low_at)
+        upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
+        return np.where(upper, high, -low), np.where(upper, high_at, low_at)
 
     def least(self, names: Sequence[str], still: float) -> tuple[Floats, Floats]:
         """Smallest absolute values of functions over each motion, and their places; shape (names, lines).

@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.numerics.rounding import STILL, cleared
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.results import Table
 from mechdesign.rows import no_value, no_value_along
 
-# A range below this part of a function's size is rounding.
-STILL = 1e-12
 # A row within this part of an extreme of the motion between the rows does not contradict it.
 AT_ROW = 1e-9
 
@@ -96,6 +95,9 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         better = np.isfinite(peaks.place) & moves & ~kept
         for k, new in enumerate((peaks.value, shown)):
             ends[:, k, followed] = np.where(better, new, ends[:, k, followed])
+    values = cleared(ends[:, 0], STILL * np.maximum(finite, size))
+    # What is rounding everywhere has no place.
+    ends = np.stack([values, np.where((values == 0).all(axis=0), np.nan, ends[:, 1])], axis=1)
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
