@@ -67,9 +67,10 @@ class Chosen:
         """Where a row that counts, or the motion between the rows, has no value, in words; empty where it has."""
         if self.table.lacking is not None:
             return next(filter(None, self.table.lacking[self.counts].tolist()), "")
-        lost = np.count_nonzero(np.isnan(self.values[self.counts]))
+        counts = self.counts & (self.table["valid"].astype(bool) if "valid" in self.table else True)
+        lost = np.count_nonzero(np.isnan(self.values[counts]))
         if lost and self.table.scope is not None and len(self.table) > 1:
-            return no_value(lost, int(np.count_nonzero(self.counts)))
+            return no_value(lost, int(np.count_nonzero(counts)))
         return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")
 
     @property

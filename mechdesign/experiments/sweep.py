@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -195,16 +196,18 @@ def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:
 def requirement_names(study: Study, entries: Sequence[str]) -> list[str]:
     """Columns of the requirements: the result that each judges, with its bounds where another judges the same.
 
-    Rows that count are named where they are the same in all cases, of which `entries` vary.
+    Of several in the same words the later ones have their numbers in the study. Rows that count are named where they
+    are the same in all cases, of which `entries` vary.
     """
     names = [str(requirement.result) if _varies(entries, k, "where") else requirement.name
              for k, requirement in enumerate(study.requirements)]  # fmt: skip
     names = [f"|{name}|" if requirement.abs else name
              for name, requirement in zip(names, study.requirements, strict=True)]  # fmt: skip
-    return [
-        in_words(requirement) if names.count(name) > 1 else name
-        for requirement, name in zip(study.requirements, names, strict=True)
-    ]  # fmt: skip
+    several = Counter(names)
+    names = [in_words(requirement) if several[name] > 1 else name
+             for requirement, name in zip(study.requirements, names, strict=True)]  # fmt: skip
+    first = {name: k for k, name in reversed([*enumerate(names)])}
+    return [name if first[name] == k else f"{name}, requirement {k + 1}" for k, name in enumerate(names)]
 
 
 def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caution]:

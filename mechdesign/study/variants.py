@@ -88,7 +88,7 @@ def judging(study: Study, changes: Changes) -> Judging | None:
     context = context_of(study.resolved, Reporter(document))[0]
     try:
         override(document, overrides(changes))
-        parts = [adapter(key).validate_python(document.data.get(key) or (), context=context) for key in JUDGED]
+        parts = [adapter(key).validate_python(document.data.get(key) or [], context=context) for key in JUDGED]
     except (StudyError, ValidationError):
         return None
     return Judging(*parts)
