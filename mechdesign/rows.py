@@ -70,7 +70,7 @@ class Chosen:
         counts = self.counts & (self.table["valid"].astype(bool) if "valid" in self.table else True)
         lost = np.count_nonzero(np.isnan(self.values[counts]))
         if lost and self.table.scope is not None and len(self.table) > 1:
-            return no_value(lost, int(np.count_nonzero(counts)))
+            return no_value(lost, int(np.count_nonzero(counts)), "pose" if self.table.strands is None else "row")
         return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")
 
     @property
@@ -168,9 +168,9 @@ class Chosen:
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
 
 
-def no_value(number: int, count: int) -> str:
-    """That some of the poses that count have no value, in words."""
-    return f"no value in {number} of {counted(count, 'pose')}"
+def no_value(number: int, count: int, noun: str = "pose") -> str:
+    """That some of the poses or rows that count have no value, in words."""
+    return f"no value in {number} of {counted(count, noun)}"
 
 
 def no_value_along(part: float) -> str:

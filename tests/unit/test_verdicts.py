@@ -211,6 +211,26 @@ def test_designs_without_a_value_somewhere_are_not_feasible(asked: str):
     assert result.tables["designs"]["r"][np.isfinite(result.tables["designs"]["CPI"])].tolist() == [28, 29]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [7, 73])
+@pytest.mark.parametrize(
+    ("command", "result"),
+    [
+        *(("kinematics", name) for name in ("theta_effort", "theta_effort.rms", "extremes.theta_effort.range")),
+        *(("dynamics", name) for name in ("theta_effort", "magnitude.max", "O_force", "flywheel.surplus.max",
+                                          "extremes.theta_effort.mean", "extremes.O_force.peak")),
+    ],
+)  # fmt: skip
+def test_forces_of_loads_without_a_value_somewhere_meet_nothing(command: str, result: str, number: int):
+    text = CRANK_ROCKER.format(measure="0*B.x", number=number).replace("kinematics:", f"{command}:")
+    more = "rates: {theta: 60 rpm}, flywheel: {fluctuation: 0.05}, " if command == "dynamics" else ""
+    load = f'{more}loads: [{{at: B, force: ["sqrt(B.x - 50.01)", 0]}}]'
+    text = text.replace("outputs: [B, q]", load)
+    (verdict,) = verdicts(text + f"requirements: [{{result: {command}.{result}, at_most: 1e12}}]\n", command)
+    assert not verdict.met
+    assert math.isnan(verdict.worst)
+
+
 # Point 19: moments of some of the samples.
 
 

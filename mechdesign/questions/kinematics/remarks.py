@@ -71,19 +71,24 @@ def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[
     return warnings
 
 
+def valued(question: MotionQuestion) -> list[str]:
+    """Columns that have a value in every regular pose: outputs, and without friction the efforts."""
+    statics = question.statics if question.friction is None else ()
+    efforts = [static.name for static in statics if static.name.endswith("_effort")]
+    return [*(output.name for output in question.outputs), *efforts]
+
+
 def without_value(question: MotionQuestion, marks: Mapping[str, Mark], between: Mapping[str, float]) -> list[Caution]:
     """Warnings of outputs that have no value at valid poses, or on parts of the motion `between` them."""
     study, poses, warnings = question.study, question.poses, []
-    for output in question.outputs:
-        count, row = marks.get(f"{output.name}{_WITHOUT_VALUE}", (0, 0))
+    for name in valued(question):
+        count, row = marks.get(f"{name}{_WITHOUT_VALUE}", (0, 0))
         if count:
             first = pose_in_words(study, poses, row)
-            words = f"{output.name} has {no_value(count, poses.count)}; the first: {first}"
+            words = f"{name} has {no_value(count, poses.count)}; the first: {first}"
             warnings.append(Caution("undefined", words, _TABLE, row, first))
-        elif part := between.get(output.name, 0.0):
-            warnings.append(
-                Caution("undefined", f"{output.name} has {no_value_along(part)}, between its poses", _TABLE)
-            )
+        elif part := between.get(name, 0.0):
+            warnings.append(Caution("undefined", f"{name} has {no_value_along(part)}, between its poses", _TABLE))
     return warnings
 
 
@@ -119,9 +124,9 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     marks |= outside(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
-    for output in question.outputs:
-        if (lost := valid & steady & np.isnan(arrays[output.name])).any():
-            marks[f"{output.name}{_WITHOUT_VALUE}"] = lost
+    for name in valued(question):
+        if (lost := valid & steady & np.isnan(arrays[name])).any():
+            marks[f"{name}{_WITHOUT_VALUE}"] = lost
     for centre in question.centres:
         for kind in _CENTRELESS:
             marks[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)
