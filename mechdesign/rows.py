@@ -68,7 +68,7 @@ class Chosen:
         if self.table.lacking is not None:
             return next(filter(None, self.table.lacking[self.counts].tolist()), "")
         counts = self.counts & (self.table["valid"].astype(bool) if "valid" in self.table else True)
-        lost = np.count_nonzero(np.isnan(self.values[counts]))
+        lost = int(np.count_nonzero(np.isnan(self.values[counts])))
         if lost and self.table.scope is not None and len(self.table) > 1:
             return no_value(lost, int(np.count_nonzero(counts)), "pose" if self.table.strands is None else "row")
         return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")

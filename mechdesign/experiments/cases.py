@@ -82,9 +82,12 @@ class Answer:
         right = np.array([own is not None for own in required]) & (designs is not None and designs.faults == "")
         if designs is not None and right.any():
             some = np.flatnonzero(right)
-            designs = designs.take(some)
-            for k, own in zip(some.tolist(), designs.required([required[k] for k in some.tolist()]), strict=True):
-                sheet.judging[rows[k]] = own
+            designs, known = (
+                designs.take(some),
+                [own for own, good in zip(required, right, strict=True) if good and own],
+            )
+            for row, own in zip(rows[some].tolist(), designs.required(known), strict=True):
+                sheet.judging[row] = own
             self._together(sheet, rows[some], designs)
         for k in np.flatnonzero(~right).tolist():
             self._alone(sheet, rows[k : k + 1], cases[k])

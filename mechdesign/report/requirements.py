@@ -349,7 +349,7 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
 def _counted(chosen: Chosen, requirement: Requirement) -> Flags:
     """Rows that count; those of poses that are not valid do not where the study allows them."""
     if requirement.unassembled and "valid" in chosen.table:
-        return chosen.counts & chosen.table["valid"].astype(bool)
+        return np.asarray(chosen.counts & chosen.table["valid"].astype(bool))
     return chosen.counts
 
 

@@ -283,7 +283,7 @@ def _meanings(section: Mapping[str, Any] | None) -> dict[str, str]:
     return {column["name"]: column["meaning"] for column in columns if column["numeric"] and not column["unit"]}
 
 
-def _in_words(requirement: Requirement) -> dict[str, str]:
+def _in_words(requirement: Requirement) -> dict[str, Any]:
     path = path_of(requirement.result)
     bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
