@@ -206,11 +206,18 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
         [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
     )
     links = np.array([holders(task.study, channel) for channel in task.question.channels])
-    return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
+    table = CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
         share=share.ravel(), **_index_values(indices, share.shape),
     ))  # fmt: skip
+    lost = {
+        row: f"{own.invalid} of {own.samples} samples cannot be assembled"
+        for row, own in indices.items()
+        if own.invalid
+    }
+    words = np.array([lost.get(row, "") for row in pose.tolist()], dtype=str)
+    return replace(table, unassembled={name: words for name in table.names if name.startswith("sobol_")})
 
 
 def _index_values(by_pose: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
