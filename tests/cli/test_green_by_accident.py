@@ -278,6 +278,64 @@ def test_files_of_cases_are_not_green(text: str, folder, invoke):
     assert (done.exit_code, reason in done.output) == (code, True), done.output
 
 
+UNMET = ["--set", "requirements.0.at_most=1"]
+# Commands one after the other, "edit" in the place of a hand that turns the verdict in a manifest; then the exit code
+# and a part of the reason of the last.
+SEQUENCES: dict[str, tuple[list[list[str] | str], int, str]] = {
+    "no study here": ([["run"]], 2, "no study is named"),
+    "an empty name": ([["run", ""]], 2, "empty"),
+    "a file of another name": ([["run", "bra.yaml"]], 2, "cannot be read"),
+    "one of two files": ([["run", "bar.yaml", "bra.yaml"]], 2, "cannot be read"),
+    "a merge of nothing": ([["merge", "bar.yaml"]], 2, "there are no shards"),
+    "a merge of one shard of two": (
+        [["sweep", "bar.yaml", "--vary", "requirements.0.at_most=1000,1", "--shard", "1/2"], ["merge", "bar.yaml"]], 2,
+        "shards are missing: 2/2",
+    ),
+    "a merge of shards whose limits differ": (
+        [["sweep", "bar.yaml", "--vary", "requirements.0.at_most=1000,1", "--shard", "1/2"],
+         ["sweep", "bar.yaml", "--vary", "requirements.0.at_most=1000,1", "--shard", "2/2"], ["merge", "bar.yaml"]], 1,
+        "1 of 2 cases do not meet it",
+    ),
+    "results kept from a wider limit": ([["run", "bar.yaml"], ["run", "bar.yaml", "--resume", *UNMET]], 1, "NOT MET"),
+    "results kept that miss it": ([["run", "bar.yaml", *UNMET], ["run", "bar.yaml", "--resume", *UNMET]], 1, "NOT MET"),
+    "an edited verdict that is kept": (
+        [["run", "bar.yaml", *UNMET], "edit", ["run", "bar.yaml", "--resume", *UNMET]], 1, "NOT MET",
+    ),
+    "verified results that miss it": (
+        [["run", "bar.yaml", *UNMET], ["run", "--verify", "results/bar"]], 1, "NOT MET, worst 104",
+    ),
+    "an edited verdict that is verified": (
+        [["run", "bar.yaml", *UNMET], "edit", ["run", "--verify", "results/bar"]], 1, "NOT MET, worst 104",
+    ),
+    "nothing to verify": ([["run", "--verify", "results/bar"]], 2, "no such folder"),
+    "nothing to compare": ([["run", "bar.yaml"], ["compare", "results/bar", "results/bra"]], 2, "no such folder"),
+    "a verdict that is another": (
+        [["run", "bar.yaml"], ["run", "bar.yaml", "--out", "other", *UNMET], ["compare", "results/bar", "other"]], 1,
+        "at most 1",
+    ),
+    "a junit file of what is not met": (
+        [["run", "bar.yaml", "--junit", "junit.xml", *UNMET]], 1, "at most 1: NOT MET, worst 104",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("way", SEQUENCES)
+def test_what_is_left_on_the_disk_is_not_green(way: str, folder, invoke):
+    (folder / "bar.yaml").write_text(STUDY + GATE)
+    steps, code, reason = SEQUENCES[way]
+    done = None
+    for step in steps:
+        if isinstance(step, str):
+            manifest = folder / "results/bar/kinematics/manifest.json"
+            manifest.write_text(manifest.read_text().replace('"met": false', '"met": true'))
+        else:
+            plain = [] if step[0] in ("merge", "compare") or "--verify" in step else ["--no-plots"]
+            done = invoke(*step, *plain)
+    assert done is not None
+    assert (done.exit_code, reason in done.output) == (code, True), done.output
+
+
 # Texts of a study that judge nothing, and a part of the reason.
 TEXTS = {
     STUDY + "Requirements: [{result: kinematics.B.x, at_most: 1}]\n": "unknown key",
