@@ -151,6 +151,7 @@ def test_values_that_fit_together_only_are_cases_with_labels(tmp_path: Path):
 # Point 15: no value on a part of the motion.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["", ".min", ".max", ".mean", ".range", ".rms", ".peak", ".evenness"])
 @pytest.mark.parametrize("number", [4, 73])
 def test_a_measure_without_a_value_somewhere_meets_nothing(word: str, number: int):
@@ -337,6 +338,14 @@ def test_a_real_zero_keeps_its_place():
     table = mechdesign.kinematics(mechdesign.load(text=ARM)).tables["extremes"]
     by_name = {name: k for k, name in enumerate(table["output"].tolist())}
     assert (table["min"][by_name["P.x"]], abs(table["min_at"][by_name["P.x"]])) == (0, 90)
+
+
+def test_errors_of_rounding_have_no_place():
+    """The arm's end lies where its target says, up to rounding."""
+    text = ARM.replace("{links", "{targets: {P.x: 100*cos(arm)}, links")
+    table = mechdesign.kinematics(mechdesign.load(text=text)).tables["targets"]
+    assert [table[name].tolist() for name in ("rms", "mean", "max_abs")] == [[0], [0], [0]]
+    assert np.isnan(table["at"]).all()
 
 
 def test_of_two_equal_peaks_the_first_counts():

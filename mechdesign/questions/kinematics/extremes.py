@@ -153,6 +153,8 @@ def targets_table(motion: Motion, along: Along | None) -> Table:
                 along.shown(np.arange(len(place)), place),
             ])  # fmt: skip
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
+        numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * motion.question.sizes.get(error.quantity, 1.0))
+        numbers[3, numbers[2, :, k] == 0, k] = np.nan
     rms, mean, largest, where = numbers.reshape(4, -1)
     words = of_swept(study, swept, "row (from 0)")
     units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
