@@ -5,16 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import counted, nearest, suggestion
+from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.rounding import cleared
 from mechdesign.results import Result, Strands, Table
-from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread, Several
+from mechdesign.statistics import (
+    STATISTICS,
+    Course,
+    Interval,
+    Measured,
+    Part,
+    Request,
+    RowSpread,
+    Several,
+    Span,
+    no_value,
+    no_value_along,
+)  # fmt: skip
 
 HELP_PAGE = "reference/study/requirements"
 
@@ -166,32 +178,6 @@ class Chosen:
             If it is a quantity of another kind.
         """
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
-
-
-def no_value(number: int, count: int, noun: str = "pose") -> str:
-    """That some of the poses or rows that count have no value, in words."""
-    return f"no value in {number} of {counted(count, noun)}"
-
-
-def no_value_along(part: float) -> str:
-    """That a part of a motion has no value, in words."""
-    return f"no value on {100 * part:.3g} % of the motion"
-
-
-@runtime_checkable
-class Span(Protocol):
-    """Values from one to another, such as `mechdesign.questions.optimize.schema.Span`."""
-
-    def interval(self, unit: str) -> Interval:
-        """The values in a unit of a table; raises ValueError if it is another kind of quantity."""
-
-
-@runtime_checkable
-class Measured(Protocol):
-    """A number with a unit, such as `mechdesign.study.text.units.Amount`."""
-
-    def within(self, unit: str) -> float:
-        """The number in a unit of a table; raises ValueError if it is another kind of quantity."""
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:

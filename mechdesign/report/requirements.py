@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
@@ -13,10 +13,9 @@ from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.numerics.arrays import Flags
-from mechdesign.questions.dynamics import columns as dynamics
-from mechdesign.questions.kinematics import columns as kinematics
 from mechdesign.questions.optimize.schema import Requirement
-from mechdesign.results import POSES_ONLY, Drawn, Result, Table
+from mechdesign.report.row_words import place_of
+from mechdesign.results import POSES_ONLY, Drawn, Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.statistics import AT_END, STATISTICS
 from mechdesign.study import Study
@@ -28,12 +27,6 @@ HELP_PAGE = "reference/study/requirements"
 
 Bounds = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
-# Columns of the places of the extremes before them.
-_PLACES = [
-    *(table[f"{end}_at"] for table in (kinematics.EXTREMES, dynamics.EXTREMES) for end in ("min", "max")),
-    *(kinematics.LOOPS[f"transmission_{end}_at"] for end in ("min", "max")),
-    dynamics.EXTREMES["peak_at"], kinematics.TARGETS["at"],
-]  # fmt: skip
 # Place of a verdict where the motion never enters the part that a requirement is about.
 _OUTSIDE = "no place of the motion"
 
@@ -390,27 +383,3 @@ def in_words(requirement: Requirement) -> str:
     bounds = [f"{words} {written(bound)}" for words, bound in limits if bound is not None]
     allowed = ", unassembled allowed" if requirement.unassembled else ""
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}{allowed}"
-
-
-def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method.
-
-    In a table of extremes it is the place of the extreme. `begin` is the number of rows before the table, where it is a
-    part of a long one.
-    """
-    places = {before.name: column for before, column in pairwise(table.columns) if column.kind in _PLACES}
-    place = places.get(judged)
-    if place is not None:
-        words = [f"{column.name} {column.values[row]}" for column in table.columns[:1] if not column.numeric]
-        at = [f"{place.meaning.partition(' at the ')[0]} {place.values[row]:.6g}"]
-        return ", ".join([*words, *(at if np.isfinite(place.values[row]) else [])])
-    parts: list[str] = []
-    for column in table.columns:
-        if column.numeric:
-            freedom -= 1
-            if column.name == judged or (freedom < 0 and table.strands is None):
-                break
-            parts += [f"{column.name} {column.values[row]:.6g}"] if freedom >= 0 else []
-        else:
-            parts.append(f"{column.name} {column.values[row]}")
-    return ", ".join(parts) or f"row {begin + row + 1}"

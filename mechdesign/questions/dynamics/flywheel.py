@@ -20,8 +20,7 @@ from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import radians
 from mechdesign.results import Table
-from mechdesign.rows import no_value_along
-from mechdesign.statistics import Request
+from mechdesign.statistics import Request, no_value_along
 from mechdesign.study.poses import Poses
 
 # Work over the next motion that differs by less than this part of the work of the size of the effort is the same; of an

@@ -13,7 +13,7 @@ from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.results import Table
-from mechdesign.rows import no_value, no_value_along
+from mechdesign.statistics import no_value, no_value_along
 
 # A row within this part of an extreme of the motion between the rows does not contradict it.
 AT_ROW = 1e-9

@@ -16,7 +16,7 @@ from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
-from mechdesign.rows import no_value, no_value_along
+from mechdesign.statistics import no_value, no_value_along
 from mechdesign.study.poses import Poses
 
 _TABLE = "motion"  # whose rows are the poses
