@@ -6,6 +6,7 @@ One that has poles, such as a drive's effort at a singularity, is followed as th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -99,10 +100,16 @@ class Series:
 
     def lost(self, name: str) -> Floats:
         """Part of each motion on which a function has no value, shape (lines,); 0 where that is rounding."""
-        pieces = self.pieces
-        empty = np.isnan(self._table[self.names[name]]).sum(axis=1) > chebyshev.COUNT // 2
-        length = np.bincount(pieces.line, (pieces.end - pieces.begin) * empty, self.curve.lines)
-        return np.where(length > LOST * self.curve.poses.end, length / self.curve.poses.end, 0.0)
+        return self._lost[self.names[name]]
+
+    @cached_property
+    def _lost(self) -> Floats:
+        pieces, end = self.pieces, self.curve.poses.end
+        empty = np.isnan(self._table).sum(axis=2) > chebyshev.COUNT // 2
+        length = np.zeros((len(empty), self.curve.lines))
+        for row in np.flatnonzero(empty.any(axis=1)).tolist():
+            length[row] = np.bincount(pieces.line, (pieces.end - pieces.begin) * empty[row], self.curve.lines)
+        return np.where(length > LOST * end, length / max(end, LOST), 0.0)
 
     def _values(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]
