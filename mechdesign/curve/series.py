@@ -100,7 +100,7 @@ class Series:
 
     def lost(self, name: str) -> Floats:
         """Part of each motion on which a function has no value, shape (lines,); 0 where that is rounding."""
-        return self._lost[self.names[name]]
+        return np.asarray(self._lost[self.names[name]])
 
     @cached_property
     def _lost(self) -> Floats:
