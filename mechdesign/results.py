@@ -211,6 +211,10 @@ class Table:
     meaning: str = ""
     scope: Scope | None = None  #: of poses and motions
     strands: Strands | None = None  #: the rows of a pose, where it has several
+    #: of each row, why its numbers are not those of the whole motion; empty where they are
+    lacking: NDArray[Any] | None = None
+    #: of each row, by column, how many of the samples behind it cannot be assembled, in words; empty where all can
+    unassembled: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         lengths = {len(column.values) for column in self.columns}
@@ -249,7 +253,9 @@ class Table:
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
         columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)
-        return replace(self, columns=columns)
+        unassembled = {name: words[rows] for name, words in self.unassembled.items()}
+        lacking = None if self.lacking is None else self.lacking[rows]
+        return replace(self, columns=columns, lacking=lacking, unassembled=unassembled)
 
     def blocks(self) -> Iterator[Table]:
         """The table in parts, one after the other, of which each is in memory."""
@@ -321,6 +327,7 @@ class LongTable(Table):
         columns = tuple(_LongColumn(column, self._values) for column in some.columns)
         self.__dict__.update(
             name=some.name, columns=columns, meaning=some.meaning, scope=some.scope, strands=some.strands,
+            lacking=None, unassembled={},
             _some=some, _count=count, _source=source,
         )  # fmt: skip
 

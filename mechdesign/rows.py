@@ -5,15 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.rounding import cleared
 from mechdesign.results import Result, Strands, Table
-from mechdesign.statistics import STATISTICS, Course, Interval, Part, Request, RowSpread, Several
+from mechdesign.statistics import (
+    STATISTICS,
+    Course,
+    Interval,
+    Measured,
+    Part,
+    Request,
+    RowSpread,
+    Several,
+    Span,
+    no_value,
+    no_value_along,
+)  # fmt: skip
 
 HELP_PAGE = "reference/study/requirements"
 
@@ -60,6 +73,24 @@ class Chosen:
         """Whether it speaks of the poses alone, though rows of a motion are judged."""
         scope = self.table.scope
         return scope is not None and (scope.poses_only or not (scope.follow is None or self.picked or self.courses))
+
+    @property
+    def lacking(self) -> str:
+        """Where a row that counts, or the motion between the rows, has no value, in words; empty where it has."""
+        if self.table.lacking is not None:
+            return next(filter(None, self.table.lacking[self.counts].tolist()), "")
+        counts = self.counts & (self.table["valid"].astype(bool) if "valid" in self.table else True)
+        lost = int(np.count_nonzero(np.isnan(self.values[counts])))
+        if lost and self.table.scope is not None and len(self.table) > 1:
+            return no_value(lost, int(np.count_nonzero(counts)), "pose" if self.table.strands is None else "row")
+        return next((no_value_along(part) for course in self.courses.values() if (part := float(course.lost[0]))), "")
+
+    @property
+    def gaps(self) -> tuple[str, ...]:
+        """Which poses, parts of the motion or samples are missing, in words; empty where none is."""
+        words = self.table.unassembled.get(self.column)
+        rows = [] if words is None else [word for word in words[self.counts].tolist() if word][:1]
+        return tuple(filter(None, [self.table.scope.missing if self.table.scope is not None else "", *rows]))
 
     @cached_property
     def courses(self) -> Mapping[str, Course]:
@@ -126,7 +157,10 @@ class Chosen:
                 return rows
             courses = [*self.courses.values()]
             lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
-            return np.where(lost, rows, statistic(Several(courses, spread)))
+            numbers = np.where(lost, rows, statistic(Several(courses, spread)))
+            if not STATISTICS[self.statistic].pure:
+                numbers = cleared(numbers, max(course.rounding for course in courses))
+            return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
 
     def _several(self, count: int) -> str:
         words = [*STATISTICS]
@@ -144,22 +178,6 @@ class Chosen:
             If it is a quantity of another kind.
         """
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
-
-
-@runtime_checkable
-class Span(Protocol):
-    """Values from one to another, such as `mechdesign.questions.optimize.schema.Span`."""
-
-    def interval(self, unit: str) -> Interval:
-        """The values in a unit of a table; raises ValueError if it is another kind of quantity."""
-
-
-@runtime_checkable
-class Measured(Protocol):
-    """A number with a unit, such as `mechdesign.study.text.units.Amount`."""
-
-    def within(self, unit: str) -> float:
-        """The number in a unit of a table; raises ValueError if it is another kind of quantity."""
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
@@ -209,6 +227,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         worded = worded if table.column(name).numeric else worded & equal
     _one_unit(table, column, counts)
     numbers = values.astype(float)
+    if table.lacking is not None:
+        numbers = np.where(table.lacking == "", numbers, np.nan)
     missing = "" if counts.any() or part else _missing(table, rows, where)
     return Chosen(
         table, column, np.abs(numbers) if absolute else numbers, counts, missing, statistic, tuple(part),

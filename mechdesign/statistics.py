@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from mechdesign.errors import counted
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Values this little beyond an end of an interval, as a part of the end (or of a turn), count as inside.
@@ -112,15 +113,15 @@ class RowSpread:
 class Several:
     """Values of several columns along motions, of as many values each, as those of one, and of the rows among them."""
 
-    parts: Sequence[Spread]
+    parts: Sequence[Course]
     rows: RowSpread
 
     def end(self, sign: int) -> Floats:
         """The largest value of all, or with the sign -1 the smallest: that of a row where it is farther out."""
         between = sign * np.max([sign * part.end(sign) for part in self.parts], axis=0)
-        row = self.rows.end(sign)
+        row, rounding = self.rows.end(sign), max(part.rounding for part in self.parts)
         with np.errstate(invalid="ignore"):
-            return np.where(sign * (row - between) > AT_END * np.abs(between), row, between)
+            return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), rounding), row, between)
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of all values."""
@@ -160,6 +161,22 @@ class Interval(NamedTuple):
         return [np.sin(np.pi * (values - end) / self.turn) if self.turn else values - end for end in ends]
 
 
+@runtime_checkable
+class Span(Protocol):
+    """Values from one to another, such as `mechdesign.questions.optimize.schema.Span`."""
+
+    def interval(self, unit: str) -> Interval:
+        """The values in a unit of a table; raises ValueError if it is another kind of quantity."""
+
+
+@runtime_checkable
+class Measured(Protocol):
+    """A number with a unit, such as `mechdesign.study.text.units.Amount`."""
+
+    def within(self, unit: str) -> float:
+        """The number in a unit of a table; raises ValueError if it is another kind of quantity."""
+
+
 # A part of a motion: columns, and the interval in which each lies there.
 Part = tuple[tuple[str, Interval], ...]
 
@@ -188,6 +205,14 @@ class Course(Spread, Protocol):
     def followed(self) -> Flags:
         """Which motions are followed between their poses, shape (designs,)."""
 
+    @property
+    def rounding(self) -> float:
+        """Values up to this are rounding."""
+
+    @property
+    def lost(self) -> Floats:
+        """Part of each motion on which it has no value, shape (designs,)."""
+
     def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
         """The largest value times the sign (of absolute values, where these count) and its place in rows.
 
@@ -213,3 +238,13 @@ class Course(Spread, Protocol):
 
 # Columns along motions, asked together; None for each that is not known there.
 Follow = Callable[[Sequence[Request]], Sequence[Course | None]]
+
+
+def no_value(number: int, count: int, noun: str = "pose") -> str:
+    """That some of the poses or rows that count have no value, in words."""
+    return f"no value in {number} of {counted(count, noun)}"
+
+
+def no_value_along(part: float) -> str:
+    """That a part of a motion has no value, in words."""
+    return f"no value on {100 * part:.3g} % of the motion"

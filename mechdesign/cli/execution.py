@@ -35,7 +35,7 @@ from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.loading import Source, load_bytes, read_file
-from mechdesign.study.text.document import MAX_BYTES
+from mechdesign.study.text.document import MAX_BYTES, leaves, read
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import ahead, shards
 from mechdesign.work.chunks import Divided, divided, worker_count
@@ -116,7 +116,13 @@ def load_source(source: Source, options: Options) -> Study:
     StudyError
         Every mistake of the study or the overrides.
     """
-    study = load_bytes(source.text, source.path, options.overrides or (), options.seed, source.folder)
+    changes = options.overrides or ()
+    values = (text.partition("=")[2].encode(errors="surrogateescape") for text in changes)
+    parts = (read(value, "").data for value in values if value.strip())
+    given = frozenset(value for part in parts for _, value in leaves(part) if isinstance(value, str))
+    # The rule for files is of what a study names, not of what its user does.
+    folder = dataclasses.replace(source.folder, given=given)
+    study = load_bytes(source.text, source.path, changes, options.seed, folder)
     return dataclasses.replace(study, strict=True) if options.strict else study
 
 

@@ -53,8 +53,11 @@ class Matrix:
                     raise StudyError(f"--vary {name} is given twice; list its values with commas between them")
             yield f"matrix.vary={in_yaml(dict(varied))}"
         if self.cases is not None:
+            here = study is not None or Path("study.yaml").exists()
             beside = study.parent if study is not None else Path()
-            yield f"matrix.cases={in_yaml(os.path.relpath(self.cases, beside))}"
+            # The built-in study lies elsewhere.
+            file = os.path.relpath(self.cases, beside) if here else os.path.abspath(self.cases)
+            yield f"matrix.cases={in_yaml(file)}"
         if self.maximize or self.minimize:
             yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
         lists = {"results": self.results, "best.maximize": self.maximize, "best.minimize": self.minimize}

@@ -6,6 +6,7 @@ One that has poles, such as a drive's effort at a singularity, is followed as th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -35,6 +36,9 @@ MEAN_ERROR = 1e-10
 MOST_LOST = 4
 # Rounding of a quotient at a node, as a part of its value, with which the node says nothing of it.
 NOISE = 2e-8
+
+# A part of a motion on which a function has no value is rounding, such as of a root of zero, if it is shorter.
+LOST = 1e-6
 
 # Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
@@ -89,6 +93,23 @@ class Series:
     def at(self, line: Ints, s: Floats) -> Floats:
         """Values of all functions at places of lines, shape (functions, n)."""
         return self._values(line, s)[0]
+
+    def size(self, name: str) -> float:
+        """What a function's rounding is judged by, whatever its values are."""
+        return float(self._sizes[self.names[name]])
+
+    def lost(self, name: str) -> Floats:
+        """Part of each motion on which a function has no value, shape (lines,); 0 where that is rounding."""
+        return np.asarray(self._lost[self.names[name]])
+
+    @cached_property
+    def _lost(self) -> Floats:
+        pieces, end = self.pieces, self.curve.poses.end
+        empty = np.isnan(self._table).sum(axis=2) > chebyshev.COUNT // 2
+        length = np.zeros((len(empty), self.curve.lines))
+        for row in np.flatnonzero(empty.any(axis=1)).tolist():
+            length[row] = np.bincount(pieces.line, (pieces.end - pieces.begin) * empty[row], self.curve.lines)
+        return np.where(length > LOST * end, length / max(end, LOST), 0.0)
 
     def _values(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]

@@ -18,7 +18,7 @@ from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
-from mechdesign.study.designs import Designs
+from mechdesign.study.variants import Judging
 
 # Exit code of a case that misses a requirement, or has a warning that the study forbids.
 NOT_MET = 1
@@ -28,10 +28,14 @@ IMPOSSIBLE = 3
 
 @dataclass
 class Worst:
-    """The worst verdict on a requirement over cases, its case, and the number and the first of those that miss it."""
+    """The worst verdict on a requirement over cases, its case, and the number and the first of those that miss it.
+
+    `margin` is from the limit in the unit of the result, the lowest where none is known or would meet it.
+    """
 
     case: int
     verdict: Verdict
+    margin: float
     unmet: int = 0
     first: int = 0
 
@@ -77,7 +81,8 @@ class Sheet:
 
     def __init__(self, study: Study, results: Sequence[CaseNumber], count: int) -> None:
         self._required, self._results, self._mobility = study.requirements, results, study.mechanism.mobility
-        self._fail_on = study.fail_on
+        #: by the row: what the case requires, the study's own until it is set
+        self.judging = [Judging(study.requirements, study.fail_on)] * count
         self._numbers = np.full((count, len(results)), np.nan)
         self._worst, self._margins = np.full((2, count, len(self._required)), np.nan)
         self._met = np.zeros((count, len(self._required)), dtype=bool)
@@ -95,7 +100,7 @@ class Sheet:
         why = "; ".join(message.splitlines())
         self._reasons[row][f"{command}: {why}" if command else why] = max(code, IMPOSSIBLE)
 
-    def note(self, rows: Ints, designs: Designs, group: Group) -> None:
+    def note(self, rows: Ints, group: Group) -> None:
         """Add the answers of a group of designs, which are the cases `rows`."""
         command = group.result.command
         for row, end in zip(rows.tolist(), group.ends, strict=True):
@@ -109,11 +114,11 @@ class Sheet:
                 rows_of_kind = self._warned.setdefault(warning.kind, {})
                 first, number = rows_of_kind.get(row, (message, 0))
                 rows_of_kind[row] = first, number + 1
-                if fails(warning, self._fail_on):
+                if fails(warning, self.judging[row].fail_on):
                     self._reasons[row].setdefault(message, NOT_MET)
-        self._read(rows, designs, group)
+        self._read(rows, group)
 
-    def _read(self, rows: Ints, designs: Designs, group: Group) -> None:
+    def _read(self, rows: Ints, group: Group) -> None:
         """Read the numbers and verdicts of a group, design by design where they cannot be read together."""
         command, good = group.result.command, np.array([end.error is None for end in group.ends])
         try:
@@ -124,7 +129,7 @@ class Sheet:
                     self._units[k] = unit
             for k, requirement in enumerate(self._required):
                 if command_of(requirement) == command:
-                    self._judge(k, requirement, rows, designs, group)
+                    self._judge(k, rows, group)
         except UnknownColumnError as error:
             if len(rows) == 1:
                 self._reasons[rows[0]][f"{command}: {error}"] = IMPOSSIBLE
@@ -132,15 +137,14 @@ class Sheet:
             for k in range(len(rows)):
                 answer = group.of(k)
                 alone = Group.alone(answer) if isinstance(answer, Result) else Group.failed(command, answer)
-                self._read(rows[k : k + 1], designs.take(group.rows[k : k + 1]), alone)
+                self._read(rows[k : k + 1], alone)
 
-    def _judge(self, k: int, requirement: Requirement, rows: Ints, designs: Designs, group: Group) -> None:
-        """Judge designs by a requirement."""
+    def _judge(self, k: int, rows: Ints, group: Group) -> None:
+        """Judge cases by a requirement, each by its own."""
         good = np.array([end.error is None for end in group.ends])
+        required = [self.judging[row].requirements[k] for row in rows.tolist()]
         if good.any():
-            follows = any(getattr(bound, "expression", None) for bound in (requirement.at_least, requirement.at_most))
-            own = group.rows.tolist() if follows else group.rows[:1].tolist()
-            scores = judged(group, [designs.required(row)[k] for row in own])
+            scores = judged(group, required)
             self._units[len(self._results) + k] = scores.unit
             for column, values in (
                 (self._worst, scores.worst),
@@ -148,16 +152,20 @@ class Sheet:
                 (self._met, scores.met),
             ):
                 column[rows[good], k] = values[good]
-        margins = _ordered(self._margins[:, k])
-        least = int(margins[rows].argmin())
+        order = self._order(k)
+        least = int(order[rows].argmin())
         row, so_far = int(rows[least]), self._verdicts.get(k)
-        if so_far is not None and (margins[so_far[0]], so_far[0]) <= (margins[row], row):
+        if so_far is not None and (order[so_far[0]], so_far[0]) <= (order[row], row):
             return
-        answer, required = group.of(least), designs.required(int(group.rows[least]))[k]
-        verdict = _unanswered(required)
+        answer, verdict = group.of(least), _unanswered(required[least])
         if isinstance(answer, Result):
-            verdict = requirements.judge(answer, required, self._mobility)
+            verdict = requirements.judge(answer, required[least], self._mobility)
         self._verdicts[k] = row, verdict
+
+    def _order(self, k: int) -> Floats:
+        """Margins of the cases from a limit; the lowest where one is not known or no margin meets it."""
+        margins, met = self._margins[:, k], self._met[:, k]
+        return np.where(np.isnan(margins) | (~met & (margins >= 0)), -np.inf, margins)
 
     def answered(self) -> Answered:
         """The answers of all cases."""
@@ -179,20 +187,16 @@ class Sheet:
             yield kind, Warned(row, f"{message} (and {number - 1} more)" if number > 1 else message, len(rows))
 
     def _worst_of(self, k: int) -> Worst:
-        row = int(_ordered(self._margins[:, k]).argmin())
+        order = self._order(k)
+        row = int(order.argmin())
         judged_row, verdict = self._verdicts.get(k, (-1, None))
         unmet = np.flatnonzero(~self._met[:, k])
         first = int(unmet[0]) if len(unmet) else 0
         if verdict is None or judged_row != row:
-            verdict = _unanswered(self._required[k])
-        return Worst(row, verdict, len(unmet), first)
+            verdict = _unanswered(self.judging[row].requirements[k])
+        return Worst(row, verdict, float(order[row]), len(unmet), first)
 
 
 def _unanswered(requirement: Requirement) -> Verdict:
     """The verdict on a case without an answer."""
     return Verdict(requirements.in_words(requirement), met=False, worst=float("nan"))
-
-
-def _ordered(margins: Floats) -> Floats:
-    """Margins with the lowest value where one is not known."""
-    return np.where(np.isnan(margins), -np.inf, margins)

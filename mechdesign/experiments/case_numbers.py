@@ -15,6 +15,7 @@ from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.together import Group
 from mechdesign.rows import Chosen, UnknownColumnError
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, path_of, terms_of
 from mechdesign.terms import command_of as command_named
 
@@ -93,26 +94,42 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
     Parameters
     ----------
     required : sequence of Requirement
-        The requirement of each design where its limits follow parameters; else a single one for all.
+        That of each design.
 
     Raises
     ------
     UnknownColumnError
-        See `CaseNumber.find`.
+        See `CaseNumber.find`; also where designs are judged on other rows.
     """
-    (one, *_), pairs = required, []
-    limits = zip(*(bounds_of(requirement) for requirement in required), strict=True)
-    for own in limits:
-        goal = own[0]
+    one, pairs = required[0], []
+    if any(other is not one and _subject(other) != _subject(one) for other in required):
+        raise UnknownColumnError("designs are not judged on the same rows")
+    for goal in bounds_of(one):
+        key = "at_most" if goal.smallest else "at_least"
         terms = _terms(group, goal.column, dict(goal.where))
         values = goal.judge(group.result, len(group.ends)).values
-        beyond = values - np.array([terms.bound(goal.bound) for goal in own])
+        own = [(getattr(other, key), text_of(getattr(other, key))) for other in required]
+        limits = {limit: terms.bound(limit[0]) for limit in {*own}}
+        beyond = values - np.array([limits[limit] for limit in own])
         pairs.append((values, -beyond if goal.smallest else beyond))
     values, margins = (np.stack(part) for part in zip(*pairs, strict=True))
     nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
     worst, margin = (np.take_along_axis(part, nearer, axis=0)[0] for part in (values, margins))
-    partly = group.missing if any(part.table.scope for part in terms.parts) and one.unassembled is None else False
-    return Judged(worst, margin, (margin >= 0) & ~np.asarray(partly), terms.unit)
+    partly = incomplete(group, terms) & (one.unassembled is None)
+    return Judged(worst, margin, (margin >= 0) & ~partly, terms.unit)
+
+
+def incomplete(group: Group, terms: Chosen | Sum) -> Flags:
+    """Designs of which poses, samples or a part of the motion are missing in what is judged."""
+    if len(group.ends) == 1:
+        return np.array([any(part.gaps for part in terms.parts)])
+    return group.missing & any(part.table.scope for part in terms.parts)
+
+
+def _subject(requirement: Requirement) -> dict[str, Any]:
+    """What a requirement judges, and from which sides."""
+    limits = {key: getattr(requirement, key) is None for key in ("at_least", "at_most")}
+    return requirement.model_copy(update=limits).__dict__
 
 
 def _terms(group: Group, path: str, where: dict[str, Any]) -> Chosen | Sum:

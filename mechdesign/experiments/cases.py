@@ -20,7 +20,7 @@ from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study, forms
 from mechdesign.study.designs import Designs
-from mechdesign.study.variants import Changes, with_entries
+from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks
 
 # Cases in one batch where a case costs far less among many, the largest batch, and the batches that are wanted at
@@ -65,40 +65,62 @@ class Answer:
         sheet = Sheet(self.study, self.results, len(cases))
         alike: dict[str, list[int]] = {}
         for k, case in enumerate(cases):
-            alike.setdefault(forms.form_of(case), []).append(k)
+            alike.setdefault(forms.form_of(split(case)[0]), []).append(k)
         for members in alike.values():
             self._alike(sheet, np.array(members), [cases[k] for k in members])
         return sheet.answered()
 
     def _alike(self, sheet: Sheet, rows: Ints, cases: Sequence[Changes]) -> None:
-        """Answer cases that differ in numbers alone."""
-        form = forms.compiled(self.study, cases[0], self.first)
-        designs = form.designs(cases) if form is not None else None
-        if designs is not None and len(designs.study.requirements) != len(self.study.requirements):
-            designs = None
+        """Answer cases that differ in numbers alone, and in what they are judged by."""
+        computed, judged = zip(*(split(case) for case in cases), strict=True)
+        required = [self._required(own) for own in judged]
+        designs: Designs | None = Designs(self.study, {})
+        if computed[0]:
+            form = forms.compiled(self.study, computed[0], split(self.first)[0])
+            designs = form.designs(computed) if form is not None else None
         # A case that is wrong is loaded alone: its error then names the entries that it changes.
-        right = designs.faults == "" if designs is not None else np.zeros(len(cases), dtype=bool)
+        right = np.array([own is not None for own in required]) & (designs is not None and designs.faults == "")
         if designs is not None and right.any():
-            self._together(sheet, rows[right], designs.take(np.flatnonzero(right)))
+            some = np.flatnonzero(right)
+            designs, known = (
+                designs.take(some),
+                [own for own, good in zip(required, right, strict=True) if good and own],
+            )
+            for row, own in zip(rows[some].tolist(), designs.required(known), strict=True):
+                sheet.judging[row] = own
+            self._together(sheet, rows[some], designs)
         for k in np.flatnonzero(~right).tolist():
             self._alone(sheet, rows[k : k + 1], cases[k])
+
+    def _required(self, changes: Changes) -> Judging | None:
+        """What is required of a case; None where its changes of that are wrong."""
+        own = judging(self.study, changes)
+        return own if own is not None and self._comparable(own) else None
+
+    def _comparable(self, own: Judging) -> bool:
+        """Whether a case is judged on the results on which the study is."""
+        one, other = ([part.result for part in parts] for parts in (own.requirements, self.study.requirements))
+        return one == other
 
     def _alone(self, sheet: Sheet, row: Ints, case: Changes) -> None:
         """Answer one case, loaded as if its file had the changed entries."""
         try:
             study = with_entries(self.study, case)
-            if len(study.requirements) != len(self.study.requirements):
-                raise StudyError("a case has the requirements of the study; only their limits may be otherwise")
+            own = Judging(study.requirements, study.fail_on)
+            if not self._comparable(own):
+                raise StudyError("a case is judged on the results of the study; only limits and rows may be otherwise")
         except Exception as error:
             sheet.failed(int(row[0]), "", error)
             return
+        sheet.judging[row[0]] = own
         self._together(sheet, row, Designs(study, {}))
 
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
-        """Answer designs of a study."""
+        """Answer designs of a study, each a case; a study without changes is that of all the cases."""
         for command in commands_of(designs.study, self.results):
             for group in batches.answers(designs, command).groups:
-                sheet.note(rows[group.rows], designs, group)
+                for some in [rows[group.rows]] if designs.changed else rows[:, None]:
+                    sheet.note(some, group)
 
 
 def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:

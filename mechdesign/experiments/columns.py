@@ -10,7 +10,7 @@ SUMMARY = TableKind.of("summary", "what became of each question",
     ("rows", "rows of its main table"), ("warnings", "how many warnings it gave"),
     ("directory", "where its results are"))  # fmt: skip
 SWEEP = TableKind.of("sweep", "what becomes of each case of the matrix",
-    ("case", "number of the case"),
+    ("case", "number of the case"), ("label", "name of the case, as its file gives it"),
     ("exit_code", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure"),
     ("<entry>", VARIED, "as the entry"), ("<requirement>", "worst row; required is <limit>", "as the result"),
     ("<requirement>_met", "1 where the requirement is met"), ("<result>", CHOSEN, "as the result"),

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
 from typing import Any, overload
 
 import numpy as np
@@ -17,13 +20,19 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import Changes, faults
+from mechdesign.study.variants import Changes, faults, is_judged
+
+_DECIMAL = re.compile(r"-?[0-9.]+(e[-+]?[0-9]+)?")
+# Cases among which those with a value are looked for, and those that are tried where the value alone is wrong.
+_MOST_SEARCHED, _MOST_TRIED = 10_000, 16
 
 
 class Design(Sequence[Changes]):
     """The cases of a matrix in their order; each gives every varied entry (`names`) a value."""
 
     names: tuple[str, ...]
+    labels: Sequence[str] = ()  # of the cases; empty where they have none
+    written: Mapping[str, Callable[[Any], Any]] = {}  # entries with quantities that are judged: a value as written
 
     @abstractmethod
     def value(self, k: int, place: int) -> Any:
@@ -46,7 +55,10 @@ class Design(Sequence[Changes]):
             return [self[case] for case in range(*k.indices(len(self)))]
         if not 0 <= k < len(self):
             raise IndexError(k)
-        return tuple((name, self.value(k, place)) for place, name in enumerate(self.names))
+        return tuple(
+            (name, self.written.get(name, lambda value: value)(self.value(k, place)))
+            for place, name in enumerate(self.names)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +67,7 @@ class Grid(Design):
 
     names: tuple[str, ...]
     values: tuple[tuple[Any, ...], ...]
+    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return math.prod(map(len, self.values))
@@ -81,6 +94,7 @@ class Spread(Design):
     names: tuple[str, ...]
     values: tuple[Values, ...]
     cube: Floats
+    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.cube)
@@ -99,6 +113,7 @@ class Listed(Design):
 
     names: tuple[str, ...]
     rows: Sequence[tuple[Any, ...]]
+    labels: Sequence[str] = ()
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -123,17 +138,53 @@ def cases_of(study: Study) -> Design:
     design: Design
     if matrix.vary is None:
         design = Listed(*matrix.table(study.folder))
-    elif matrix.method == GRID:
-        design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()))
     else:
-        assert matrix.samples is not None
-        cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
-        design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube)
-    for place, name in enumerate(design.names):
-        # Quantities are tried as they are written: the units must fit the entry.
-        written = study.resolved["matrix"]["vary"][name] if matrix.vary is not None else ()
-        _try(study, name, [*design.distinct(place), *_parts(written)])
+        written = {name: partial(_as_written, study, name) for name in matrix.vary if is_judged(name)}
+        if matrix.method == GRID:
+            design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()), written)
+        else:
+            assert matrix.samples is not None
+            cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
+            design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube, written)
+    keys = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
+    problems = [
+        study.problem(f"{name}={in_yaml(value)}: {message}", *keys, *([name] if matrix.vary is not None else []))
+        for name, value in tried(study, design)
+        for message in _wrong(study, design, name, value)
+    ]
+    if problems:
+        raise StudyError(problems)
     return design
+
+
+def _as_written(study: Study, name: str, value: Any) -> Any:
+    """A value of an entry that is judged, as a quantity where it is written as one, since columns have own units."""
+    for part in _parts(study.resolved["matrix"]["vary"][name]):
+        if isinstance(part, str) and QUANTITY.fullmatch(part) and isinstance(value, int | float):
+            if not isinstance(study.resolved["matrix"]["vary"][name], list):
+                return study.units.as_written(value, part)
+            if study.units.convert(part) == value:
+                return part
+    return value
+
+
+def tried(study: Study, design: Design) -> Iterator[tuple[str, Any]]:
+    """Entries with each word or structure that one takes in some case, and one quantity of each unit as written."""
+    for place, name in enumerate(design.names):
+        written = study.resolved["matrix"]["vary"][name] if not isinstance(design, Listed) else ()
+        values = [*design.distinct(place), *_parts(written)]
+        words = [value for value in values if isinstance(value, bool) or not _DECIMAL.fullmatch(str(value))]
+        units = {(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}
+        yield from ((name, value) for value in units.values())
+
+
+def _wrong(study: Study, design: Design, name: str, value: Any) -> list[str]:
+    """Why an entry cannot have a value: neither with the others as they are, nor as the first cases have them."""
+    messages = [*faults(study, [(name, value)], name)]
+    place = design.names.index(name)
+    same = (design[k] for k in range(min(len(design), _MOST_SEARCHED)) if design.value(k, place) == value)
+    right = messages and any(not [*faults(study, case, name)] for case in islice(same, _MOST_TRIED))
+    return [] if right else messages
 
 
 def _parts(written: Any) -> Iterable[Any]:
@@ -157,22 +208,3 @@ def _cube(method: str, dimensions: int, samples: int, seed: int) -> Floats:
     # The sequence is even over powers of two: the next larger one is drawn, and its first points are used.
     sobol = qmc.Sobol(dimensions, scramble=True, rng=random)
     return np.asarray(sobol.random_base2((samples - 1).bit_length()))[:samples]
-
-
-def _try(study: Study, name: str, values: Sequence[Any]) -> None:
-    """Load the study with each word or structure that an entry takes in some case, the other entries as they are.
-
-    Raises
-    ------
-    StudyError
-        Where the entry itself is wrong. A mistake that needs several entries is reported by its case.
-    """
-    words = [value for value in values if not isinstance(value, int | float) or isinstance(value, bool)]
-    # One quantity of each unit is tried.
-    tried = [*{(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}.values()]
-    keys = ("matrix", "vary", name) if study.matrix and study.matrix.vary is not None else ("matrix", "cases")
-    problems = [
-        study.problem(f"{name}={in_yaml(tried[k])}: {message}", *keys) for k, message in faults(study, name, tried)
-    ]  # fmt: skip
-    if problems:
-        raise StudyError(problems)

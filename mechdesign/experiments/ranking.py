@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.experiments.case_numbers import CaseNumber, Numbers
+from mechdesign.experiments.case_numbers import CaseNumber, Numbers, incomplete
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.schema.matrix import Best
 from mechdesign.numerics.arrays import Flags, Floats
@@ -29,8 +29,7 @@ class Goal(CaseNumber):
         """The number of each design; see `CaseNumber.find`."""
         numbers = super().find(group)
         terms = terms_of(group.result, path_of(self.name), dict(self.where))
-        scoped = any(part.table.scope for part in terms.parts)
-        return numbers._replace(values=np.where(scoped & group.missing, np.nan, numbers.values))
+        return numbers._replace(values=np.where(incomplete(group, terms), np.nan, numbers.values))
 
 
 def goals_of(best: Best | None) -> dict[Goal, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,7 +17,7 @@ from mechdesign.errors import Interrupted, StudyError, counted
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.columns import SWEEP
-from mechdesign.experiments.design import Design, Listed, cases_of
+from mechdesign.experiments.design import Design, Listed, cases_of, tried
 from mechdesign.experiments.ranking import Ranking, goals_of
 from mechdesign.experiments.tally import Tally
 from mechdesign.numerics.arrays import Flags
@@ -25,8 +26,9 @@ from mechdesign.report.cases import text_of
 from mechdesign.report.requirements import DrawnCases, in_words
 from mechdesign.results import Column, Result
 from mechdesign.study import Study
+from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
-from mechdesign.study.variants import entry_unit
+from mechdesign.study.variants import entry_unit, is_judged, with_entries
 from mechdesign.work.journal import Journal
 from mechdesign.work.threads import one_thread
 
@@ -53,9 +55,27 @@ def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
     foresee(study, results)
+    _foresee_limits(study, cases)
     # A number with a requirement has a column already.
-    required = requirement_names(study)
+    required = requirement_names(study, cases.names)
     return cases, [number for number in results if number.title not in required]
+
+
+def _foresee_limits(study: Study, cases: Design) -> None:
+    """Find quantities among the limits of cases that are of another kind than the result that they judge.
+
+    Raises
+    ------
+    StudyError
+        With the entry, its value and the reason.
+    """
+    for name, value in tried(study, cases):
+        if is_judged(name) and QUANTITY.fullmatch(str(value)):
+            try:
+                foresee(with_entries(study, [(name, value)]), ())
+            except StudyError as error:
+                message = f"{name}={value}: {'; '.join(problem.message for problem in error.problems)}"
+                raise StudyError([study.problem(message, _SECTION)]) from None
 
 
 @one_thread()
@@ -112,11 +132,29 @@ def _result(study: Study, cases: Design, tally: Tally, results: Sequence[CaseNum
 
 def _drawn(study: Study, tally: Tally, numbers: Sequence[CaseNumber]) -> DrawnCases:
     """The entries that vary, the results with what is required of them, and which are goals."""
-    bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
-    limits = dict(zip(requirement_names(study), bounds, strict=True))
-    results = limits | {number.title: (None, None) for number in numbers}
     entries = [name for name, _ in tally.cases[0]]
+    own = _limits_of_cases(study, entries)
+    bounds = [(None, None) if k in own else (requirement.at_least, requirement.at_most)
+              for k, requirement in enumerate(study.requirements)]  # fmt: skip
+    limits = dict(zip(requirement_names(study, entries), bounds, strict=True))
+    results = limits | {number.title: (None, None) for number in numbers}
     return DrawnCases(entries, results, _goals(study), tally.verdicts)
+
+
+def _limits_of_cases(study: Study, entries: Sequence[str]) -> set[int]:
+    """Requirements whose limits differ from case to case."""
+    moved = study.parameters.moved([name.removeprefix("mechanism.parameters.") for name in entries])
+    return {
+        k for k, requirement in enumerate(study.requirements)
+        if _varies(entries, k) or any(not number.expression.names.isdisjoint(moved)
+                                      for number in own_numbers(requirement) if number.expression)
+    }  # fmt: skip
+
+
+def _varies(entries: Sequence[str], k: int, key: str = "") -> bool:
+    """Whether one of the entries is requirement `k`, is in it (of a key: in that), or holds it."""
+    place = f"requirements.{k}.{key}".rstrip(".")
+    return any(f"{place}.".startswith(f"{name}.") or f"{name}.".startswith(f"{place}.") for name in entries)
 
 
 def _goals(study: Study) -> dict[str, int]:
@@ -128,13 +166,15 @@ def _goals(study: Study) -> dict[str, int]:
 def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
-    yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
+    labels = {"label": np.array(cases.labels[:count])} if cases.labels else {}
+    yield from SWEEP.columns({}, case=np.arange(1, count + 1), **labels, exit_code=table[:, 0].astype(np.intp))
     for place, name in enumerate(cases.names):
         values = cases.column(place, count, partial(_array, study.units))
         yield SWEEP["<entry>"].column(values, entry_unit(study, name), entry=name)
-    for k, name in enumerate(requirement_names(study)):
+    own = _limits_of_cases(study, cases.names)
+    for k, name in enumerate(requirement_names(study, cases.names)):
         worst, met, unit = tally.required(k)
-        limit = str(tally.worst[k].verdict.requirement)
+        limit = "what the case requires" if k in own else str(tally.worst[k].verdict.requirement)
         yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
         yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
     for k, number in enumerate(numbers):
@@ -153,13 +193,21 @@ def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:
     return np.array([text_of(value) for value in values])
 
 
-def requirement_names(study: Study) -> list[str]:
-    """Columns of the requirements: the result that each judges, with its bounds where another judges the same."""
-    names = [f"|{requirement.name}|" if requirement.abs else requirement.name for requirement in study.requirements]
-    return [
-        in_words(requirement) if names.count(name) > 1 else name
-        for requirement, name in zip(study.requirements, names, strict=True)
-    ]  # fmt: skip
+def requirement_names(study: Study, entries: Sequence[str]) -> list[str]:
+    """Columns of the requirements: the result that each judges, with its bounds where another judges the same.
+
+    Of several in the same words the later ones have their numbers in the study. Rows that count are named where they
+    are the same in all cases, of which `entries` vary.
+    """
+    names = [str(requirement.result) if _varies(entries, k, "where") else requirement.name
+             for k, requirement in enumerate(study.requirements)]  # fmt: skip
+    names = [f"|{name}|" if requirement.abs else name
+             for name, requirement in zip(names, study.requirements, strict=True)]  # fmt: skip
+    several = Counter(names)
+    names = [in_words(requirement) if several[name] > 1 else name
+             for requirement, name in zip(study.requirements, names, strict=True)]  # fmt: skip
+    first = {name: k for k, name in reversed([*enumerate(names)])}
+    return [name if first[name] == k else f"{name}, requirement {k + 1}" for k, name in enumerate(names)]
 
 
 def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caution]:

@@ -35,6 +35,7 @@ class Tally:
 
     def __init__(self, cases: Sequence[Changes], results: int, requirements: int) -> None:
         self.cases = cases
+        self._labels: Sequence[str] = getattr(cases, "labels", ())
         self._results, self._requirements = results, requirements
         self.width = 3 + results + 2 * requirements
         self._rows = array("d")
@@ -60,8 +61,8 @@ class Tally:
             before.cases += warned.cases
         new = [replace(other, case=begin + other.case, first=begin + other.first) for other in answered.worst]
         for worst, other in zip(self.worst, new, strict=bool(self.worst)):
-            if _margin(other.verdict) < _margin(worst.verdict):
-                worst.case, worst.verdict = other.case, other.verdict
+            if other.margin < worst.margin:
+                worst.case, worst.verdict, worst.margin = other.case, other.verdict, other.margin
             worst.first = worst.first if worst.unmet else other.first
             worst.unmet += other.unmet
         self.worst = self.worst or new
@@ -100,8 +101,9 @@ class Tally:
         )
 
     def named(self, k: int) -> str:
-        """A case in words: its number, from 1, and its values."""
-        return f"case {k + 1} ({changes_in_words(self.cases[k])})"
+        """A case in words: its number, from 1, its label, if it has one, and its values."""
+        label = self._labels[k] if len(self._labels) else ""
+        return f"case {k + 1} ({label and f'{label}: '}{changes_in_words(self.cases[k])})"
 
     def note(self, journal: Journal, *, last: bool = False) -> None:
         """Write new cases to a journal, if they are many, some seconds have passed, or they are the last."""
@@ -145,7 +147,3 @@ class Tally:
 
     def _key(self, begin: int, end: int) -> bytes:
         return digest([np.array([begin, end], dtype=float)])
-
-
-def _margin(verdict: Verdict) -> float:
-    return -np.inf if np.isnan(verdict.margin) else verdict.margin

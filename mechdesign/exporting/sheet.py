@@ -115,8 +115,9 @@ def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[s
             rows.append((f"least transmission angle, {row['joints']}", least, "", "", style.printed(label("angle"))))
     yield "motion", rows if len(rows) > 1 else []
     verdicts = [
-        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{verdict.worst:.5g} {style.printed(verdict.unit)}")
+        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{own.worst:.5g} {style.printed(own.unit)}")
         for verdict in requirements(study, result)
+        for own in [verdict.as_required]
     ]
     yield "requirements", [("requirement", "", "worst"), *verdicts] if verdicts else []
 

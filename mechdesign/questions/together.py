@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Ints
-from mechdesign.results import Column, Result, Scope, Table
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Course, Follow, Request
 
 
@@ -45,6 +45,7 @@ class Group:
     result: Result
     ends: Sequence[End]
     uneven: Mapping[str, Sequence[int] | Ints] = field(default_factory=dict)
+    _answers: dict[int, Result] = field(default_factory=dict, init=False)
 
     @classmethod
     def alone(cls, result: Result) -> Group:
@@ -70,20 +71,20 @@ class Group:
             return end.error
         if len(self.ends) == 1:
             return self.result
-        tables = {name: self._of(table, k, end) for name, table in self.result.tables.items()}
-        return replace(
-            self.result, tables=tables, warnings=list(end.warnings), counts=end.counts, failed=end.failed
-        )  # fmt: skip
+        if k not in self._answers:
+            tables = {name: self._of(table, k, end) for name, table in self.result.tables.items()}
+            self._answers[k] = replace(
+                self.result, tables=tables, warnings=list(end.warnings), counts=end.counts, failed=end.failed
+            )  # fmt: skip
+        return self._answers[k]
 
     def _of(self, table: Table, k: int, end: End) -> Table:
         counts = self.uneven.get(table.name)
         size = len(table) // len(self.ends)
         begin, number = (k * size, size) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
-        columns = tuple(
-            Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
-        )
+        own = table.take(np.arange(begin, begin + number))
         scope = table.scope and replace(table.scope, missing=end.missing, follow=_follow_of(table.scope, k))
-        return replace(table, columns=columns, scope=scope)
+        return replace(own, scope=scope)
 
 
 def _follow_of(scope: Scope, design: int) -> Follow | None:

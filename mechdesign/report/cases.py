@@ -68,7 +68,7 @@ def telling_columns(table: Table) -> list[str]:
     chosen = [column.name for column in table.columns if column.meaning == CHOSEN]
     varied = [column.name for column in table.columns if column.meaning == VARIED]
     required = [name for name in table.names if f"{name}_met" in table]
-    return ["case", *chosen, *varied, *required]
+    return ["case", *(["label"] if "label" in table else []), *chosen, *varied, *required]
 
 
 def best_of(table: Table) -> Best | None:
@@ -85,6 +85,7 @@ def best_of(table: Table) -> Best | None:
             changes = [
                 (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
             ]
-            best = int(part["case"][row]), changes_in_words(changes)
+            label = f"{part['label'][row]}: " if "label" in part and part["label"][row] else ""
+            best = int(part["case"][row]), label + changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
     return None if best is None else Best(*best, *numbers.tolist())

@@ -91,6 +91,7 @@ class _Verdict(BaseModel):
     margin: float | None
     unit: str
     note: str
+    limit_unit: str = ""
 
 
 class _Manifest(BaseModel):
@@ -193,6 +194,11 @@ def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
     return beside if all((beside / name).is_file() for name in names) else directory
 
 
+def _fields(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as data; the unit of a limit that is a bare number is left out."""
+    return {name: value for name, value in asdict(verdict).items() if value or name != "limit_unit"}
+
+
 def compose(
     directory: Path,
     study: Study,
@@ -212,7 +218,7 @@ def compose(
             "failed": result.failed,
             **({"interrupted": result.interrupted} if result.interrupted else {}),
             **({"strict": True} if study.strict else {}),
-            "requirements": [plain(asdict(verdict)) for verdict in verdicts],
+            "requirements": [plain(_fields(verdict)) for verdict in verdicts],
             "tables": {
                 f"{table.name}.csv": {
                     "meaning": table.meaning,

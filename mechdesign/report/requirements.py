@@ -12,11 +12,14 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
+from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.optimize.schema import Requirement
-from mechdesign.results import POSES_ONLY, Drawn, Result, Table
+from mechdesign.report.row_words import place_of
+from mechdesign.results import POSES_ONLY, Drawn, Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
+from mechdesign.statistics import AT_END, STATISTICS
 from mechdesign.study import Study
-from mechdesign.study.text.units import written
+from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named
 
@@ -34,15 +37,26 @@ class Verdict:
 
     requirement: str  #: in words
     met: bool  #: whether the worst row meets it
-    worst: float  #: the value of the worst row; nan where a row has none or no row was found
+    worst: float  #: the value where it is worst; nan where a row has none or no row was found
     place: str = ""  #: the pose or row where it is worst
     margin: float = float("nan")  #: of the worst row to the limit, negative beyond it
     unit: str = ""  #: of `worst` and `margin`
     note: str = ""  #: which poses or parts of a motion it does not speak of
+    limit_unit: str = ""  #: unit in which the nearer limit is written; empty where it is a bare number
+
+    @property
+    def as_required(self) -> Verdict:
+        """The verdict in the unit in which the nearer limit is written."""
+        if not self.limit_unit:
+            return self
+        factor = Amount(1.0, f"1 {self.limit_unit}").within(self.unit)
+        return replace(self, worst=self.worst / factor, margin=self.margin / factor, unit=self.limit_unit)
 
     def __str__(self) -> str:
         place, note = f" at {self.place}" if self.place else "", f" ({self.note})" if self.note else ""
-        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}{note}"
+        own = self.as_required
+        unit = f" {self.limit_unit}" if self.limit_unit and not np.isnan(self.worst) else ""
+        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {own.worst:.6g}{unit}{place}{note}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,9 +219,24 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: 
     UnknownColumnError
         See `requirements`.
     """
+    return _with_unit_of_limit(_judged(result, requirement, freedom, fewer), requirement)
+
+
+def _with_unit_of_limit(verdict: Verdict, requirement: Requirement) -> Verdict:
+    """The verdict with the unit in which the nearer limit is written, if it has one."""
+    limits = [limit for limit in (requirement.at_least, requirement.at_most) if limit is not None]
+    if len(limits) == 2 and not np.isnan(verdict.margin):
+        low, high = (Amount.of(limit).within(verdict.unit) for limit in limits)
+        limits = limits[:1] if verdict.worst - low <= high - verdict.worst else limits[1:]
+    quantity = QUANTITY.fullmatch(text_of(limits[0]))
+    return verdict if quantity is None else replace(verdict, limit_unit=quantity["unit"])
+
+
+def _judged(result: Result, requirement: Requirement, freedom: int, fewer: Collection[str]) -> Verdict:
+    """The verdict in the unit of the result."""
     path = path_of(requirement.result)
     if not is_plain(result, path):
-        return _of_number(terms_of(result, path, requirement.where), requirement)
+        return _of_number(terms_of(result, path, requirement.where), requirement, freedom)
     table, column, rows = located(result, path)
     worst, begin = None, 0
     # A word that selects rows may occur in a few blocks only.
@@ -234,15 +263,37 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: 
         raise UnknownColumnError(missing)
     if worst is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return worst if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
+    return _scoped(worst, chosen, requirement) if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
 
 
-def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
+def _of_number(terms: Chosen | Sum, requirement: Requirement, freedom: int) -> Verdict:
     """The verdict on one number: a statistic of a column, or a sum."""
     value = float(terms.numbers(assembled=requirement.unassembled is not None)[0])
     value = abs(value) if requirement.abs else value
-    place = _OUTSIDE if np.isnan(value) and any(chosen.part for chosen in terms.parts) else ""
+    place = _place_of_end(terms, requirement, freedom) if isinstance(terms, Chosen) else ""
+    if np.isnan(value):
+        outside = any(chosen.part for chosen in terms.parts) and not any(chosen.lacking for chosen in terms.parts)
+        place = _OUTSIDE if outside else ""
     return _scoped(_verdict(requirement, _bounds(terms, requirement), value, place, terms.unit), terms, requirement)
+
+
+def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str:
+    """Where the largest or smallest value is that a statistic takes; empty of a mean and a range."""
+    statistic = STATISTICS[chosen.statistic] if chosen.statistic else None
+    counts = _counted(chosen, requirement) & ~np.isnan(chosen.values)
+    if statistic is None or not statistic.end or not counts.any():
+        return ""
+    sign, rows = statistic.end, np.flatnonzero(counts)
+    values = sign * (np.abs(chosen.values) if statistic.absolute else chosen.values)
+    row = int(rows[values[rows].argmax()])
+    most, place = float(values[row]), place_of(chosen.table, row, chosen.column, freedom)
+    for words, course in chosen.courses.items():
+        end, at = (float(part[0]) for part in course.worst(sign, absolute=statistic.absolute))
+        if abs(most) <= course.rounding and np.isnan(at):
+            return ""
+        if np.isfinite(at) and sign * end >= most - AT_END * abs(most):
+            most, place = sign * end, ", ".join(filter(None, (course.shown(at), words)))
+    return place
 
 
 def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Bounds:
@@ -265,28 +316,39 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
             where = ", ".join(filter(None, (course.shown(place), words)))
             between = _verdict(requirement, bounds, value, where, verdict.unit)
             verdict = between if not between.margin >= verdict.margin else verdict
+    if any(abs(verdict.worst) <= course.rounding for course in chosen.courses.values()):
+        # Where the motion has no place of its extremes, all of it is rounding.
+        ends = [float(course.worst(sign)[1][0]) for course in chosen.courses.values() for sign in (1, -1)]
+        verdict = _verdict(requirement, bounds, 0.0, verdict.place if np.isfinite(ends).any() else "", verdict.unit)
+    if chosen.lacking:
+        verdict = _verdict(requirement, bounds, float("nan"), "", verdict.unit)
     return _scoped(verdict, chosen, requirement)
 
 
 def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
     scopes = [chosen.table.scope for chosen in terms.parts]
-    missing = [scope.missing for scope in scopes if scope is not None and scope.missing]
+    missing = [gap for chosen in terms.parts for gap in chosen.gaps]
     if missing and not requirement.unassembled:
         verdict = replace(verdict, met=False)
     notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
     courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     ends = [scope.until for scope in scopes if scope is not None and scope.until]
-    return replace(verdict, note="; ".join([*notes, *dict.fromkeys([*missing, *ends])]))
+    lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(verdict.worst) else []
+    return replace(verdict, note="; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))]))
+
+
+def _counted(chosen: Chosen, requirement: Requirement) -> Flags:
+    """Rows that count; those of poses that are not valid do not where the study allows them."""
+    if requirement.unassembled and "valid" in chosen.table:
+        return np.asarray(chosen.counts & chosen.table["valid"].astype(bool))
+    return chosen.counts
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
     """The worst row: one without a value, or else the farthest beyond a limit; None without rows."""
-    counts = chosen.counts
-    if requirement.unassembled and "valid" in chosen.table:
-        counts = counts & chosen.table["valid"].astype(bool)
-    rows, values = np.flatnonzero(counts), chosen.values
+    rows, values = np.flatnonzero(_counted(chosen, requirement)), chosen.values
     if not rows.size:
         return None
     undefined = rows[np.isnan(values[rows])]
@@ -319,21 +381,5 @@ def in_words(requirement: Requirement) -> str:
     where = ", ".join(f"{column} {cell}" for column, cell in requirement.where.items())
     limits = (("at least", requirement.at_least), ("at most", requirement.at_most))
     bounds = [f"{words} {written(bound)}" for words, bound in limits if bound is not None]
-    return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
-
-
-def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method.
-
-    `begin` is the number of rows before the table, where it is a part of a long one.
-    """
-    parts: list[str] = []
-    for column in table.columns:
-        if column.numeric:
-            freedom -= 1
-            if column.name == judged or (freedom < 0 and table.strands is None):
-                break
-            parts += [f"{column.name} {column.values[row]:.6g}"] if freedom >= 0 else []
-        else:
-            parts.append(f"{column.name} {column.values[row]}")
-    return ", ".join(parts) or f"row {begin + row + 1}"
+    allowed = ", unassembled allowed" if requirement.unassembled else ""
+    return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}{allowed}"

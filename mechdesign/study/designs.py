@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,14 +15,13 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.study.expansion import Numbers
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.text.document import Document
 from mechdesign.study.text.fields import Model, own_numbers, parts_of, positive
 from mechdesign.study.text.units import Amount
-from mechdesign.study.variants import changed_data, remeasured
+from mechdesign.study.variants import Judging, changed_data, remeasured
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,18 +111,26 @@ class Designs:
         moved = self.study.parameters.moved(self.changed)
         return moved.isdisjoint(self.study.fixed) and not remeasured(self.study, self.changed)
 
-    def required(self, k: int) -> tuple[Requirement, ...]:
-        """What is required of a design."""
-        if not self.parameters:
-            return self.study.requirements
+    def required(self, judging: Sequence[Judging]) -> Iterator[Judging]:
+        """What is required of each design, with its own numbers where these follow parameters."""
+        followers: dict[int, list[int]] = {}
+        for k, own in enumerate(judging):
+            required = [*own.requirements]
 
-        def number(amount: Amount) -> Amount:
-            return Amount(float(self.numbers.of(amount)[k]), "", amount.expression)
+            def number(amount: Amount, k: int = k) -> Amount:
+                if not self.numbers.moves(amount):
+                    return amount
+                value = float(self.numbers.of(amount)[k])
+                return Amount(value, self.study.units.as_written(value, amount.text), amount.expression)
 
-        return tuple(requirement.with_numbers(number) for requirement in self.study.requirements)
+            if id(own) not in followers:
+                followers[id(own)] = [j for j, one in enumerate(required) if one.with_numbers(Amount) is not one]
+            for j in followers[id(own)]:
+                required[j] = required[j].with_numbers(number)
+            yield own._replace(requirements=tuple(required))
 
     def take(self, rows: Ints) -> Designs:
-        """Some of the designs."""
+        """Some of the designs; a study without changes stays the one that it is."""
         return Designs(self.study, {name: values[rows] for name, values in self.changed.items()})
 
     @cached_property

@@ -329,7 +329,7 @@ def load_document(
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
     reporter = Reporter(document)
     data = _sections(document, reporter)
-    context, formulas = _context(data, reporter)
+    context, formulas = context_of(data, reporter)
     parts = _validated(data, context, reporter)
     section: MechanismSection | None = parts.get("mechanism")
     if section is None:
@@ -386,7 +386,7 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
     return {key: {} if value is None and key in COMMANDS else value for key, value in data.items()}
 
 
-def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
+def context_of(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
     """Units and parameters, which are needed to read all other numbers."""
     units = Units()
     # A wrong unit is reported later, with the mistakes of other sections.
@@ -437,16 +437,16 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
                 )
             continue
         if key == "mechanism" and isinstance(raw, dict):
-            # The parameters have been read by `_context`.
+            # The parameters have been read by `context_of`.
             raw = {name: value for name, value in raw.items() if name != "parameters" or not isinstance(value, dict)}
-        adapter = _adapter(key)
+        validator = adapter(key)
         try:
-            parts[key] = adapter.validate_python(raw, context=context)
+            parts[key] = validator.validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
             # If only numbers and keys are wrong, the names in this part can still be checked.
             with contextlib.suppress(ValidationError):
-                parts[key] = adapter.validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
+                parts[key] = validator.validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
 
 
@@ -525,7 +525,7 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
 
 
 @cache
-def _adapter(key: str) -> TypeAdapter[Any]:
+def adapter(key: str) -> TypeAdapter[Any]:
     """Validator of one top-level key."""
     return TypeAdapter(StudyFile.model_fields[key].rebuild_annotation())
 

@@ -6,27 +6,39 @@ tolerances that go by the size of a dimension, are found anew from the data.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import yaml
+from pydantic import ValidationError
 
 from mechdesign.errors import StudyError, printable
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
+from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.study.building.section import LINK_KEYS
-from mechdesign.study.loading import Study, load_document, same_sketch
+from mechdesign.study.loading import Study, adapter, context_of, load_document, same_sketch
 from mechdesign.study.schema.entries import number_at
 from mechdesign.study.schema.study_file import entry, kinds_of, override
 from mechdesign.study.text.document import Document, KeyPath, dotted, in_yaml, leaves, plain, read
+from mechdesign.study.text.reporter import Reporter
 
 Changes = Sequence[tuple[str, Any]]
 """Entries of a study, by the names that ``--set`` takes, and their values."""
 # Sections that ask for variants of the study.
 _OF_OTHERS = ("matrix", "sensitivities")
+# Keys of a study by which answers are judged, and nothing is computed.
+JUDGED = ("requirements", "fail_on")
 # Largest text that is edited, in bytes; a longer one is written anew, without comments.
 _MOST_BYTES = 1_000_000
 _INPUT = "input_"
+
+
+class Judging(NamedTuple):
+    """What is required of a case, and the kinds of warnings that it may not have."""
+
+    requirements: tuple[Requirement, ...]
+    fail_on: tuple[str, ...]
 
 
 def overrides(changes: Changes) -> tuple[str, ...]:
@@ -55,17 +67,43 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
     return load_document(document, study.source, (*study.overrides, *texts), original=original)
 
 
-def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:
-    """Mistakes of values of an entry, each tried alone: the index of the value, and the message.
+def is_judged(name: str) -> bool:
+    """Whether an entry is one by which answers are judged."""
+    return name.partition(".")[0] in JUDGED
+
+
+def split(changes: Changes) -> tuple[list[tuple[str, Any]], list[tuple[str, Any]]]:
+    """Changes of what is computed, and of what is judged alone."""
+    sides: tuple[list[tuple[str, Any]], list[tuple[str, Any]]] = ([], [])
+    for change in changes:
+        sides[is_judged(change[0])].append(change)
+    return sides
+
+
+def judging(study: Study, changes: Changes) -> Judging | None:
+    """What a study requires with changes of that alone; None where they are wrong, as loading the whole study says."""
+    if not changes:
+        return Judging(study.requirements, study.fail_on)
+    document = Document.of(plain({key: study.resolved[key] for key in JUDGED if key in study.resolved}))
+    context = context_of(study.resolved, Reporter(document))[0]
+    try:
+        override(document, overrides(changes))
+        parts = [adapter(key).validate_python(document.data.get(key) or [], context=context) for key in JUDGED]
+    except (StudyError, ValidationError):
+        return None
+    return Judging(*parts)
+
+
+def faults(study: Study, changes: Changes, name: str) -> Iterator[str]:
+    """Mistakes in an entry of the study with some changes.
 
     Mistakes elsewhere in the study are left out: other changes may correct them.
     """
     place = dotted(entry(study.resolved, name))
-    for k, value in enumerate(values):
-        try:
-            with_entries(study, [(name, value)])
-        except StudyError as error:
-            yield from ((k, problem.message) for problem in error.problems if f"{problem.key}.".startswith(f"{place}."))
+    try:
+        with_entries(study, changes)
+    except StudyError as error:
+        yield from (problem.message for problem in error.problems if f"{problem.key}.".startswith(f"{place}."))
 
 
 def entry_unit(study: Study, name: str) -> str:

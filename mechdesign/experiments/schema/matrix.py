@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from mechdesign.errors import StudyError
+from mechdesign.errors import StudyError, printable
 from mechdesign.expressions import Expression
 from mechdesign.questions.optimize.schema import WORDS as WORDS
 from mechdesign.questions.optimize.schema import Chosen, check_result, read_result
@@ -24,6 +24,8 @@ from mechdesign.study.text.inputs import Folder
 
 HELP_PAGE = "howto/sweep"
 
+# The column of a file of cases that names them.
+LABEL = "label"
 # Most cases of one study.
 MAX_CASES = 10_000_000
 GRID = "grid"
@@ -172,6 +174,14 @@ class Best(fields.Model):
         return self
 
 
+class Table(NamedTuple):
+    """A file of cases: the entries that vary, a row of values for each case, and the labels, if it has any."""
+
+    names: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    labels: tuple[str, ...] = ()
+
+
 class MatrixSection(fields.Model):
     """Cases of the study, each answered whole: entries that vary, in a grid or at random, or a file of cases."""
 
@@ -185,7 +195,9 @@ class MatrixSection(fields.Model):
     samples: Annotated[int, fields.whole(1, MAX_CASES)] | None = None
     """Number of cases of ``latin_hypercube`` and ``sobol``, which the seed chooses; at most |MAX_CASES|. Example: 64"""
     cases: str | None = None
-    """CSV file, beside the study, whose first line names entries; each line below is a case. Example: cases.csv"""
+    """CSV file, beside the study, whose first line names entries; each line below is a case, which a column ``label``
+    names. Example: cases.csv
+    """
     results: Results = ()
     """Results of every case that are listed besides the requirements. Example: [kinematics.mu.min, GII]"""
     best: Best | None = None
@@ -224,8 +236,8 @@ class MatrixSection(fields.Model):
                 check_result(checker, result.result, (*place, k))
         return self
 
-    def table(self, folder: Folder) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]]:
-        """Names and rows of the file of cases.
+    def table(self, folder: Folder) -> Table:
+        """Names of entries, values and labels of the cases, as their file has them.
 
         Raises
         ------
@@ -233,22 +245,27 @@ class MatrixSection(fields.Model):
             Where the file cannot be read or is no table of values.
         """
         assert self.cases is not None
-        (_, names), *lines = read_cells(folder, self.cases)
-        if len(set(names)) < len(names) or not all(names):
-            raise StudyError(f"{self.cases}: the first line does not name each column, or names one twice")
+        (_, head), *lines = read_cells(folder, self.cases)
+        names = [name for name in head if name != LABEL]
+        if len(set(head)) < len(head) or not all(head) or not names:
+            raise StudyError(f"{self.cases}: the first line does not name each entry that varies, or names one twice")
         if not lines:
             raise StudyError(f"{self.cases} has no cases below its first line")
         if len(lines) > MAX_CASES:
             raise StudyError(
                 f"{self.cases} has {len(lines):,} cases, and at most {MAX_CASES:,} are answered; divide the file"
             )
-        return tuple(names), tuple(self._row(number, names, row) for number, row in lines)
+        for number, row in lines:
+            if len(row) != len(head):
+                raise StudyError(f"{self.cases}:{number}: {len(row)} values for {len(head)} names")
+        labels = tuple(printable(row[head.index(LABEL)]) for _, row in lines) if LABEL in head else ()
+        return Table(tuple(names), tuple(self._row(number, head, row) for number, row in lines), labels)
 
-    def _row(self, number: int, names: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:
-        if len(row) != len(names):
-            raise StudyError(f"{self.cases}:{number}: {len(row)} values for {len(names)} names")
+    def _row(self, number: int, head: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:
         values: list[Any] = []
-        for name, cell in zip(names, row, strict=True):
+        for name, cell in zip(head, row, strict=True):
+            if name == LABEL:
+                continue
             if decimal := _DECIMAL.fullmatch(cell):
                 values.append(plainly(float(cell)) if decimal[1] else int(cell))
                 continue

@@ -20,7 +20,7 @@ from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import radians
 from mechdesign.results import Table
-from mechdesign.statistics import Request
+from mechdesign.statistics import Request, no_value_along
 from mechdesign.study.poses import Poses
 
 # Work over the next motion that differs by less than this part of the work of the size of the effort is the same; of an
@@ -81,6 +81,8 @@ def _no_motion(question: MotionQuestion, along: Along | None) -> str:
         return "the motion cannot be followed between its poses"
     if missing := along.missing(0):
         return missing
+    if lost := float(along.lost(f"{drive.name}_effort")[0]):
+        return f"the effort of {drive.name} has {no_value_along(lost)}"
     return "" if np.isfinite(along.mean(f"{drive.name}_effort")[0]) else f"the effort of {drive.name} is not finite"
 
 

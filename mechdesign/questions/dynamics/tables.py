@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.rounding import STILL, cleared, larger
 from mechdesign.questions.columns import VALID
 from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
 from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
 from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.extremes import without_value
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.results import Table
 
-# A range below this part of a function's size is rounding.
-STILL = 1e-12
+# Places among the numbers of an extreme that are values.
+VALUES = [0, 2, 4, 6, 7]
 
 
 def question_of(motion: Motion) -> ForceQuestion:
@@ -77,14 +79,23 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
         values = motion.arrays[static.name].reshape(poses.designs, -1)
         numbers[k] = _of_poses(np.where(valid, values, np.nan), at)
         if along is not None and static.name in along.columns:
-            numbers[k] = np.where(along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k]))
+            numbers[k] = np.where(
+                along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k], static.size)
+            )
+        peak = numbers[k][:, [4]]
+        values = cleared(numbers[k][:, VALUES], STILL * np.fmax(np.where(np.isfinite(peak), peak, 0.0), static.size))
+        numbers[k][:, VALUES] = values
+        # What is rounding everywhere has no place.
+        numbers[k][(values[:, :3] == 0).all(axis=1), 1:6:2] = np.nan
     low, low_at, high, high_at, peak, peak_at, mean, rms = numbers.transpose(2, 1, 0).reshape(8, -1)
     names, units = ([getattr(static, key) for static in statics] * poses.designs for key in ("name", "unit"))
     columns = EXTREMES.columns(
         of_swept(question.study, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
         max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, unit=np.array(units, dtype=str),
     )  # fmt: skip
-    return EXTREMES.table(columns, **over(along, [static.name for static in statics]))
+    lacking = np.array([without_value(motion, along, static.name) for static in statics]).reshape(len(statics), -1)
+    table = EXTREMES.table(columns, **over(along, [static.name for static in statics]))
+    return replace(table, lacking=lacking.T.ravel())
 
 
 def _of_poses(values: Floats, at: Floats) -> Floats:
@@ -100,15 +111,16 @@ def _of_poses(values: Floats, at: Floats) -> Floats:
     return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
 
 
-def _between(along: Along, name: str, poses: Floats) -> Floats:
+def _between(along: Along, name: str, poses: Floats, size: float) -> Floats:
     """The same over the motion between its poses."""
     lines = np.arange(along.curve.lines)
-    still = STILL * np.nan_to_num(poses[:, 4])
+    still = STILL * np.fmax(np.nan_to_num(poses[:, 4]), size)
     peaks = along.functions.extremes([name], still[None])
     (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
     constant = np.logical_not(high - low > still)
-    size, size_at = np.where(high >= -low, high, -low), np.where(high >= -low, high_at, low_at)
-    ends = [low, along.shown(lines, low_at), high, along.shown(lines, high_at), size, along.shown(lines, size_at)]
+    upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
+    peak, peak_at = np.where(upper, high, -low), np.where(upper, high_at, low_at)
+    ends = [low, along.shown(lines, low_at), high, along.shown(lines, high_at), peak, along.shown(lines, peak_at)]
     square = along.mean(name, 2)
     whole = np.stack([*ends, along.mean(name), np.sqrt(np.maximum(square, 0.0))], axis=1)
     # What stands still keeps the place of the first pose.

@@ -21,6 +21,7 @@ from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.rounding import STILL, cleared, larger
 from mechdesign.questions.columns import GIVEN
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import APART
@@ -80,6 +81,7 @@ class Along:
         columns |= {s.name: s.size for s in question.statics if s.name not in EFFICIENCIES}
         columns |= dict.fromkeys(question.clearances, sizes["length"])
         self._requests, self._within = requests, dict[Part, Along]()
+        self._worst = dict[tuple[str, int, bool, float], tuple[Floats, Floats]]()
         whole = [request for request in requests if not request.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
         judged = dict.fromkeys([*also, *(request.column for request in whole)])
@@ -295,15 +297,23 @@ class Along:
         The value is that of the function, absolute where that is judged; nan where it has none. Of values within
         `still` the first along the motion counts.
         """
+        key = name, sign, absolute, still
+        if key not in self._worst:
+            self._worst[key] = self._worst_of(*key)
+        return self._worst[key]
+
+    def _worst_of(self, name: str, sign: int, absolute: bool, still: float) -> tuple[Floats, Floats]:
         if absolute and sign < 0:
             values, places = self.least([name], still)
             return values[0], places[0]
         peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
-        (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
+        low, high = cleared(peaks.value[:, 0], STILL * self.functions.size(name))
+        # What is rounding everywhere has no place.
+        low_at, high_at = np.where((low == 0) & (high == 0), np.nan, peaks.place[:, 0])
         if not absolute:
             return (high, high_at) if sign > 0 else (low, low_at)
-        larger = high >= -low
-        return np.where(larger, high, -low), np.where(larger, high_at, low_at)
+        upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
+        return np.where(upper, high, -low), np.where(upper, high_at, low_at)
 
     def least(self, names: Sequence[str], still: float) -> tuple[Floats, Floats]:
         """Smallest absolute values of functions over each motion, and their places; shape (names, lines).
@@ -339,6 +349,10 @@ class Along:
     def _squared(self, name: str, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         table, conditioning = self._evaluate(line, s)
         return table[[self._names.index(name)]] ** 2, conditioning
+
+    def lost(self, name: str) -> Floats:
+        """Part of each motion on which a column has no value, shape (lines,)."""
+        return self.functions.lost(name)
 
     def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
         """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""

@@ -23,7 +23,7 @@ from mechdesign.questions.kinematics.limits import Limit, change_points, hidden,
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, without_centre
+from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, valued, without_centre, without_value
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import invalid_in_words, judge_failures
@@ -141,6 +141,9 @@ def _warnings(
                 "but extremes may lie between the places that were looked at; sweep less of it",
                 "extremes",
             ))  # fmt: skip
+    names = [name for name in valued(question) if along is not None and name in along.columns]
+    between = {} if along is None or along.curve.spent[k] else {name: float(along.lost(name)[k]) for name in names}
+    warnings += without_value(question, marks, between)
     return [*warnings, *without_centre(question, marks), *cautions(question.study, events.cams, k)], failed
 
 

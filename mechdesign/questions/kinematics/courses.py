@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.rounding import STILL
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -66,6 +67,16 @@ class Followed:
     def followed(self) -> Flags:
         """Which motions are followed between their poses, shape (designs,)."""
         return ~self.along.curve.spent[self._designs]
+
+    @property
+    def rounding(self) -> float:
+        """Values up to this are rounding."""
+        return STILL * self.along.functions.size(self.name)
+
+    @property
+    def lost(self) -> Floats:
+        """Part of each motion on which it has no value, shape (designs,)."""
+        return self.along.lost(self.name)[self._designs]
 
     def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
         """The largest value times the sign, and its place in rows, shape (designs,)."""

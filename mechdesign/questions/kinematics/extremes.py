@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mechdesign.numerics.rounding import STILL, cleared
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.results import Table
+from mechdesign.statistics import no_value, no_value_along
 
-# A range below this part of a function's size is rounding.
-STILL = 1e-12
 # A row within this part of an extreme of the motion between the rows does not contradict it.
 AT_ROW = 1e-9
+
+
+def without_value(motion: Motion, along: Along | None, name: str) -> list[str]:
+    """Of each design, where a column has no value though the mechanism assembles, in words; empty where it has one."""
+    poses, valid = motion.question.poses, motion.valid
+    lost = (valid & np.isnan(motion.arrays[name])).reshape(poses.designs, -1).sum(axis=1)
+    count = valid.reshape(poses.designs, -1).sum(axis=1)
+    between = np.zeros(poses.designs)
+    if along is not None and name in along.columns:
+        between = np.where(along.curve.spent, 0.0, along.lost(name))
+    # Of a long motion some poses are kept, those without a value among them.
+    some = "no value in some poses" if poses.rows is not None else ""
+    return [
+        (some or no_value(number, valid)) if number else no_value_along(part) if part else ""
+        for number, valid, part in zip(lost.tolist(), count.tolist(), between.tolist(), strict=True)
+    ]
 
 
 def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
@@ -77,6 +95,9 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         better = np.isfinite(peaks.place) & moves & ~kept
         for k, new in enumerate((peaks.value, shown)):
             ends[:, k, followed] = np.where(better, new, ends[:, k, followed])
+    values = cleared(ends[:, 0], STILL * np.maximum(finite, size))
+    # What is rounding everywhere has no place.
+    ends = np.stack([values, np.where((values == 0).all(axis=0), np.nan, ends[:, 1])], axis=1)
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
@@ -86,11 +107,21 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
         span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
-    return EXTREMES.table(EXTREMES.columns(
+    targeted = {error.name: error.output for error in motion.errors}
+    lacking = _lacking(motion, along, [targeted.get(name, name) for name in curves])
+    return replace(EXTREMES.table(EXTREMES.columns(
         of_swept(study, swept, "place in rows (from 0)"), output=np.tile(np.array(list(curves)), poses.designs),
         min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
         range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
-    ), **over(along, list(curves)))  # fmt: skip
+    ), **over(along, list(curves))), lacking=lacking)  # fmt: skip
+
+
+def _lacking(motion: Motion, along: Along | None, outputs: Sequence[str]) -> NDArray[np.str_]:
+    """Where outputs, or coordinates of points, have no value: a row each, design by design."""
+    parts = [[name] if name in motion.arrays else [f"{name}.{axis}" for axis in "xy"] for name in outputs]
+    words = [[max(pair) for pair in zip(*(without_value(motion, along, name) for name in part), strict=True)]
+             for part in parts]  # fmt: skip
+    return np.array(words, dtype=str).reshape(len(outputs), -1).T.ravel()
 
 
 def targets_table(motion: Motion, along: Along | None) -> Table:
@@ -122,9 +153,12 @@ def targets_table(motion: Motion, along: Along | None) -> Table:
                 along.shown(np.arange(len(place)), place),
             ])  # fmt: skip
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
+        numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * motion.question.sizes.get(error.quantity, 1.0))
+        numbers[3, numbers[2, :, k] == 0, k] = np.nan
     rms, mean, largest, where = numbers.reshape(4, -1)
     words = of_swept(study, swept, "row (from 0)")
     units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
     outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
     columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)
-    return TARGETS.table(columns, **over(along, [error.name for error in errors]))
+    table = TARGETS.table(columns, **over(along, [error.name for error in errors]))
+    return replace(table, lacking=_lacking(motion, along, [error.output for error in errors]))

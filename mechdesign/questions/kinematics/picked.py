@@ -35,6 +35,8 @@ class Picked:
             if finite.any():
                 low, high = np.where(finite, values, np.inf), np.where(finite, values, -np.inf)
                 some[[low.argmin(), high.argmax(), finite.argmax()]] = True
+            if (lost := motion.valid & np.isnan(values)).any():
+                some[lost.argmax()] = True
         kept = np.flatnonzero(some)
         errors = [Error(error.output, error.quantity, error.values[kept]) for error in motion.errors]
         arrays = {name: values[kept] for name, values in motion.arrays.items()}

@@ -16,6 +16,7 @@ from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
+from mechdesign.statistics import no_value, no_value_along
 from mechdesign.study.poses import Poses
 
 _TABLE = "motion"  # whose rows are the poses
@@ -25,6 +26,7 @@ _LOST = "without drive rates"
 _REGULAR = "regular"
 _NEAR = "nearly singular"
 _WITHOUT_TARGET = " without target"
+_WITHOUT_VALUE = " without value"
 # How two links without an instant centre within reach move against each other.
 _CENTRELESS = {
     TRANSLATION: "one translates against the other: their instant centre is at infinity",
@@ -69,6 +71,27 @@ def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[
     return warnings
 
 
+def valued(question: MotionQuestion) -> list[str]:
+    """Columns that have a value in every regular pose: outputs, and without friction the efforts."""
+    statics = question.statics if question.friction is None else ()
+    efforts = [static.name for static in statics if static.name.endswith("_effort")]
+    return [*(output.name for output in question.outputs), *efforts]
+
+
+def without_value(question: MotionQuestion, marks: Mapping[str, Mark], between: Mapping[str, float]) -> list[Caution]:
+    """Warnings of outputs that have no value at valid poses, or on parts of the motion `between` them."""
+    study, poses, warnings = question.study, question.poses, []
+    for name in valued(question):
+        count, row = marks.get(f"{name}{_WITHOUT_VALUE}", (0, 0))
+        if count:
+            first = pose_in_words(study, poses, row)
+            words = f"{name} has {no_value(count, poses.count)}; the first: {first}"
+            warnings.append(Caution("undefined", words, _TABLE, row, first))
+        elif part := between.get(name, 0.0):
+            warnings.append(Caution("undefined", f"{name} has {no_value_along(part)}, between its poses", _TABLE))
+    return warnings
+
+
 def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """A warning where a valid pose has no target."""
     study, poses, warnings = question.study, question.poses, []
@@ -101,6 +124,9 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     marks |= outside(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
+    for name in valued(question):
+        if (lost := valid & steady & np.isnan(arrays[name])).any():
+            marks[f"{name}{_WITHOUT_VALUE}"] = lost
     for centre in question.centres:
         for kind in _CENTRELESS:
             marks[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)

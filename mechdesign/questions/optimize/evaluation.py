@@ -37,6 +37,7 @@ from mechdesign.terms import terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"
+SAMPLES = "samples cannot be assembled"
 # Most studies of other structure that are kept.
 MAX_OTHERS = 256
 
@@ -233,10 +234,12 @@ class Evaluator:
             other = self._needed(other)
             for command, goals in self.question.alone.items():
                 result = ask(other, command)
-                partly = [not goal.unassembled and missing(goal, result) for goal in goals]
+                partly = ["" if goal.unassembled else missing(goal, result) for goal in goals]
                 values = [batch.judge(goal, result, row) for goal in goals]
                 if result.failed or any(partly) or np.isnan(values).any():
-                    return self._pose_reason(batch, k, other, command) or (BETWEEN if any(partly) else "")
+                    gap = next(filter(None, partly), "")
+                    between = SAMPLES if gap.endswith(SAMPLES) else BETWEEN if gap else ""
+                    return self._pose_reason(batch, k, other, command) or between
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
@@ -257,6 +260,6 @@ class Evaluator:
 
 
 def missing(goal: Goal, result: Result) -> str:
-    """Invalid poses or parts of the motion among those that a goal judges, in words; empty where all are valid."""
-    scopes = [chosen.table.scope for chosen in terms_of(result, goal.column, dict(goal.where)).parts]
-    return next((scope.missing for scope in scopes if scope is not None and scope.missing), "")
+    """Invalid poses, samples or parts of the motion that a goal judges, in words; empty where all are valid."""
+    parts = terms_of(result, goal.column, dict(goal.where)).parts
+    return next((gap for chosen in parts for gap in chosen.gaps), "")

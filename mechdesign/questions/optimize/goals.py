@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.rounding import cleared
 from mechdesign.questions.optimize.schema import Condition, Containment, OptimizeSection, Outline
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
@@ -112,7 +113,10 @@ class Goal:
         lost, take = (counts & np.isnan(values)).any(axis=1), np.fmax if self.smallest else np.fmin
         for course in chosen.courses.values() if self.requests(chosen) else ():
             between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
-            extreme = np.where(lost, np.nan, take(extreme, np.abs(between) if absolute else between))
+            extreme = np.where(
+                lost | (course.lost > 0), np.nan, take(extreme, np.abs(between) if absolute else between)
+            )
+            extreme = cleared(extreme, course.rounding)
             if self.gate and rows is not None:
                 rows = np.column_stack([rows, np.where(np.isnan(between), extreme, between)])
         return Judgement(extreme, rows)

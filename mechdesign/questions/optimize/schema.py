@@ -37,7 +37,9 @@ _METHODS = {
 }
 # Statistics that may follow the name of a column.
 WORDS = ", ".join(f"``{word}``" for word in STATISTICS_OF_ROWS)
-_UNASSEMBLED = {"allowed": "only the part of the motion that is valid counts; how much is missing is said"}
+_UNASSEMBLED = {
+    "allowed": "only the part of the motion, or the samples, that are valid count; how much is missing is said"
+}
 
 
 def _statistics() -> tuple[str, ...]:
@@ -197,8 +199,8 @@ class Judged(Chosen):
     """Whether the absolute value is judged."""
     unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
     """What becomes of a motion with poses that cannot be assembled or lie outside the limits, or of one in time that
-    fails before its end. Left out: it is not met, and a design is infeasible, where one pose is not valid or the motion
-    ends between two. Example: allowed
+    fails before its end, and of moments of samples some of which cannot be assembled. Left out: it is not met, and a
+    design is infeasible, where one pose or sample is not valid or the motion ends between two. Example: allowed
     """
 
     @model_validator(mode="after")
@@ -436,10 +438,10 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
                 check_result(checker, term, path, required=required)
             return
     command, _, rest = name.partition(".")
-    statistics = _statistics()
     if rest:
         checker.check_name(command, COMMANDS, "command", path)
-    elif required or name not in statistics:
+    elif required or name not in _statistics():
+        statistics = _statistics()
         names = statistics if required else (*statistics, *checker.parameters.nominal)
         hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")

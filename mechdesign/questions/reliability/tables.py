@@ -55,6 +55,18 @@ def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[Metho
     return [result for result in results if result.sums or result.normal] or [methods.run("analytic", task)]
 
 
+def _lost(results: Sequence[MethodResult], pose: Ints, method: Ints) -> Strings:
+    """How many samples behind moments cannot be assembled, in words, for rows by pose and method."""
+
+    def words(row: int, result: MethodResult) -> str:
+        sums = result.sums.get(row) if result.normal is None else None
+        lost = 0 if sums is None else sums.samples - sums.valid
+        return f"{lost} of {sums.samples} samples cannot be assembled" if sums is not None and lost else ""
+
+    pairs = {pair: words(pair[0], results[pair[1]]) for pair in {*zip(pose.tolist(), method.tolist(), strict=True)}}
+    return np.array([pairs[pair] for pair in zip(pose.tolist(), method.tolist(), strict=True)], dtype=str)
+
+
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
     results = _with_moments(task, results)
@@ -67,12 +79,13 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
-    return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
+    table = MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
         {}, method=np.array([result.method for result in results])[method], **_channels(task, channel), nominal=nominal,
         mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
         worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
         unit=task.labels[2][channel], valid=task.reason[pose] == 0,
     ))  # fmt: skip
+    return replace(table, unassembled=dict.fromkeys(("mean", "sigma"), _lost(results, pose, method)))
 
 
 def success(task: Task, results: Sequence[MethodResult]) -> Table:
@@ -110,7 +123,9 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
         columns += RELIABILITY.columns({}, rho=values)
     all_valid = (task.reason == 0).reshape(task.poses.designs, -1).all(axis=1)
     valid = np.where(whole, all_valid[pose // length], task.reason[pose] == 0)
-    return RELIABILITY.table([*columns, *RELIABILITY.columns({}, valid=valid)])
+    table = RELIABILITY.table([*columns, *RELIABILITY.columns({}, valid=valid)])
+    lost = np.where(whole, "", _lost(results, pose, np.array([results.index(result) for result in methods_of])))
+    return replace(table, unassembled={"rho": lost} if task.question.pair is not None else {})
 
 
 def _sigma_level(failure: Floats) -> Floats:
@@ -153,13 +168,14 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     )  # fmt: skip
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
-    return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
+    table = CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
         {}, method=np.array([result.method for result in results])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
         mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
         sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
         ppm_high=1e6 * most.ravel(), unit=unit[limit], valid=task.reason[pose] == 0,
     ))  # fmt: skip
+    return replace(table, unassembled=dict.fromkeys(("mean", "sigma", "cp", "cpk"), _lost(results, pose, method)))
 
 
 def _by_limit(task: Task, result: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
@@ -190,11 +206,18 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
         [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
     )
     links = np.array([holders(task.study, channel) for channel in task.question.channels])
-    return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
+    table = CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
         share=share.ravel(), **_index_values(indices, share.shape),
     ))  # fmt: skip
+    lost = {
+        row: f"{own.invalid} of {own.samples} samples cannot be assembled"
+        for row, own in indices.items()
+        if own.invalid
+    }
+    words = np.array([lost.get(row, "") for row in pose.tolist()], dtype=str)
+    return replace(table, unassembled={name: words for name in table.names if name.startswith("sobol_")})
 
 
 def _index_values(by_pose: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:

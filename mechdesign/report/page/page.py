@@ -261,7 +261,10 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     rows: list[tuple[bool, int, dict[str, Any]]] = []
     rules = [
         *map(_in_words, study.requirements),
-        *({"result": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
+        *(
+            {"result": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0", "bare": True}
+            for kind in study.barred
+        ),
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for answer in answers:
@@ -280,13 +283,15 @@ def _meanings(section: Mapping[str, Any] | None) -> dict[str, str]:
     return {column["name"]: column["meaning"] for column in columns if column["numeric"] and not column["unit"]}
 
 
-def _in_words(requirement: Requirement) -> dict[str, str]:
+def _in_words(requirement: Requirement) -> dict[str, Any]:
     path = path_of(requirement.result)
     bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
         "result": f"|{path}|" if requirement.abs else path,
         "where": ", ".join(f"{column} {value}" for column, value in requirement.where.items()),
         "limit": ", ".join(f"{sign} {text_of(bound) or shown(bound)}" for sign, bound in bounds if bound is not None),
+        # A quantity has its unit already.
+        "bare": not any(text_of(bound) for _, bound in bounds),
     }
 
 

@@ -42,6 +42,9 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
     _pivots(checker, description.links[GROUND], description)
     _wheels(checker)
     _planets(checker)
+    data = checker.reporter.document.data
+    if data.get("requirements", ()) is None:
+        checker.doubt(("requirements",), "lists nothing, so that no result is judged", at_key=True)
     reliability = parts.get("reliability")
     if reliability is not None:
         _tolerances(checker, reliability)

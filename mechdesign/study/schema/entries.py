@@ -55,7 +55,7 @@ def check_varied(matrix: MatrixSection, checker: Checker) -> None:
     """Check that the entries that a matrix varies exist, and that none equals or contains another."""
     at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     try:
-        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
+        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder).names
     except StudyError as error:
         checker.report(at, str(error))
         return
@@ -69,6 +69,8 @@ def check_varied(matrix: MatrixSection, checker: Checker) -> None:
             continue
         if path[0] == "matrix":
             checker.report(place, "a matrix does not vary itself", at_key=True)
+        if path[0] == "units":
+            checker.report(place, "cases are compared in the units of the study, which no case changes", at_key=True)
         varied.add(path, name, place)
 
 

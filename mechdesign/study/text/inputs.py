@@ -22,11 +22,14 @@ MAX_FILE_BYTES = 50_000_000
 class Folder:
     """The folder that must contain the files that a study names, unless they may lie `anywhere`.
 
+    Those whose names, as seen from the folder, the user gave beside the study (`given`) may lie anywhere, too.
+
     A file is read once: changes of it during the computation have no effect.
     """
 
     path: Path = Path()
     anywhere: bool = False
+    given: frozenset[str] = frozenset()
     _read: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def text(self, name: str) -> str:
@@ -56,7 +59,8 @@ class Folder:
             Where it lies elsewhere, cannot be read, or is too large.
         """
         try:
-            if not self.anywhere and not file.resolve().is_relative_to(self.path.resolve()):
+            free = self.anywhere or file in {self.path / name for name in self.given}
+            if not free and not file.resolve().is_relative_to(self.path.resolve()):
                 raise StudyError(f"{file} is not in the folder of the study; --allow-files reads it all the same")
             # Opened without waiting, as a pipe may never be written to.
             with open(file, "rb", opener=_without_waiting) as stream:

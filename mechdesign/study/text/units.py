@@ -249,6 +249,11 @@ class Units:
         under = "*".join(parts)
         return f"{one or '1'}/{f'({under})' if {'*', '/'} & {*under} else under}"
 
+    def as_written(self, value: float, like: str) -> str:
+        """A number in the study's units as the text of a quantity, in the unit of another; empty where that is bare."""
+        match = QUANTITY.fullmatch(like)
+        return "" if match is None else f"{value / self.convert('1 ' + match['unit'])!r} {match['unit']}"
+
     def convert(self, text: str, kind: str | None = None) -> float:
         """Convert a quantity of a kind (a name of `KINDS`, or any) to the study's units.
 

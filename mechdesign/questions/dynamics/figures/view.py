@@ -7,10 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.rounding import STILL
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.motion_in_time import STANDSTILL
 from mechdesign.questions.dynamics.question import ForceQuestion
-from mechdesign.questions.dynamics.tables import STILL, question_of
+from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
 from mechdesign.report.figures.pictures import PosesView
 from mechdesign.study.poses import Poses
