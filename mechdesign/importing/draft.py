@@ -44,7 +44,9 @@ class Draft:
     def _from_pivot(self, body: str) -> list[str]:
         """The points of a body, from those by which it turns: its angle counts from there."""
         points = self.bodies.points
-        bases = [drive.base for drive in self.sketch.drives if drive.kind == "angle" and self.bodies.of(drive.of) == body]
+        bases = [
+            drive.base for drive in self.sketch.drives if drive.kind == "angle" and self.bodies.of(drive.of) == body
+        ]
         pivots = {point for base in [*bases, GROUND] for point in points.get(self.bodies.of(base), ())}
         return sorted(points[body], key=lambda point: body != GROUND and point not in pivots)
 
@@ -143,7 +145,9 @@ class Draft:
             if body == GROUND or body not in self.points:
                 raise StudyError(f"the input moves link {drive.of!r}, which is part of the ground or joined to nothing")
             if self.bodies.of(drive.base) not in self.points:
-                raise StudyError(f"the input moves link {drive.of!r} from link {drive.base!r}, which is joined to nothing")
+                raise StudyError(
+                    f"the input moves link {drive.of!r} from link {drive.base!r}, which is joined to nothing"
+                )
             drives[self.link(body)] = drive
         return drives
 

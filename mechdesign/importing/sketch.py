@@ -193,7 +193,9 @@ class Sketch:
         begin, end = (self.points[name] for name in ends)
         middle, half = (begin + end) / 2, (end - begin) / 2
         if not 0 < abs(half) <= radius:
-            raise StudyError(f"{point!r} moves on an arc of radius {radius:.6g}, and its ends are {2 * abs(half):.6g} apart")
+            raise StudyError(
+                f"{point!r} moves on an arc of radius {radius:.6g}, and its ends are {2 * abs(half):.6g} apart"
+            )
         across = 1j * half / abs(half)
         far = across * math.sqrt((radius - abs(half)) * (radius + abs(half)))
         center = min((middle + far, middle - far), key=lambda center: abs(abs(place - center) - radius))
@@ -205,7 +207,9 @@ class Sketch:
                 self.links[guide].points.append(name)
         self.add_link(f"{point}_arc", (f"{point}_center", point))
         self.reaches.append((point, f"{point}_middle", ends[0]))
-        self.choices.append(f"{point!r} moves on an arc: link '{point}_arc' holds it about the arc's centre, '{point}_center'")
+        self.choices.append(
+            f"{point!r} moves on an arc: link '{point}_arc' holds it about the arc's centre, '{point}_center'"
+        )
 
     def _guide(self, point: str, ends: Sequence[str]) -> str:
         """What has the two ends of the path of a point: the ground, or a link."""

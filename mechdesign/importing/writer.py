@@ -190,8 +190,8 @@ class Writer:
                 rounds = max(1, round(duration / periods[name]))
                 if rounds > _MOST_ROUNDS:
                     raise StudyError(
-                        f"the input {name!r} goes to and fro {rounds:,} times while the slowest one moves once: choose one "
-                        "of them with --drive"
+                        f"the input {name!r} goes to and fro {rounds:,} times while the slowest one moves once: choose "
+                        "one of them with --drive"
                     )
                 moves = [{"from": near, **there}, back, *[there, back] * (rounds - 1)]
             lines += [f"    {name}:", *(f"      - {flow(move)}" for move in moves)]

@@ -74,8 +74,8 @@ class ChangePoints:
         high = max(end, high, self.sketch + self._period)
         if high - low > MOST_TURNS * self._period:
             raise MechanismError(
-                f"with 'branch: follow' every turn since the sketch counts, {MOST_TURNS:,} at most; ask for fewer, or say "
-                "'branch: side'"
+                f"with 'branch: follow' every turn since the sketch counts, {MOST_TURNS:,} at most; ask for fewer, or "
+                "say 'branch: side'"
             )
         count = int(np.ceil((high - low) / self._period * SAMPLES_PER_TURN)) + 1
         samples = np.linspace(low, high, count)

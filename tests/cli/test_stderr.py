@@ -16,7 +16,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))
-LIBRARY = re.compile(r"Warning:|Traceback|internal error|site-packages|[/\\]mechdesign[/\\]\w+[/\\].*\.py|lib[/\\]python")
+LIBRARY = re.compile(
+    r"Warning:|Traceback|internal error|site-packages|[/\\]mechdesign[/\\]\w+[/\\].*\.py|lib[/\\]python"
+)
 # Commands in a row; each says first which it is.
 COMMANDS = """
 import json, sys
@@ -78,7 +80,7 @@ READERS = {
     "motion": ("kinematics: {motion: {crank: {file: data.csv}}, outputs: [B]}", [[0, 0], [1, 3], [2, 10], [3, 0]]),
     "path": ("kinematics: {path: {crank: {file: data.csv}}, outputs: [B]}", [[1], [2], [3], [10]]),
     "spline": ("kinematics: {path: {B: {file: data.csv, spline: true}}, speed: 5}", [[75, 55], [80, 60], [80, 70]]),
-    "target": ("  targets: {rocker.angle: data.csv}\nkinematics: {outputs: [rocker.angle]}", [[0, 0], [90, 9], [200, 3]]),
+    "target": ("  targets: {rocker.angle: data.csv}\nkinematics: {outputs: [rocker.angle]}", [[0, 0], [90, 9], [99, 3]]),
     "measured": ("reliability: {dimensions: {a: {measured: data.csv}}, outputs: [B.x], poses: [{crank: 60}]}",
                  [[30 + 0.01 * k] for k in range(12)]),
     "cases": ("matrix: {cases: data.csv, results: [kinematics.B.x.max]}", [["mechanism.parameters.a"], [20], [30]]),
@@ -123,9 +125,7 @@ SOME = pytest.mark.parametrize("numbers", [["1e308", "1e59"], pytest.param(NUMBE
 
 @SOME
 def test_no_line_of_a_library_is_seen_whatever_the_numbers(numbers, tmp_path):
-    studies = [
-        (FOUR_BAR + ASKED, [f"{place}={number}"], QUESTIONS_ASKED) for place, number in product(PLACES, numbers)
-    ]
+    studies = [(FOUR_BAR + ASKED, [f"{place}={number}"], QUESTIONS_ASKED) for place, number in product(PLACES, numbers)]
     said = stderr_of(QUESTIONS, studies, tmp_path)
     assert said.count("$") == len(studies)
     assert lines_of_libraries(said) == []
@@ -135,7 +135,9 @@ def test_no_line_of_a_library_is_seen_whatever_the_numbers(numbers, tmp_path):
 def test_no_line_of_a_library_is_seen_whatever_stands_in_files(numbers, tmp_path):
     commands = []
     for reader, (section, rows) in READERS.items():
-        for k, number in product(range(1, len(rows), 2), [number.replace(".n", "n").replace(".i", "i") for number in numbers]):
+        for k, number in product(
+            range(1, len(rows), 2), [number.replace(".n", "n").replace(".i", "i") for number in numbers]
+        ):
             name = f"{reader}_{k}_{number}"
             changed = [[*row[:-1], number] if row is rows[k] else row for row in rows]
             (tmp_path / f"{name}.csv").write_text("".join(",".join(map(str, row)) + "\n" for row in changed))

@@ -54,12 +54,13 @@ def test_where_nothing_acts_it_says_what_to_write():
 @pytest.mark.parametrize(
     ("command", "section", "column", "newtons"),
     [
-        ("sweep", "matrix: {vary: {mechanism.links.arm.mass: [1, 4]}, results: [NAME]}", NAME, [1, 4]),
-        ("sensitivities", "sensitivities: {results: [NAME], parameters: [mechanism.links.arm.mass]}", "derivative", [1]),
+        ("sweep", "matrix: {vary: {MASS: [1, 4]}, results: [NAME]}", NAME, [1, 4]),
+        ("sensitivities", "sensitivities: {results: [NAME], parameters: [MASS]}", "derivative", [1]),
         ("optimize", "optimize: {variables: {arm.length: {choices: [100, 50]}}, minimize: NAME}", NAME, [1]),
     ],
 )
 def test_results_of_dynamics_need_no_section(command, section, column, newtons):
-    text = ARM.replace("RATES", SPEED).replace("SPRING", "{}") + section.replace("NAME", NAME)
+    text = ARM.replace("RATES", SPEED).replace("SPRING", "{}") + section
+    text = text.replace("NAME", NAME).replace("MASS", "mechanism.links.arm.mass")
     table = getattr(mechdesign, command)(mechdesign.load(text=text)).main
     assert table[column] == pytest.approx(np.array(newtons) * 0.05 * (2 * np.pi) ** 2, rel=1e-9)

@@ -56,7 +56,9 @@ def read(source: Source) -> Sketch:
         if joint.type != "R":
             angle = math.radians(number(joint.angle or "0", f"angle of {joint.words}"))
             riders = (joint.links[1],) if joint.type == "P" else ()
-            sketch.slides[f"{joint.name}_slide"] = Slide(joint.name, joint.guide, (f"{joint.name}_line",), angle, riders)
+            sketch.slides[f"{joint.name}_slide"] = Slide(
+                joint.name, joint.guide, (f"{joint.name}_line",), angle, riders
+            )
     driven = [joint for joint in joints if joint.flags[3:] == "t"]
     if not driven and joints:
         driven = joints[:1]
