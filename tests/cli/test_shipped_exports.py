@@ -10,17 +10,8 @@ from mechdesign.exporting.exports import exports
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))
-# Telescopic legs, slides, gears, cams, plates, a platform and a motion over time; all others every night.
-FEW = {
-    "excavator",
-    "two_rpr",
-    "scotch_yoke",
-    "planetary",
-    "cam_dwell",
-    "acrylic_leg",
-    "rrr_platform",
-    "rise_dwell_return",
-}
+# Telescopic legs, slides, gears, a cam and a motion over time; all others every night.
+FEW = {"excavator", "scotch_yoke", "planetary", "cam_dwell", "rise_dwell_return"}
 
 
 @pytest.mark.parametrize(
@@ -32,7 +23,7 @@ def test_every_file_of_a_shipped_study_is_made(config: Path, tmp_path: Path, inv
         done = invoke("export", config, "--to", name, "--out", tmp_path / name)
         if done.exit_code and name == "motion.csv":
             # A controller needs a time, one way and every pose.
-            assert done.exit_code == 2, done.output
+            assert done.exit_code in (2, 3), done.output
             assert any(words in done.stderr for words in ("'rates'", "against its rate", "no motion", "no valid pose"))
         else:
             assert done.exit_code == 0, done.output

@@ -80,7 +80,7 @@ READERS = {
     "motion": ("kinematics: {motion: {crank: {file: data.csv}}, outputs: [B]}", [[0, 0], [1, 3], [2, 10], [3, 0]]),
     "path": ("kinematics: {path: {crank: {file: data.csv}}, outputs: [B]}", [[1], [2], [3], [10]]),
     "spline": ("kinematics: {path: {B: {file: data.csv, spline: true}}, speed: 5}", [[75, 55], [80, 60], [80, 70]]),
-    "target": ("  targets: {rocker.angle: data.csv}\nkinematics: {outputs: [rocker.angle]}", [[0, 0], [90, 9], [99, 3]]),
+    "target": ("  targets: {rocker.angle: data.csv}\nkinematics: {outputs: [B]}", [[0, 0], [90, 9], [200, 3]]),
     "measured": ("reliability: {dimensions: {a: {measured: data.csv}}, outputs: [B.x], poses: [{crank: 60}]}",
                  [[30 + 0.01 * k] for k in range(12)]),
     "cases": ("matrix: {cases: data.csv, results: [kinematics.B.x.max]}", [["mechanism.parameters.a"], [20], [30]]),
