@@ -34,8 +34,8 @@ def convert(
     Parameters
     ----------
     source : str or path
-        A share address of PMKS+, a file of PMKS+, PMKS, Linkage or pylinkage, a DXF sketch, JSON of joints and links, or
-        a folder with ``joints.csv`` and ``links.csv``. Nothing is fetched: an address holds the whole mechanism.
+        A share address of PMKS+, a file of PMKS+, PMKS, Linkage or pylinkage, a DXF, JSON of joints and links, or a
+        folder with ``joints.csv`` and ``links.csv``. Nothing is fetched: an address holds the whole mechanism.
     text : str
         The text of such a file, or an address, in place of `source`.
     drives : sequence of str
