@@ -304,7 +304,8 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     Parameters
     ----------
     study : Study
-        With a section ``dynamics``: gravity, loads, and a motion unless kinematics has one.
+        Its section ``dynamics`` has gravity, loads, and a motion unless kinematics has one; without it there are none,
+        and what acts are inertia and springs.
     seed, jobs, progress : optional
         See `mechdesign`; nothing is random.
 
@@ -318,7 +319,7 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     Raises
     ------
     StudyError
-        If the study has no such section.
+        If without such a section nothing acts on the mechanism.
     AssemblyError
         If no pose at all can be assembled, or the start of a motion in time cannot.
     MechanismError

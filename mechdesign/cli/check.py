@@ -46,7 +46,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
                 terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, *_massless(study), ""]))
-            doubts = [*sketch_doubts(study.mechanism), *(cautions := assumed(study))]
+            cautions = assumed(study) if study.dynamics is not None else []
+            doubts = [*sketch_doubts(study.mechanism), *cautions]
             for caution in cautions:
                 terminal.say(f"{label}: warning: {caution} [{caution.kind}]", quiet=options.quiet)
             for warning in study.warnings:

@@ -6,10 +6,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from mechdesign.cli.terminal import emit, emit_words
+from mechdesign.cli.terminal import emit, emit_words, say
 from mechdesign.errors import OutputError, StudyError
 from mechdesign.files import replace
-from mechdesign.importing.conversion import convert
+from mechdesign.importing.conversion import conversion
 
 
 def import_study(
@@ -26,7 +26,9 @@ def import_study(
     """
     if out is not None and os.path.lexists(out):
         raise StudyError(f"{out} is there already; give --out another name")
-    text = convert(source, drives=drives, unit=unit, scale=scale)
+    text, undecided = conversion(source, drives=drives, unit=unit, scale=scale)
+    for reason in undecided:
+        say(f"to move before it runs: {reason}")
     if out is None:
         emit(text)
         return
@@ -35,4 +37,4 @@ def import_study(
         replace(out, [text.encode()])
     except OSError as error:
         raise OutputError(f"{out}: could not be written: {error.strerror or error}") from error
-    emit_words(f"{out}: written; mechdesign kinematics {out} runs it\n")
+    emit_words(f"{out}: written{'' if undecided else f'; mechdesign kinematics {out} runs it'}\n")

@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
@@ -21,6 +22,9 @@ def run(command: Callable[[], Any]) -> None:
 
     Not in a library's process: signals and streams become the command's.
     """
+    if not sys.warnoptions:
+        # Libraries warn of what their callers do, with lines of their code; users get the warnings of their study.
+        warnings.simplefilter("ignore")
     output = _open_streams()
     # What it says of its cache and its fonts concerns no study.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)

@@ -35,6 +35,8 @@ TRUE = 1e-7
 TOUCHED = 1e-14
 # Values of a function that differ by less than this part of its size are equal.
 ROUNDED = 1e-13
+# Levels that are repeated are sought in so many periods at most; a motion with more has no pieces that resolve them.
+MOST_PERIODS = 10_000
 # Sides of `searchsorted`: to the first of equal values, and behind the last.
 _SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 
@@ -312,11 +314,9 @@ class Functions(Means):
         table, every = self._table[self.names[name]], np.array(levels)
         finite = table[np.isfinite(table)]
         if period and len(finite):
-            first, last = (
-                np.floor((finite.min() - every.max()) / period),
-                np.ceil((finite.max() - every.min()) / period),
-            )
-            every = (every + period * np.arange(first, last + 1)[:, None]).ravel()
+            first = np.floor((finite.min() - every) / period)
+            count = int(min(np.ptp(finite) / period, MOST_PERIODS)) + 2
+            every = (every + period * (first + np.arange(count)[:, None])).ravel()
         series = chebyshev.series(table)
         table = chebyshev.at_places(series)
         turned, back, extreme = chebyshev.turning_points(series)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import StudyError
 from mechdesign.importing.sketch import GROUND, Sketch
@@ -18,33 +18,38 @@ class Bodies:
     def __init__(self, sketch: Sketch) -> None:
         self.sketch = sketch
         self._groups = {GROUND: {GROUND}} | {name: {name} for name in sketch.links}
+        self._order = {name: k for k, name in enumerate(self._groups)}
+        self._body = {name: name for name in self._groups}
         for weld in sketch.welds:
             for other in weld[1:]:
                 self._merge(weld[0], other)
-        while pair := self._sharing_two():
-            self._merge(*pair)
+        self._merge_sharing_two()
         self._take_out_idle()
 
     def of(self, link: str) -> str:
         """The body of a link."""
-        return next(name for name, group in self._groups.items() if link in group)
+        return self._body[link]
 
     def links(self, body: str) -> list[str]:
         """The links that a body is made of."""
-        return [link for link in self.sketch.links if link in self._groups[body]]
+        return sorted(self._groups[body] - {GROUND}, key=self._order.__getitem__)
 
     def at(self, point: str) -> list[str]:
         """The bodies that have a point."""
         return [body for body, points in self.points.items() if point in points]
 
-    def _merge(self, one: str, other: str) -> None:
-        first, second = sorted((self.of(one), self.of(other)), key=[*self._groups].index)
+    def _merge(self, one: str, other: str) -> str:
+        """Make one body of those of two links, and return it."""
+        first, second = sorted((self.of(one), self.of(other)), key=self._order.__getitem__)
         if first != second:
             if self._telescopic(first) or self._telescopic(second):
                 raise StudyError(
                     f"{one!r} and {other!r} are fastened to each other, and one of them changes its length"
                 )
-            self._groups[first] |= self._groups.pop(second)
+            joined = self._groups.pop(second)
+            self._groups[first] |= joined
+            self._body |= dict.fromkeys(joined, first)
+        return first
 
     def _telescopic(self, body: str) -> bool:
         return any(self.sketch.links[link].telescopic for link in self.links(body))
@@ -53,18 +58,31 @@ class Bodies:
         own = self.sketch.fixed if body == GROUND else []
         return list(dict.fromkeys([*own, *(p for link in self.links(body) for p in self.sketch.links[link].points)]))
 
-    def _sharing_two(self) -> tuple[str, str] | None:
-        """Two rigid bodies that share two points at different places."""
-        owners: dict[str, list[str]] = {}
-        for body in self._groups:
-            if not self._telescopic(body):
-                for point in self._all_points(body):
-                    owners.setdefault(point, []).append(body)
-        shared: dict[tuple[str, str], str] = {}
-        for point, bodies in owners.items():
-            for pair in combinations(bodies, 2):
-                if self.sketch.distance(shared.setdefault(pair, point), point) > 0:
-                    return pair
+    def _merge_sharing_two(self) -> None:
+        """Merge rigid bodies that share two points at different places; a body that grew is looked at again."""
+        points = {body: self._all_points(body) for body in self._groups if not self._telescopic(body)}
+        owners: dict[str, set[str]] = {}
+        for body, own in points.items():
+            for point in own:
+                owners.setdefault(point, set()).add(body)
+        pending = [*points]
+        while pending:
+            body = pending.pop()
+            if body in self._groups and (other := self._sharing_two(body, points[body], owners)) is not None:
+                merged = self._merge(body, other)
+                gone = other if merged == body else body
+                points[merged] = list(dict.fromkeys(points[merged] + points[gone]))
+                for point in points.pop(gone):
+                    owners[point] = owners[point] - {gone} | {merged}
+                pending.append(merged)
+
+    def _sharing_two(self, body: str, points: Iterable[str], owners: Mapping[str, set[str]]) -> str | None:
+        """A body that shares two points at different places with this one."""
+        shared: dict[str, str] = {}
+        for point in points:
+            for other in owners[point] - {body}:
+                if self.sketch.distance(shared.setdefault(other, point), point) > 0:
+                    return other
         return None
 
     def _take_out_idle(self) -> None:

@@ -34,7 +34,7 @@ def convert(
     Parameters
     ----------
     source : str or path
-        A share address of PMKS+, a file of PMKS+, Linkage or pylinkage, a DXF sketch, JSON of joints and links, or a
+        A share address of PMKS+, a file of PMKS+, PMKS, Linkage or pylinkage, a DXF, JSON of joints and links, or a
         folder with ``joints.csv`` and ``links.csv``. Nothing is fetched: an address holds the whole mechanism.
     text : str
         The text of such a file, or an address, in place of `source`.
@@ -67,6 +67,14 @@ def convert(
     """
     if (source is None) == (text is None):
         raise StudyError("give a source, or a text in its place")
+    return conversion(source, text=text, drives=drives, unit=unit, scale=scale)[0]
+
+
+def conversion(
+    source: str | os.PathLike[str] | None, *, text: str | None = None, drives: Sequence[str], unit: str | None,
+    scale: float | None,
+) -> tuple[str, tuple[str, ...]]:  # fmt: skip
+    """A study as `convert` makes it, and what is to be moved in its sketch before it runs, such as at a dead centre."""
     origin = Source.of(os.fspath(source)) if source is not None else Source.of_text(text or "")
     if not origin.text.strip():
         raise StudyError(f"{cut(origin.name)} is empty")
@@ -150,34 +158,33 @@ def _named(sketch: Sketch, name: str) -> Drive:
     return next((drive for drive in sketch.drives if drive.of == chosen.of), chosen)
 
 
-def _settled(draft: Draft, source: str) -> str:
-    """The study, whose drive goes no farther than the mechanism lets it."""
+def _settled(draft: Draft, source: str) -> tuple[str, tuple[str, ...]]:
+    """The study, whose drive goes no farther than the mechanism lets it; and what its sketch leaves undecided."""
     writer, spans = Writer(draft), {name: draft.span(name) for name in draft.drives}
     text = writer.text(source, spans)
-    solve = _loaded(text).mechanism.solve
+    try:
+        study = studies.load(None, (), None, text=text)
+    except StudyError as error:
+        reasons = tuple(f"{problem.key}: {problem.message}" for problem in error.problems[:3])
+        if all(problem.key == "mechanism.sketch" for problem in error.problems):
+            return writer.text(source, spans, undecided=reasons), reasons
+        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {'; '.join(reasons)}") from None
+    except MechdesignError as error:
+        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
+    solve = study.mechanism.solve
     if not solve({name: [draft.start(name)] for name in spans}).valid.all():
         raise AssemblyError("the mechanism cannot be assembled as the file shows it, or a slide is beyond its limits")
     if len(spans) > 1:
-        return text
+        return text, ()
     ((name, drive),) = draft.drives.items()
     start = draft.start(name)
     turns = drive.kind == "angle" and drive.span is None
     wide = (start - 180, start + 180) if turns else spans[name]
     low, high = (_farthest(lambda values: solve({name: values}).valid, start, end) for end in wide)
     if (low, high) == wide:
-        return text
+        return text, ()
     remark = f"{name} goes from {low:.4g} to {high:.4g}; outside the links do not meet, or a limit is passed"
-    return writer.text(source, {name: (low, high)}, [remark])
-
-
-def _loaded(text: str) -> studies.Study:
-    try:
-        return studies.load(None, (), None, text=text)
-    except StudyError as error:
-        reasons = "; ".join(f"{problem.key}: {problem.message}" for problem in error.problems[:3])
-        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {reasons}") from None
-    except MechdesignError as error:
-        raise StudyError(f"what the file shows is no mechanism that its inputs drive: {error}") from None
+    return writer.text(source, {name: (low, high)}, [remark]), ()
 
 
 def _farthest(valid: Callable[[Floats], Flags], start: float, end: float) -> float:

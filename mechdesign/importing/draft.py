@@ -28,7 +28,7 @@ class Draft:
         self.bodies = Bodies(sketch)
         self.names = Names()
         self.places = dict(sketch.points)
-        self.points = {body: list(points) for body, points in self.bodies.points.items()}
+        self.points = {body: self._from_pivot(body) for body in self.bodies.points}
         self._marks()
         self.loads = self._forces()
         for points in self.points.values():
@@ -40,6 +40,15 @@ class Draft:
             self.link(body)
         self.slides = {name: slide for name, slide in sketch.slides.items() if self._carries(name, slide)}
         self.drives = self._drives()
+
+    def _from_pivot(self, body: str) -> list[str]:
+        """The points of a body, from those by which it turns: its angle counts from there."""
+        points = self.bodies.points
+        bases = [
+            drive.base for drive in self.sketch.drives if drive.kind == "angle" and self.bodies.of(drive.of) == body
+        ]
+        pivots = {point for base in [*bases, GROUND] for point in points.get(self.bodies.of(base), ())}
+        return sorted(points[body], key=lambda point: body != GROUND and point not in pivots)
 
     def point(self, name: str) -> str:
         """The study's name of a point."""
@@ -135,6 +144,10 @@ class Draft:
             body = self.bodies.of(drive.of)
             if body == GROUND or body not in self.points:
                 raise StudyError(f"the input moves link {drive.of!r}, which is part of the ground or joined to nothing")
+            if self.bodies.of(drive.base) not in self.points:
+                raise StudyError(
+                    f"the input moves link {drive.of!r} from link {drive.base!r}, which is joined to nothing"
+                )
             drives[self.link(body)] = drive
         return drives
 

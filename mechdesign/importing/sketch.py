@@ -114,6 +114,8 @@ class Sketch:
     fixed: list[str] = field(default_factory=list)
     welds: list[tuple[str, ...]] = field(default_factory=list)
     slides: dict[str, Slide] = field(default_factory=dict)
+    # Points that go no farther from a second one than a third is: on an arc from its middle.
+    reaches: list[tuple[str, str, str]] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     gears: list[Gears] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
@@ -175,10 +177,47 @@ class Sketch:
             If nothing has both points, or the point is one of them.
         """
         one, other = ends
+        self.slides[clean(f"{point}_slide")] = Slide(point, self._guide(point, ends), (one, other), limited=limited)
+
+    def add_arc(self, point: str, ends: Sequence[str], radius: float) -> None:
+        """Let a point move on the arc between two points of the ground or of one link: with a link about its centre.
+
+        Of the two arcs of the radius it is on that which is nearest to it.
+
+        Raises
+        ------
+        StudyError
+            If nothing has both ends, or the radius is too small for them.
+        """
+        guide, place = self._guide(point, ends), self.points[point]
+        begin, end = (self.points[name] for name in ends)
+        middle, half = (begin + end) / 2, (end - begin) / 2
+        if not 0 < abs(half) <= radius:
+            raise StudyError(
+                f"{point!r} moves on an arc of radius {radius:.6g}, and its ends are {2 * abs(half):.6g} apart"
+            )
+        across = 1j * half / abs(half)
+        far = across * math.sqrt((radius - abs(half)) * (radius + abs(half)))
+        center = min((middle + far, middle - far), key=lambda center: abs(abs(place - center) - radius))
+        side = math.copysign(1.0, ((place - middle) * across.conjugate()).real)
+        added = {f"{point}_center": center, f"{point}_middle": center + side * radius * across}
+        for name, at in added.items():
+            self.add_point(name, at.real, at.imag, fixed=guide == GROUND)
+            if guide != GROUND:
+                self.links[guide].points.append(name)
+        self.add_link(f"{point}_arc", (f"{point}_center", point))
+        self.reaches.append((point, f"{point}_middle", ends[0]))
+        self.choices.append(
+            f"{point!r} moves on an arc: link '{point}_arc' holds it about the arc's centre, '{point}_center'"
+        )
+
+    def _guide(self, point: str, ends: Sequence[str]) -> str:
+        """What has the two ends of the path of a point: the ground, or a link."""
+        one, other = ends
         guides = [GROUND] if {one, other} <= {*self.fixed} else self.links_with(one, other)
         if not guides or point in ends:
             raise StudyError(f"{point!r} slides on the line of {one!r} and {other!r}, which are on no common link")
-        self.slides[clean(f"{point}_slide")] = Slide(point, guides[0], (one, other), limited=limited)
+        return guides[0]
 
     def links_with(self, *points: str) -> list[str]:
         """The links that have all of these points."""

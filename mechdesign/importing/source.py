@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import json
 import os
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,8 @@ from mechdesign.study.text.inputs import Folder
 
 # Most characters of a source.
 MOST_CHARACTERS = 5_000_000
+# An address in angle brackets, in a link of Markdown, or before a full stop.
+_AROUND = re.compile(r"<([^<>]*)>|!?\[[^\[\]]*\]\(([^()]*)\)|(\S*[^.\s])\.+")
 # Names of the tables of a folder; either stands for both.
 JOINTS, LINKS = "joints.csv", "links.csv"
 
@@ -53,7 +56,7 @@ class Source:
     @classmethod
     def of_text(cls, text: str, name: str = "a text") -> Source:
         """A text."""
-        return cls(name, _bounded(text, name))
+        return cls(name, _address(_bounded(text, name)))
 
     @property
     def stem(self) -> str:
@@ -83,6 +86,14 @@ def _read(path: Path) -> str:
         return _bounded(content.decode("utf-16" if wide else "utf-8-sig"), str(path))
     except UnicodeDecodeError:
         return _bounded(content.decode("cp1252", errors="replace"), str(path))
+
+
+def _address(text: str) -> str:
+    """An address without what stands around it in a text: ``<...>``, ``[words](...)``, a full stop; else the text."""
+    address = text.strip()
+    while (around := _AROUND.fullmatch(address)) is not None:
+        address = (around[1] or around[2] or around[3]).strip()
+    return address if "://" in address.partition("?")[0] else text
 
 
 def _bounded(text: str, name: str) -> str:

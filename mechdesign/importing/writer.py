@@ -17,8 +17,9 @@ _WIDTH = 116
 STEPS = 72
 _INSTANTS = 361
 _EACH_TURN = 73
-# Longest motion of several drives, in seconds.
+# Longest motion of several drives, in seconds, and most times that one of them goes to and fro in it.
 _LONGEST = 60.0
+_MOST_ROUNDS = 1000
 
 
 # What a line of a study holds.
@@ -32,11 +33,14 @@ class Writer:
         self._draft, self._sketch = draft, draft.sketch
         self._couplings = [self._coupling(gears) for gears in draft.sketch.gears]
 
-    def text(self, source: str, spans: Mapping[str, Span], remarks: Sequence[str] = ()) -> str:
-        """The study, with what its drives go through."""
+    def text(
+        self, source: str, spans: Mapping[str, Span], remarks: Sequence[str] = (), undecided: Sequence[str] = ()
+    ) -> str:
+        """The study, with what its drives go through, and what is to be moved before it runs."""
         mechanism, kinematics = self._mechanism(), self._kinematics(spans)
         sketch = self._sketch
         lines = [f"# Imported from {sketch.tool}: {source}"]
+        lines += _listed("What to move before it runs:", undecided)
         lines += _listed("What became what:", [*sketch.choices, *self._draft.names.changed(), *remarks])
         lines += _listed("What the file has and this study does not:", sketch.omitted)
         name = printable(cut(sketch.name)) or f"Mechanism from {sketch.tool}"
@@ -61,6 +65,9 @@ class Writer:
                 measure = draft.names.make("measure", f"{draft.joint(name)}_travel")
                 measures[measure] = f"{draft.joint(name)}.slide"
                 limits.append({"measure": measure, "min": 0.0, "max": self._sketch.distance(*slide.through)})
+        for point, middle, end in self._sketch.reaches:
+            bound = self._sketch.distance(middle, end)
+            limits.append({"distance": [draft.point(point), draft.point(middle)], "max": bound})
         return ["mechanism:", *lines, *_section("measures", measures), *_section("limits", limits)]
 
     def _link(self, body: str) -> dict[str, Flow]:
@@ -181,6 +188,11 @@ class Writer:
                 far, near = sorted(draft.span(name), key=lambda end: -abs(end - start))
                 there, back = (_move(end, periods[name] / 2) for end in (far, near))
                 rounds = max(1, round(duration / periods[name]))
+                if rounds > _MOST_ROUNDS:
+                    raise StudyError(
+                        f"the input {name!r} goes to and fro {rounds:,} times while the slowest one moves once: choose "
+                        "one of them with --drive"
+                    )
                 moves = [{"from": near, **there}, back, *[there, back] * (rounds - 1)]
             lines += [f"    {name}:", *(f"      - {flow(move)}" for move in moves)]
         turns = max(duration / period for period in periods.values())
@@ -208,7 +220,7 @@ def _move(end: float, time: float) -> dict[str, Flow]:
 def _common(periods: list[float]) -> float:
     """The shortest time that is a whole number of each period, or `_LONGEST`, or the longest period."""
     longest = max(periods)
-    for count in range(1, round(_LONGEST / longest) + 1):
+    for count in range(1, min(round(_LONGEST / longest), _MOST_ROUNDS) + 1):
         time = count * longest
         if all(abs(time / period - round(time / period)) < 1e-6 for period in periods):
             return time

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Floats
@@ -19,6 +20,8 @@ from mechdesign.numerics.roots import lowest
 TOUCHING = 1e-10
 # Number of values of the coordinate at which closures are sampled, in a turn or in a travel of the mechanism's size.
 SAMPLES_PER_TURN = 720
+# Most turns, or travels of the mechanism's size, that are searched.
+MOST_TURNS = 1000
 
 
 def _closing_groups(groups: Sequence[Group]) -> list[int]:
@@ -54,7 +57,13 @@ class ChangePoints:
         return self._parity(np.asarray(values, dtype=float), len(self._places))
 
     def cover(self, values: Value) -> None:
-        """Search the range of these values unless that has been done."""
+        """Search the range of these values unless that has been done.
+
+        Raises
+        ------
+        MechanismError
+            If it is too long.
+        """
         finite = np.asarray(values, dtype=float)[np.isfinite(values)]
         low, high = (float(end(finite, initial=self.sketch)) for end in (np.min, np.max))
         begin, end = self._range
@@ -63,6 +72,11 @@ class ChangePoints:
         # A turn or more to each side at once, so that later calls rarely have to search.
         low = min(begin, low, self.sketch - self._period)
         high = max(end, high, self.sketch + self._period)
+        if high - low > MOST_TURNS * self._period:
+            raise MechanismError(
+                f"with 'branch: follow' every turn since the sketch counts, {MOST_TURNS:,} at most; ask for fewer, or "
+                "say 'branch: side'"
+            )
         count = int(np.ceil((high - low) / self._period * SAMPLES_PER_TURN)) + 1
         samples = np.linspace(low, high, count)
         # The modes of a group decide where the groups after it have their change points.

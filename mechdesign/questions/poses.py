@@ -84,6 +84,8 @@ def _with_poses(study: Study, section: str) -> list[PoseSection]:
 
 def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
+    if not len(rows):
+        return
     owner = next((part for part in _with_poses(designs.study, section) if part.source is not None), None)
     counts = (
         np.zeros((len(rows), 0))

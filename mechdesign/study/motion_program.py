@@ -14,14 +14,15 @@ from mechdesign.study.point_paths import bends, between, table_of
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.text.csv_files import read_table
+from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
 
 HELP_PAGE = "howto/motion_laws"
 
 # Times that differ by less than this part of the whole time are the same.
 SAME_TIME = 1e-9
-# Part of the whole time below which that of a segment is a slip, and below which times of a file do not rise.
-SHORTEST, RISING = 1e-6, 1e-12
+# Part of the whole time below which that of a segment is a slip.
+SHORTEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +224,7 @@ def _spline(folder: Folder, file: str) -> TimedCourse:
     if table.shape[1] != 2 or len(table) < 3:
         raise StudyError(f"{file} is no motion over time: that has a time and a value a line, and three lines or more")
     times, values = table[:, 0] - table[0, 0], table[:, 1]
-    late = np.flatnonzero(~(np.diff(times) > RISING * times[-1]))
+    late = np.flatnonzero(~(np.diff(times) > APART * times[-1]))
     if len(late):
         k = int(late[0])
         raise StudyError(f"{file}: the times do not rise, {table[k, 0]:.12g} is followed by {table[k + 1, 0]:.12g}")

@@ -19,7 +19,7 @@ from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
 from mechdesign.study.text.csv_files import read_table
-from mechdesign.study.text.fields import MIN_NUMBER
+from mechdesign.study.text.fields import APART, MIN_NUMBER
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
@@ -178,7 +178,7 @@ class Spline(PointPath):
     """A cubic spline by the length of the chords through three places or more, periodic where the first is the last."""
 
     curve: Any  # SciPy's CubicSpline of complex numbers, for a spline is linear in its values
-    rows: Floats  # its parameter at the poses
+    rows: Floats  # its parameter, the length of the chords in a unit of its own, at the poses
     fine: Floats  # its parameter at ends of pieces of it,
     length: Floats  # and the length up to there
 
@@ -188,6 +188,8 @@ class Spline(PointPath):
         from scipy.interpolate import CubicSpline
 
         knots = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(places)))])
+        # Its equations are scaled: by a power of two, so that no digit changes.
+        knots = np.ldexp(knots, -np.frexp(knots[-1])[1])
         curve: Any = CubicSpline(knots, places, bc_type="periodic" if places[0] == places[-1] else "not-a-knot")
         fine = np.unique(np.concatenate([np.linspace(a, b, SPLINE_PIECES + 1) for a, b in pairwise(knots)]))
         lengths = _spline_lengths(curve, fine[:-1], fine[1:])
@@ -307,7 +309,8 @@ def course(name: str, given: PathSection, folder: Folder, value: Callable[[float
         places = table[..., 0] + 1j * table[..., 1]
         if not given.spline:
             return Polyline.through(places)
-        if places.shape[1] < 3 or not np.diff(places, axis=1).all():
+        chords = np.abs(np.diff(places, axis=1))
+        if places.shape[1] < 3 or not (chords > APART * chords.sum(axis=1, keepdims=True)).all():
             raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
         splines = [Spline.through(place, given.points) for place in places]
         return splines[0] if len(splines) == 1 else Own(splines[0].count, splines)

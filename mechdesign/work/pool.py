@@ -220,10 +220,10 @@ def _perform(version: str, content: bytes, items: list[Any]) -> tuple[list[Any],
     if version != _version():
         raise MechdesignError(f"a worker has {_version()}, not {version}; install the same there")
     keep_freed_memory()
-    with one_thread():
-        return _timed(_function(content), items)
+    return _timed(_function(content), items)
 
 
 def _timed(function: Callable[[Any], Any], items: list[Any]) -> tuple[list[Any], float]:
     begun = time.perf_counter()
-    return [function(item) for item in items], time.perf_counter() - begun
+    with one_thread():
+        return [function(item) for item in items], time.perf_counter() - begun

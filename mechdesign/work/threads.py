@@ -1,4 +1,4 @@
-"""Settings of the whole process: linear algebra on one thread, and freed memory that is kept for reuse.
+"""Settings under which all is computed: linear algebra on one thread, no words of NumPy, freed memory kept for reuse.
 
 The last digits of a long sum depend on how many threads share it.
 """
@@ -45,14 +45,19 @@ def one_thread() -> Iterator[None]:
 
     The limit holds for the process and those forked from it. The former settings come back when the last block ends:
     blocks may be nested, and overlap in several threads.
+
+    NumPy does not warn there: what has no value, or too large a one, is nan or infinite, and results say so themselves.
     """
+    from numpy import errstate
+
     global _inside
     with _lock:
         if not _inside:
             _limit()
         _inside += 1
     try:
-        yield
+        with errstate(all="ignore"):
+            yield
     finally:
         with _lock:
             _inside -= 1

@@ -337,3 +337,17 @@ def test_a_study_whose_tables_are_all_wide_has_a_report(folder, invoke):
     done = invoke("dynamics", "slider.yaml", "--no-plots", "--report", "--set", weighed, "--set", moving)
     assert done.exit_code == 0, done.output
     assert "largest joint force" in next(folder.rglob("report.html")).read_text(encoding="utf-8")
+
+
+def test_a_report_of_a_mechanism_that_bears_nothing_moves(folder, invoke):
+    (folder / "idle.yaml").write_text("""
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+  friction: {A: {coefficient: 0.1, radius: 5}}
+dynamics: {sweep: {crank: {from: 0, to: 360, step: 30}}, rates: {crank: 60 rpm}}
+""")
+    done = invoke("dynamics", "idle.yaml", "--report", "--out", "out")
+    assert done.exit_code == 0
+    assert "cannot be shown moving" not in done.stderr

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mechdesign.importing.formats import dxf, linkage, pmks, pylinkage, tables
+from mechdesign.importing.formats import dxf, linkage, pmks, pmks_desktop, pylinkage, tables
 from mechdesign.importing.sketch import Sketch
 from mechdesign.importing.source import Source
 
@@ -20,5 +20,6 @@ class Format:
 
 
 FORMATS = tuple(
-    Format(module.NAME, module.recognises, module.read) for module in (pmks, linkage, pylinkage, tables, dxf)
+    Format(module.NAME, module.recognises, module.read)
+    for module in (pmks, pmks_desktop, linkage, pylinkage, tables, dxf)
 )

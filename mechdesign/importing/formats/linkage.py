@@ -2,7 +2,7 @@
 
 Connectors are points, anchors those of the ground; a connector is an input of so many turns a minute, clockwise for
 positive ones; a slider moves on the line of two connectors. Lengths are 96 to the inch, whatever the unit is that the
-program shows [rectorsquid/Linkage, LinkageDoc.cpp, Simulator.cpp].
+program shows; an arc has a radius beside its ends [rectorsquid/Linkage, LinkageDoc.cpp, Simulator.cpp].
 """
 
 from __future__ import annotations
@@ -194,11 +194,10 @@ class _Reader:
         if len(ends) < 2:
             self.sketch.omitted.append(f"slider {name!r}, which has no two limits")
             return
-        if _number(connector, "slideradius"):
-            raise StudyError(
-                f"slider {name!r} moves on an arc; a study has straight slides, and a link about its centre"
-            )
-        self.sketch.add_track(name, ends, limited=True)
+        if radius := abs(self._scale * _number(connector, "slideradius")):
+            self.sketch.add_arc(name, ends, radius)
+        else:
+            self.sketch.add_track(name, ends, limited=True)
 
     def _add_gears(self, ratio: Element) -> None:
         """Two wheels; with a chain they turn alike. The sizes are radii, or else only their ratio counts."""

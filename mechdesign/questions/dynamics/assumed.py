@@ -12,16 +12,17 @@ from mechdesign.mechanism.forces import local_center
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Mass
 from mechdesign.questions.dynamics.question import pace
+from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.study import Study
 
 
 def assumed(study: Study) -> list[Caution]:
-    """Warnings of centres of mass and moments of inertia that are left out where forces follow from them."""
-    section = study.dynamics
-    if section is None:
-        return []
+    """Warnings of gravity, centres of mass and moments of inertia that are left out where forces follow from them."""
+    section, warnings = DynamicsSection.of(study), []
     moves = section.modes or section.forward is not None or pace(study).rated
-    warnings = []
+    if study.dynamics is None:
+        message = "without a section 'dynamics' there is no gravity; give {gravity: [0, -9.81 m/s^2]}, or [0, 0]"
+        warnings.append(Caution("assumed", message))
     if (moves or any(section.gravity)) and (centers := ", ".join(_centers(study))):
         message = f"centres of mass that are left out are the middles of joints: {centers}; give 'center'"
         warnings.append(Caution("assumed", message))

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
@@ -311,11 +312,17 @@ def _density(forces: Forces, moving: Moving, link: str, weight: Value, gravity: 
 def pace(study: Study) -> MotionSection:
     """The section that gives the rates of a study's dynamics: its own, or without any that of kinematics."""
     own = study.dynamics
-    return own if own is not None and own.moves else study.kinematics or KinematicsSection()
+    return own if own is not None and own.moves else KinematicsSection.of(study)
 
 
 def force_question(study: Study, poses: Poses) -> MotionQuestion:
-    """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
+    """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics.
+
+    Raises
+    ------
+    StudyError
+        If the study has no such section, and without what it would say nothing acts.
+    """
     section, rated = DynamicsSection.of(study), pace(study)
     rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
     rates["means"] = section.means or rated.means
@@ -324,9 +331,16 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
         rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     question = motion_question(replace(study, kinematics=motion, targets={}), poses)
+    borne = ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo)
+    if study.dynamics is None and not borne.size and not (motion.rated and weighed_beams(study)):
+        message = (
+            "is missing, and without it nothing acts on the mechanism: give gravity and masses of links, loads, or "
+            "rates of kinematics; for example {gravity: [0, -9.81 m/s^2]}"
+        )
+        raise StudyError([study.problem(message, "dynamics")])
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False, cams=(),
         watched=[*question.watched, *study.mechanism.windings.values()],
-        borne=ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo),
+        borne=borne,
     )  # fmt: skip

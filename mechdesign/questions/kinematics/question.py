@@ -311,7 +311,7 @@ def motion_question(study: Study, poses: Poses) -> MotionQuestion:
     MechanismError
         If an output does not exist.
     """
-    section, mechanism = study.kinematics or KinematicsSection(), study.mechanism
+    section, mechanism = KinematicsSection.of(study), study.mechanism
     outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
     listed = outputs if section.jacobian is None else expand_outputs(study, section.jacobian)
     shown = {output.name: output for output in outputs}

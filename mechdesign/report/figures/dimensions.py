@@ -230,7 +230,8 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
             rows.append(("" if name in described else name, f"{one} to {other}", _number(value, angle), text, section))
             described.add(name)
         dimensioned = {*(link.ends or ()), *(point for _, one, other, *_ in own for point in (one, other))}
-        for point in scene.link_points(name):
+        # The rod's end of a telescopic link has no place in its frame.
+        for point in link.points:
             local = complex(study.mechanism.geometry.local(name, point, {}))
             if point not in dimensioned and abs(local) > _NONE * scene.span:
                 rows.append(("" if name in described else name, f"{point} in its frame", _place(local, scene), "", ""))

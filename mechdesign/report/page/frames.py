@@ -127,8 +127,10 @@ def _ways(
         shown, motion = _solved(drawn, along, places)
         ways = [_paths(shown.configuration, points)]
         for kind in drawn.vectors(motion, shown) if sizes else ():
-            values = np.array([vector for *_, vector in kind.arrows]) / sizes[kind.unit]
-            ways.append(np.where(np.abs(values) <= 1, _ARROW * along.curve.mechanism.size * values, np.nan))
+            # What is zero throughout, such as forces where nothing acts, has no arrows.
+            if kind.unit in sizes:
+                values = np.array([vector for *_, vector in kind.arrows]) / sizes[kind.unit]
+                ways.append(np.where(np.abs(values) <= 1, _ARROW * along.curve.mechanism.size * values, np.nan))
         return np.concatenate(ways)
 
     return at

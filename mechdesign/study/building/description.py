@@ -42,6 +42,7 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import APART
 from mechdesign.study.text.units import Amount
 
 # Of teeth as ISO 53 has them (radians).
@@ -562,7 +563,7 @@ def _table(
     except StudyError as error:
         builder.report(path, str(error))
         return None
-    if rows.shape[1] != 2 or len(rows) < FEWEST_ROWS or not (np.diff(rows[:, 0]) > 0).all():
+    if rows.shape[1] != 2 or len(rows) < FEWEST_ROWS or not (np.diff(rows[:, 0]) > APART * np.ptp(rows[:, 0])).all():
         builder.report(path, f"a table has two columns and at least {FEWEST_ROWS} rows, the first column rising")
         return None
     turn, span = 2 * np.pi / builder.units.angle_factor, rows[-1] - rows[0]

@@ -14,7 +14,6 @@ class Section(fields.Model):
 
     @classmethod
     def of(cls, study: Any) -> Self:
-        """The section of a study that has it."""
+        """The section of a study; of one without it what an empty one says."""
         section = getattr(study, cls.command)
-        assert isinstance(section, cls)
-        return section
+        return section if isinstance(section, cls) else cls()

@@ -6,10 +6,14 @@ import csv
 import math
 
 import numpy as np
+from pydantic_core import PydanticCustomError
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
+from mechdesign.study.text.fields import MIN_NUMBER, Context, read_number
 from mechdesign.study.text.inputs import Folder
+
+_PLAIN = Context()
 
 
 def read_table(folder: Folder, file: str, most: int = 2) -> Floats:
@@ -31,7 +35,7 @@ def read_table(folder: Folder, file: str, most: int = 2) -> Floats:
         if len(row) > most or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
             columns = "one or two" if most == 2 else f"one to {most}"
             raise StudyError(f"{file}:{number}: the line is not a row of the same {columns} finite numbers")
-        rows.append(row)
+        rows.append([_sized(value, f"{file}:{number}") for value in row])
     if not rows:
         raise StudyError(f"{file} holds no numbers")
     return np.array(rows)
@@ -57,7 +61,7 @@ def read_column(folder: Folder, file: str, name: str | None) -> Floats:
     for number, row in rows:
         value = _number(row[place]) if place < len(row) <= len(first) else None
         if value is not None and math.isfinite(value):
-            values.append(value)
+            values.append(_sized(value, f"{file}:{number}"))
         elif row is not first or (name is None and value is not None):
             of_column = f" of column {name!r}" if name is not None else ""
             hint = "; a decimal is written with a point" if any("," in cell for cell in row) else ""
@@ -90,6 +94,21 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+def _sized(value: float, line: str) -> float:
+    """A finite number of a line, as large as a study may have one; one that is smaller is 0: its inverse may overflow.
+
+    Raises
+    ------
+    StudyError
+        If it is too large.
+    """
+    try:
+        number = float(read_number(value, _PLAIN))
+    except PydanticCustomError as error:
+        raise StudyError(f"{line}: {error.message()}") from None
+    return number if abs(number) >= MIN_NUMBER else 0.0
 
 
 def _lines(folder: Folder, file: str) -> list[tuple[int, str]]:

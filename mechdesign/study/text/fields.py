@@ -45,6 +45,8 @@ MAX_NUMBER = 1e60
 MIN_NUMBER = 1e-60
 MAX_LENGTH = 1e15
 MIN_LENGTH = 1e-15
+# Part of a spline's length below which two of its knots are the same: its equations would have no digits left.
+APART = 1e-12
 # Most names that a message lists in place of a wrong one.
 MAX_NAMED = 12
 
