@@ -15,7 +15,6 @@ from mechdesign.cli.options import Options
 from mechdesign.cli.places import claim, extras, folder
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
-from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.assumed import assumed
@@ -83,9 +82,14 @@ def _massless(study: Study) -> list[str]:
 def _foresee(study: Study) -> None:
     """Check that results named by requirements, matrix and sensitivities exist; all mistakes are raised together."""
     looks: list[Callable[[], object]] = [partial(foresee, study, COMMANDS, goals=True)]
+    # Both import all questions.
     if study.matrix is not None:
+        from mechdesign.experiments import sweep
+
         looks.append(partial(sweep.prepared, study))
     if study.sensitivities is not None:
+        from mechdesign.experiments import sensitivities
+
         looks.append(partial(sensitivities.prepared, study))
     problems: dict[Problem, None] = {}
     for look in looks:

@@ -12,7 +12,6 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
-from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import mass_centers
 from mechdesign.questions.kinematics.drawn import DrawnPoses
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown
@@ -49,8 +48,9 @@ def mechanism_figure(study: Study, result: Result) -> Figure:
         scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
         if scenes[1] is not None:
             return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
-    shown = result.drawn.shown if isinstance(result.drawn, DrawnPoses) else None
-    return sketch_and_first_pose(study, shown, masses=isinstance(result.drawn, DrawnForces))
+    if not isinstance(result.drawn, DrawnPoses):
+        return sketch_and_first_pose(study, None)
+    return sketch_and_first_pose(study, result.drawn.shown, masses=result.drawn.name == "dynamics")
 
 
 def sketch_and_first_pose(
