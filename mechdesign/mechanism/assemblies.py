@@ -37,11 +37,14 @@ class Assembly:
     drawn: bool
 
 
-def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
+def assemblies(
+    mechanism: Mechanism, given: tuple[str, ...], choosing: Sequence[int] | None = None
+) -> tuple[Assembly, ...]:  # fmt: skip
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 
-    Groups with a closed form have two modes each, whether or not they close at the sketch. For a group without one,
-    Newton's method searches from many starts at the sketch's values of the given coordinates; it may miss some.
+    Groups with a closed form, of which only those `choosing` may differ from the sketch's if these are given, have two
+    modes each, whether or not they close at the sketch. For a group without one, Newton's method searches from many
+    starts at the sketch's values of the given coordinates; it may miss some.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         If there are more than 256, or the coordinates do not determine the mechanism.
     """
     plan = mechanism.plan(given)
-    choosing = [index for index, mode in enumerate(plan.modes) if mode]
+    choosing = [index for index, mode in enumerate(plan.modes) if mode] if choosing is None else choosing
     if 2 ** len(choosing) > MAX_ASSEMBLIES:
         raise MechanismError(
             f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes; leave --all-modes out",

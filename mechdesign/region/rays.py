@@ -102,6 +102,11 @@ class Designs:
     effort: Effort
     centres: Complexes | None = None
 
+    @property
+    def members(self) -> tuple[Designs, ...]:
+        """The same designs in each mode of the field."""
+        return (self,)
+
     @cached_property
     def in_any_assembly(self) -> Designs:
         """The same designs without the margins of the assembly."""

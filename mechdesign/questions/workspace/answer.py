@@ -14,6 +14,7 @@ from mechdesign.questions.workspace.peaks import find_peaks
 from mechdesign.questions.workspace.quadrature import integrate, simple_means
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.strips import Integrand
+from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import Places
 from mechdesign.region.panels import Panels
 from mechdesign.region.pieces import Pieces, counted
@@ -51,7 +52,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         If a region has no end.
     """
     keep_freed_memory()
-    designs = question.rays_through(question.field, places, count, question.about, question.scan, effort)
+    designs = question.designs(places, count, effort)
     panels, pieces = counted(designs, tuple(sorted(set(question.counted) - set(question.scan))))
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.columns}
@@ -104,7 +105,7 @@ def area_in_any_assembly(question: Question) -> float:
     """
     if not any(name.startswith("assembly ") for _, name in question.field.labels):
         return 0.0
-    both = replace(question.field, same_assembly=False)
+    both = in_any_assembly(question.field)
     every = replace(question, field=both, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
     try:
         return float(answer(every, {}, 1, BATCH).values["area"][0])
