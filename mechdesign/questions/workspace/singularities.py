@@ -65,7 +65,8 @@ def causes(field: Field) -> list[tuple[str, str]]:
         single = causes(field.sliced)
         return [*single * 3, *((kind, f"{one} and {other}") for kind, one in single for _, other in single)]
     if len(field.members) > 1:
-        return causes(field.members[0]) * len(field.members)
+        first = field.members[0]
+        return causes(first)[: len(first.labels)] * len(field.members)
     names = forward_names(field.mechanism)
     stated = {bound.label: bound.coordinate.name for bound in field.mechanism.bounds}
     words = []
