@@ -29,9 +29,10 @@ def in_any_assembly(field: Field) -> Field:
     drawn, choosing = replace(field, same_assembly=False), _choosing(field.plan)
     if not choosing:
         return drawn
-    modes = [replace(drawn, mechanism=mode.mechanism, plan=mode.mechanism.plan(tuple(c.name for c in drawn.outputs)))
-             for mode in assemblies(drawn.mechanism, tuple(c.name for c in drawn.outputs), choosing)]  # fmt: skip
-    return AnyMode(drawn.mechanism, drawn.plan, drawn.held, False, drawn.length, tuple(modes))
+    given = tuple(output.name for output in drawn.outputs)
+    every = [mode.mechanism.plan(given) for mode in assemblies(drawn.mechanism, given, choosing) if not mode.drawn]
+    modes = (drawn, *(replace(drawn, plan=plan) for plan in every))
+    return AnyMode(drawn.mechanism, drawn.plan, drawn.held, False, drawn.length, modes)
 
 
 def _choosing(plan: Plan) -> list[int]:

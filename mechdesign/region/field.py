@@ -101,7 +101,10 @@ class Field:
         limited = {name: angle for name, angle in counting.items() if name not in self._known_turns}
         if not limited:
             return {}
-        sketch, nominal = drawn(self.mechanism, places), self.mechanism.sketch_configuration
+        sketch, nominal = drawn(self.mechanism, places), self.plan.core.sketch_configuration
+        if self.plan.core is not self.mechanism:
+            # Another assembly mode at the same place.
+            sketch = self.plan.solve([sketch.value(output) for output in self.outputs], places, limits=False)
         return {
             name: np.where(sketch.valid, sketch.value(angle), nominal.value(angle)) for name, angle in limited.items()
         }
