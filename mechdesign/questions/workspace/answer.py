@@ -10,6 +10,7 @@ import numpy as np
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.box import bounding_box
+from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.peaks import find_peaks
 from mechdesign.questions.workspace.quadrature import integrate, simple_means
 from mechdesign.questions.workspace.question import Question
@@ -89,6 +90,8 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
                 "box_area": (box, doubt),
                 "SUI": (share, (results["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
             }
+    shapes = inscribed(panels, [name for name in question.columns if name in INSCRIBED])
+    results |= {name: (size, np.zeros(count)) for name, size in shapes.items()}
     for column, (name, kind) in question.statistics.items():
         if kind in ("min", "max"):
             results[column] = peaks.of(name, kind)

@@ -13,6 +13,7 @@ from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.index import Prepared, prepare
+from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.ranged import Every, Ranged, Some, SomeDesigns
 from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.questions.workspace.strips import Integrand
@@ -120,9 +121,9 @@ def shared(study: Study, questions: Sequence[Question], moved: Collection[str]) 
 
 
 def batched(column: str) -> bool:
-    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    """Whether a column is evaluated for many designs at once: area, shapes, and what the Jacobian gives."""
     name = split(column)[0]
-    return column in COLUMNS or bool(name and needed_section(name) is None)
+    return column in (*COLUMNS, *INSCRIBED) or bool(name and needed_section(name) is None)
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str] | None = None) -> list[Question]:

@@ -86,7 +86,6 @@ def reach(question: Question) -> Reached:
     region = Reached(question, evaluation, singular, patches, pieces, everywhere, boundary=boundary)
     if ranged:
         return region
-    return replace(
-        region, shapes=inscribed(evaluation.panels), nodes=nodes_of(field, question.shown, patches),
-        loci=loci(field, reasons, patches, singular=singular),
-    )  # fmt: skip
+    shapes = np.concatenate(list(inscribed(evaluation.panels).values()))
+    curves = loci(field, reasons, patches, singular=singular)
+    return replace(region, shapes=shapes, nodes=nodes_of(field, question.shown, patches), loci=curves)
