@@ -18,6 +18,7 @@ from mechdesign.mechanism.sketch import SKETCH, deciding_joints
 
 # Largest number of assemblies.
 MAX_ASSEMBLIES = 256
+_TOO_MANY = f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out, or write assembly: same"
 # Newton's method finds the assemblies of a group without a closed form from this many starts, in this many steps.
 SEARCH_STARTS = 512
 SEARCH_STEPS = 40
@@ -54,10 +55,7 @@ def assemblies(
     plan = mechanism.plan(given)
     choosing = [index for index, mode in enumerate(plan.modes) if mode] if choosing is None else choosing
     if 2 ** len(choosing) > MAX_ASSEMBLIES:
-        raise MechanismError(
-            f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes; leave --all-modes out",
-            "mechanism.sketch",
-        )
+        raise MechanismError(f"{len(choosing)} joints choose the assembly: {_TOO_MANY}", SKETCH)
     listed: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
         modes = list(plan.modes)
@@ -75,7 +73,7 @@ def assemblies(
             label = " ".join([*names, f"#{number}"])
             listed.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
             if len(listed) > MAX_ASSEMBLIES:
-                raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out", SKETCH)
+                raise MechanismError(_TOO_MANY, SKETCH)
     return tuple(listed)
 
 

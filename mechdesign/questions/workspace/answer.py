@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.box import bounding_box
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
@@ -102,17 +102,17 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
 
 
 def area_in_any_assembly(question: Question) -> float:
-    """Area of a region in both assemblies; 0 where it has no end there, and where no assembly bounds it.
+    """Area of a region in any assembly; 0 where it has no end or too many modes, and where no assembly bounds it.
 
     It is looked for as loosely as of a design of many.
     """
     if not any(name.startswith("assembly ") for _, name in question.field.labels):
         return 0.0
-    both = in_any_assembly(question.field)
-    every = replace(question, field=both, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
+    loose = replace(question, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
     try:
+        every = replace(loose, field=in_any_assembly(question.field))
         return float(answer(every, {}, 1, BATCH).values["area"][0])
-    except AssemblyError:
+    except (AssemblyError, MechanismError):
         return 0.0
 
 
