@@ -191,7 +191,7 @@ mechanism:
   sketch: {A: [80, 60], B: [100, 127], P: [130, 127]}
 workspace: {point: P, assembly: any, at: {hand.angle: {from: -20, to: 30, all: true}}}
 """
-    x = np.linspace(-10, 210, 900)
+    x = np.linspace(-60, 210, 1100)
     z = x + 1j * x[:, None]
     reached = np.ones((2, *z.shape), dtype=bool)
     for angle in np.radians(np.linspace(-20, 30, 101)):
@@ -200,7 +200,7 @@ workspace: {point: P, assembly: any, at: {hand.angle: {from: -20, to: 30, all: t
             bend = np.arccos((np.abs(wrist) ** 2 - 100**2 - 70**2) / (2 * 100 * 70))
         for row, side in enumerate((1, -1)):
             q2 = np.degrees(side * bend)
-            q1 = np.degrees(np.angle(wrist / (100 + 70 * np.exp(1j * side * bend))))
+            q1 = np.degrees(np.angle(wrist) - np.angle(100 + 70 * np.exp(1j * side * bend)))
             reached[row] &= (q1 >= 10) & (q1 <= 60) & (q2 >= -60) & (q2 <= 70)
     found = mechdesign.workspace(study_of(text)).main["area"][0]
     assert found == pytest.approx(reached.any(axis=0).sum() * (x[1] - x[0]) ** 2, rel=3e-3)
