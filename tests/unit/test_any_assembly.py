@@ -181,6 +181,15 @@ def test_designs_of_many_count_the_elbows_that_a_single_one_counts() -> None:
 
 
 @pytest.mark.nightly
+def test_poses_of_other_questions_keep_the_elbow_of_the_sketch() -> None:
+    """Within its limits, 0 to 70 deg: the other elbow is reached in the workspace alone."""
+    poses = mechdesign.kinematics(study_of(ARM, "kinematics={outputs: [P], poses: workspace}")).main
+    assert poses["valid"].all()
+    assert poses["q2"].min() > -1e-3
+    assert poses["q2"].max() == pytest.approx(70, abs=0.1)
+
+
+@pytest.mark.nightly
 def test_every_orientation_of_a_hand_in_one_mode() -> None:
     """Where the hand turns from -20 to 30 deg with the same elbow, and where some of these is reached with either."""
     text = """
