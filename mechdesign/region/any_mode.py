@@ -97,7 +97,15 @@ class AnyMode(Field):
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             least = np.stack([mode.margins(z, places).min(axis=0, initial=np.inf) for mode in self.modes])
         least = np.where(np.isnan(least), -np.inf, least)
-        chosen = np.where((least > 0).any(axis=0), (least > 0).argmax(axis=0), least.argmax(axis=0))
+        first = np.where((least > 0).any(axis=0), (least > 0).argmax(axis=0), least.argmax(axis=0))
+        return self._in_modes(z, places, first)
+
+    def on_boundary(self, z: Complexes, margin: Ints) -> Configuration:
+        """As `Field.on_boundary`, in the mode that has the margin."""
+        return self._in_modes(z, {}, margin // len(self.modes[0].labels))
+
+    def _in_modes(self, z: Complexes, places: Places, chosen: Ints) -> Configuration:
+        """Each place in the mode of the number `chosen`."""
         signs = np.array([mode.plan.modes for mode in self.modes])
         pose = super().configuration(z, places, [*signs[chosen.ravel()].T.reshape(-1, *z.shape)])
         nears = [mode.near(z, places) for mode in self.modes]

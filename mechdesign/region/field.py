@@ -18,7 +18,7 @@ from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.mechanism import Variant, drawn
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 Places = Mapping[str, Value]
 # Names, beside those of dimensions, of numbers that may differ between designs: the values of the held coordinates
@@ -82,6 +82,10 @@ class Field:
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places, self.near(z, places),
         )  # fmt: skip
+
+    def on_boundary(self, z: Complexes, margin: Ints) -> Configuration:
+        """The mechanism with its point at places `z` of the boundary, where each `margin` is zero."""
+        return self.configuration(z, {})
 
     def poses(self, z: Complexes) -> Configuration:
         """Poses with the point at `z`, not judged by the limits."""

@@ -216,6 +216,13 @@ class Intervals:
         begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
         return ray[begins], self.inner[begins], self.outer[ends], self.enters[begins], self.leaves[ends]
 
+    def modes(self, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+        """As `whole`, but nothing is joined: where another assembly mode goes on, the margin is -1."""
+        meets = (self.ray[1:] == self.ray[:-1]) & (self.inner[1:] - self.outer[:-1] <= near)
+        enters, leaves = self.enters.copy(), self.leaves.copy()
+        enters[1:][meets] = leaves[:-1][meets] = -1
+        return self.ray, self.inner, self.outer, enters, leaves
+
     def kept(self, keep: Flags) -> Intervals:
         """The intervals that `keep` marks, on the same rays."""
         if keep.all():

@@ -67,7 +67,8 @@ def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[
     if isinstance(field.members[0], Ranged):
         values = [_deciding(field, z, margin)]
     else:
-        values = _drives(field, z, np.asarray(about + radius * (1 + BESIDE * inwards) * turn), inwards)
+        within = np.asarray(about + radius * (1 + BESIDE * inwards) * turn)
+        values = _drives(field, field.on_boundary(z, margin), field.on_boundary(within, margin), inwards)
     kind, at = (np.array(words)[margin] for words in ([kind for kind, _ in field.labels], [at for _, at in reasons]))
     curve = np.repeat(np.arange(len(curves)), lengths)
     return Boundary(z, theta, kind, at, side, curve, piece, values)
@@ -84,17 +85,18 @@ def _deciding(field: Field, z: Complexes, margin: Ints) -> tuple[Coordinate, Flo
     return field.outputs[2 + which], values
 
 
-def _drives(field: Field, z: Complexes, within: Complexes, inwards: Floats) -> list[tuple[Coordinate, Floats]]:
+def _drives(
+    field: Field, exact: Configuration, within: Configuration, inwards: Floats
+) -> list[tuple[Coordinate, Floats]]:  # fmt: skip
     """Drives on the boundary, or `within` the region where rounding opens the mechanism on it.
 
     Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is
     nearest to the sketch.
     """
     mechanism, sides = field.mechanism, np.flatnonzero(np.diff(inwards)) + 1
-    exact, near = field.configuration(z, {}), field.configuration(within, {})
     drives = []
     for drive in mechanism.forward.structure.given:
-        here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
+        here, beside = (np.broadcast_to(pose.value(drive), inwards.shape) for pose in (exact, within))
         values = np.where(np.isfinite(here), here, beside)
         if drive.quantity == "angle" and drive.name not in mechanism.turns({}):
             drawn = float(mechanism.sketch_configuration.value(drive))
