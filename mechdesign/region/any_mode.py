@@ -107,7 +107,7 @@ class AnyMode(Field):
     def _in_modes(self, z: Complexes, places: Places, chosen: Ints) -> Configuration:
         """Each place in the mode of the number `chosen`."""
         signs = np.array([mode.plan.modes for mode in self.modes])
-        pose = super().configuration(z, places, [*signs[chosen.ravel()].T.reshape(-1, *z.shape)])
+        pose = super().configuration(z, places, [*np.moveaxis(signs[chosen], -1, 0)])
         nears = [mode.near(z, places) for mode in self.modes]
         every = range(len(nears))
         near = {name: np.select([chosen == k for k in every], [nears[k][name] for k in every]) for name in nears[0]}

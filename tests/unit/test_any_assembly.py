@@ -170,6 +170,18 @@ def test_platforms_count_both_elbows_of_each_leg(seed: int) -> None:
 
 
 @pytest.mark.nightly
+def test_a_sliver_that_one_elbow_alone_reaches() -> None:
+    """l1 l2 (cos 4 - cos 8.4) dq1 of an arm that is nearly stretched, by the sketch's elbow; the other has no place."""
+    limits = "mechanism.limits=[{drive: q1, min: 42.5, max: 54}, {drive: q2, min: 4.1, max: 8.4}]"
+    elbow, hand = 62 * np.exp(1j * np.radians(44)), 77 * np.exp(1j * np.radians(52))
+    sketch = f"mechanism.sketch={{A: {told(elbow)}, P: {told(elbow + hand)}}}"
+    links = "mechanism.links={ground: {O: [0, 0]}, upper: [O, A, 62], lower: [A, P, 77]}"
+    found = mechdesign.workspace(study_of(ARM.replace("  parameters: {l2: 70}\n", ""), limits, sketch, links)).main
+    exact = 62 * 77 * np.radians(11.5) * (np.cos(np.radians(4.1)) - np.cos(np.radians(8.4)))
+    assert abs(found["area"][0] - exact) <= found["area_error"][0] + 1e-6 * exact
+
+
+@pytest.mark.nightly
 def test_designs_of_many_count_the_elbows_that_a_single_one_counts() -> None:
     designs = mechdesign.optimize(
         study_of(ARM, "optimize={variables: {l2: {from: 50, to: 90, step: 20}}, maximize: [area, GII]}")
