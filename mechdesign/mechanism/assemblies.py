@@ -18,6 +18,7 @@ from mechdesign.mechanism.sketch import SKETCH, deciding_joints
 
 # Largest number of assemblies.
 MAX_ASSEMBLIES = 256
+_TOO_MANY = f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out, or write assembly: same"
 # Newton's method finds the assemblies of a group without a closed form from this many starts, in this many steps.
 SEARCH_STARTS = 512
 SEARCH_STEPS = 40
@@ -37,11 +38,14 @@ class Assembly:
     drawn: bool
 
 
-def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
+def assemblies(
+    mechanism: Mechanism, given: tuple[str, ...], choosing: Sequence[int] | None = None
+) -> tuple[Assembly, ...]:  # fmt: skip
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 
-    Groups with a closed form have two modes each, whether or not they close at the sketch. For a group without one,
-    Newton's method searches from many starts at the sketch's values of the given coordinates; it may miss some.
+    Groups with a closed form, of which only those `choosing` may differ from the sketch's if these are given, have two
+    modes each, whether or not they close at the sketch. For a group without one, Newton's method searches from many
+    starts at the sketch's values of the given coordinates; it may miss some.
 
     Raises
     ------
@@ -49,12 +53,9 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         If there are more than 256, or the coordinates do not determine the mechanism.
     """
     plan = mechanism.plan(given)
-    choosing = [index for index, mode in enumerate(plan.modes) if mode]
+    choosing = [index for index, mode in enumerate(plan.modes) if mode] if choosing is None else choosing
     if 2 ** len(choosing) > MAX_ASSEMBLIES:
-        raise MechanismError(
-            f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes; leave --all-modes out",
-            "mechanism.sketch",
-        )
+        raise MechanismError(f"{len(choosing)} joints choose the assembly: {_TOO_MANY}", SKETCH)
     listed: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
         modes = list(plan.modes)
@@ -72,7 +73,7 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
             label = " ".join([*names, f"#{number}"])
             listed.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
             if len(listed) > MAX_ASSEMBLIES:
-                raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out", SKETCH)
+                raise MechanismError(_TOO_MANY, SKETCH)
     return tuple(listed)
 
 

@@ -290,19 +290,25 @@ class _Bodies:
 
 def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[Joint]]]:
     """All rings of four bodies with four different joints, at most one of them a slide; each at least once."""
-    near: dict[str, list[tuple[str, Joint]]] = {}
-    for one, other, joint in bodies.joints:
-        near.setdefault(one, []).append((other, joint))
-        near.setdefault(other, []).append((one, joint))
+    # By joint, as a pin may hold many bodies.
+    near: dict[str, dict[Joint, list[str]]] = {}
+    for pair in bodies.joints:
+        for one, other, joint in (pair, (pair[1], pair[0], pair[2])):
+            near.setdefault(one, {}).setdefault(joint, []).append(other)
     order = {body: k for k, body in enumerate(near)}
-    for a, around in near.items():
-        # Each ring once from its first body, in both directions.
-        for b, ab in around:
-            for c, bc in near[b]:
-                for d, cd in near[c]:
-                    if min(order[b], order[c], order[d]) <= order[a] or len({b, c, d}) < 3:
-                        continue
-                    for last, da in near[d]:
-                        joints = [ab, bc, cd, da]
-                        if last == a and len(set(joints)) == 4 and sum(joint.edge >= 0 for joint in joints) <= 1:
-                            yield [a, b, c, d], joints
+
+    def onwards(ring: list[str], joints: list[Joint]) -> Iterator[tuple[list[str], list[Joint]]]:
+        for joint, others in near[ring[-1]].items():
+            if joint in joints or (joint.edge >= 0 and any(before.edge >= 0 for before in joints)):
+                continue
+            if len(ring) == 4:
+                if ring[0] in others:
+                    yield ring, [*joints, joint]
+                continue
+            for other in others:
+                # Each ring once from its first body, in both directions.
+                if order[other] > order[ring[0]] and other not in ring:
+                    yield from onwards([*ring, other], [*joints, joint])
+
+    for first in near:
+        yield from onwards([first], [])

@@ -119,10 +119,11 @@ def pairs_of(description: Description) -> list[Pair]:
     """
     layers = {} if description.plates is None else description.plates.layers
     pins = pins_of(description)
+    together = {frozenset(pair) for pin in pins for pair in combinations(pin.links, 2)}
     pairs = [
         Pair(plate_of(one), plate_of(other))
         for one, other in combinations(description.links, 2)
-        if not any({one, other} <= {*pin.links} for pin in pins)
+        if frozenset((one, other)) not in together
         and (one not in layers or other not in layers or layers[one] == layers[other])
     ]
     for pin in pins:

@@ -20,7 +20,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.decomposition import TWICE_AND_FREE, Undetermined
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.loops import Loops, unknowns_of
+from mechdesign.mechanism.loops import Loops, gap_of, unknowns_of
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.mechanism.structure import Structure, whole
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -104,11 +104,36 @@ class Equations:
         return self._system(self.at(x, held))[1]
 
     def _system(self, loops: Loops) -> tuple[Floats, Floats]:
-        """Residuals of all equations, lengths as fractions of `size`, and their Jacobian."""
-        rows, errors = loops.equations(loops.structure.groups[0])
+        """Residuals of all equations, lengths as fractions of `size`, and their Jacobian.
+
+        Each loop is one edge, with few unknowns of the many: it is not `Loops.equations` that fills the rows.
+        """
+        structure = loops.structure
+        group, lines = structure.groups[0], np.zeros((len(structure.groups[0].loops), len(self._units)), complex)
+        angles = {root: k for k, root in enumerate(group.angles)}
+        slides = {slide: len(angles) + k for k, slide in enumerate(group.slides)}
+        bases = {node: len(angles) + len(slides) + 2 * k for k, node in enumerate(group.bases)}
+        misses = np.array([gap_of(loop, loops.nodes) for loop in group.loops], dtype=complex)
+        for number, loop in enumerate(group.loops):
+            for k, sign in loop.edges:
+                edge, step = structure.edges[k], sign * loops.edge(k)
+                misses[number] += step
+                if (root := structure.ties[edge.frame].root) in angles:
+                    lines[number, angles[root]] += 1j * step
+                if edge.slide in slides:
+                    lines[number, slides[edge.slide]] += sign * loops.direction(k)
+            for node, end in ((loop.start, 1.0), (loop.end, -1.0)):
+                if node in bases:
+                    lines[number, bases[node] : bases[node] + 2] += [end, 1j * end]
+        rows = np.stack([lines.real, lines.imag], axis=1).reshape(-1, lines.shape[1])
+        errors = misses.view(float)
+        if group.conditions:
+            loops.place(group)
+            rows = np.concatenate([rows, np.array(loops.condition_rows(group), dtype=float)])
+            errors = np.append(errors, np.array(loops.gaps(group), dtype=float))
         held = [self.size if c.quantity == "length" else 1.0 for c in loops.structure.given]
         units = np.array([self.size] * 2 * len(self.graph.edges) + held)
-        return np.array(errors, dtype=float) / units, np.array(rows, dtype=float) * self._units / units[:, None]
+        return errors / units, rows * self._units / units[:, None]
 
     def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
         """The Jacobian for random dimensions, free of special relations except between the directions of slides.

@@ -42,7 +42,8 @@ def workspace_nodes(study: Study) -> Poses:
     all_sectors: list[Sectors] = []
     held: dict[str, list[Floats]] = {name: [] for name in all_regions[0].held}
     for region in all_regions:
-        panels, _ = counted(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
+        # Poses of other questions keep the sketch's elbows, in any assembly as well.
+        panels, _ = counted(Designs(region.field.members[0], {}, 1, region.about, region.scan, SINGLE))
         if not panels.closes[0]:
             continue
         rays = region.rays or RAYS

@@ -18,7 +18,7 @@ from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.mechanism import Variant, drawn
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 Places = Mapping[str, Value]
 # Names, beside those of dimensions, of numbers that may differ between designs: the values of the held coordinates
@@ -62,25 +62,42 @@ class Field:
         """The point's x and y, then the held coordinates: the rows of the Jacobian."""
         return self.plan.structure.given
 
-    def configuration(self, z: Complexes, places: Places) -> Configuration:
-        """The mechanism with its point at `z`, inside the region or outside.
+    @property
+    def members(self) -> tuple[Field, ...]:
+        """The fields of which any may hold a place of the region."""
+        return (self,)
+
+    def configuration(self, z: Complexes, places: Places, modes: Sequence[Value] | None = None) -> Configuration:
+        """The mechanism with its point at `z`, inside the region or outside; `modes` as in `Plan.run`.
 
         Unlike `Plan.solve` this keeps finite whatever does not depend on a leg that cannot reach `z`, so that margins
         are smooth and have a sign outside the region as well.
         """
-        held = [places.get(f"{HELD}{k}", value) for k, value in enumerate(self.held)]
-        coordinates: list[Value] = [z.real, z.imag, *held]
         if self.plan.iterative:
             return self._poses(z, places)[0]
-        drawn_angles = self._drawn(places)
         vectors = self.mechanism.geometry.vectors(places)
-        state = self.plan.run(coordinates, vectors, None)
+        state = self.plan.run(self._given(z, places), vectors, None, modes)
         graph = self.mechanism.graph
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
-            np.zeros((), dtype=np.int8), places,
-            self.plan.near_sketch(coordinates, places) | drawn_angles,
+            np.zeros((), dtype=np.int8), places, self.near(z, places),
         )  # fmt: skip
+
+    def on_boundary(self, z: Complexes, margin: Ints) -> Configuration:
+        """The mechanism with its point at places `z` of the boundary, where each `margin` is zero."""
+        return self.configuration(z, {})
+
+    def poses(self, z: Complexes) -> Configuration:
+        """Poses with the point at `z`, not judged by the limits."""
+        return self.plan.solve(self._given(z, {}), limits=False)
+
+    def _given(self, z: Complexes, places: Places) -> list[Value]:
+        held = [places.get(f"{HELD}{k}", value) for k, value in enumerate(self.held)]
+        return [z.real, z.imag, *held]
+
+    def near(self, z: Complexes, places: Places) -> dict[str, Value]:
+        """Values near to which angles are read: these fix their turns."""
+        return self.plan.near_sketch(self._given(z, places), places) | self._drawn(places)
 
     def _drawn(self, places: Places) -> dict[str, Value]:
         """Angles in limited expressions as in the sketch redrawn with the dimensions `places`: these fix the turns."""
@@ -88,7 +105,10 @@ class Field:
         limited = {name: angle for name, angle in counting.items() if name not in self._known_turns}
         if not limited:
             return {}
-        sketch, nominal = drawn(self.mechanism, places), self.mechanism.sketch_configuration
+        sketch, nominal = drawn(self.mechanism, places), self.plan.core.sketch_configuration
+        if self.plan.core is not self.mechanism:
+            # Another assembly mode at the same place.
+            sketch = self.plan.solve([sketch.value(output) for output in self.outputs], places, limits=False)
         return {
             name: np.where(sketch.valid, sketch.value(angle), nominal.value(angle)) for name, angle in limited.items()
         }

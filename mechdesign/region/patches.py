@@ -47,7 +47,8 @@ class Patch:
     theta, inner, outer : ndarray, shape (rays,)
         Angles of the rays, and the radii of both curves there.
     enters, leaves : int
-        Margins that are zero on them; -1 where the patch begins at the centre of the scan.
+        Margins that are zero on them; -1 where the patch begins at the centre of the scan, or another assembly mode
+        goes on.
     piece : int
         Number of the piece of the region to which the patch belongs, from 1.
     """
@@ -94,6 +95,7 @@ class Patch:
 def patches(panels: Panels, rays: int) -> Iterator[Patch]:
     """Patches of a single design, with about `rays` rays over all panels, among them the ends of each panel."""
     total = float(np.sum(panels.high - panels.low))
+    in_modes = len(panels.designs.members) > 1
     for low, high in zip(panels.low, panels.high, strict=True):
         number = max(FEWEST, round(rays * (high - low) / total) + 1)
         # Denser towards the ends, where cusps are thin and corners sharp.
@@ -104,7 +106,8 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
             first, last = (high - low) * np.array(BESIDE)[steps]
             angles = np.clip(theta, low + first, high - last)
             traced = panels.trace(np.zeros(number, dtype=np.intp), angles, SLACK)
-            ray, inner, outer, enters, leaves = traced.whole(SAME_ROOT * float(panels.reach[0]))
+            near = SAME_ROOT * float(panels.reach[0])
+            ray, inner, outer, enters, leaves = traced.modes(near) if in_modes else traced.whole(near)
             counts = np.bincount(ray, minlength=number)
             usual = _most(counts)
             lost = counts[[0, -1]] != usual

@@ -16,7 +16,7 @@ from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.panels import Panels, find_panels
-from mechdesign.region.rays import Designs, Intervals, is_turn
+from mechdesign.region.rays import SAME_ROOT, Designs, Intervals, is_turn
 from mechdesign.region.rules import cubic, spread
 
 # Distances of rays from the end of a panel (radians), tried one after the other until a ray meets as many intervals as
@@ -110,8 +110,12 @@ class Pieces:
         above = self._ends(-1)[:, :, upper, None, :]
         overlap, overlap_farther = np.minimum(below[1], above[1]) - np.maximum(below[0], above[0])
         pair, a, b = np.nonzero((overlap > 0) & (overlap_farther < TOUCHES * overlap))
-        edges, total = (number[lower[pair], a], number[upper[pair], b]), int(has.sum())
-        graph = coo_array((np.ones(len(pair)), edges), shape=(total, total))
+        # Where one assembly mode takes over from another the next interval of a ray begins at the end of the last.
+        inner, outer = self._ends(-1)[:, 0]
+        panel, slot = np.nonzero(inner[:, 1:] - outer[:, :-1] <= SAME_ROOT * panels.reach[panels.design][:, None])
+        ends = [number[lower[pair], a], number[panel, slot]], [number[upper[pair], b], number[panel, slot + 1]]
+        edges, total = tuple(np.concatenate(side) for side in ends), int(has.sum())
+        graph = coo_array((np.ones(len(edges[0])), edges), shape=(total, total))
         label = np.full(has.shape, -1)
         label[has] = connected_components(graph, directed=False)[1]
         return label

@@ -83,12 +83,14 @@ class Raster:
             )
             slivers = [empty]
             for chunk, part, z in raster._centres(np.arange(designs.count)):
-                is_inside, margins = designs.look(z.reshape(-1, len(chunk)), chunk)
-                inside, margins = is_inside.reshape(z.shape), margins.reshape(-1, *z.shape)
-                scanned = ray_through(z - designs.about, begin) <= end
-                cut[chunk] = (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
-                holes.append(raster._between_centres(chunk, z, margins, inside))
-                slivers.append(raster._thin(chunk, z, margins, inside, scanned))
+                scanned, inside = ray_through(z - designs.about, begin) <= end, np.zeros(z.shape, dtype=bool)
+                for mode in designs.members:
+                    is_inside, margins = mode.look(z.reshape(-1, len(chunk)), chunk)
+                    own, margins = is_inside.reshape(z.shape), margins.reshape(-1, *z.shape)
+                    cut[chunk] |= (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
+                    holes.append(raster._between_centres(mode, chunk, z, margins, own))
+                    slivers.append(raster._thin(mode, chunk, z, margins, own, scanned & ~inside))
+                    inside |= own
                 raster.inside[chunk, *part] = np.moveaxis(scanned & inside, 2, 0)
             rim = raster.inside.copy()
             rim[:, 1:-1, 1:-1] = False
@@ -104,7 +106,7 @@ class Raster:
         )  # fmt: skip
 
     def _thin(
-        self, designs: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
+        self, mode: Designs, designs: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
     ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
@@ -122,7 +124,7 @@ class Raster:
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
-            is_inside, margins = self.designs.look(part, design, assembly=True)
+            is_inside, margins = mode.look(part, design, assembly=True)
             hit = is_inside.any(axis=0)
             witness[cell_of_part[hit]] = part[is_inside.argmax(axis=0), np.arange(len(design))][hit]
             misses = np.nonzero(np.broadcast_to(~hit, (PARTS, PARTS, len(design))))
@@ -134,7 +136,9 @@ class Raster:
         np.add.at(self.undecided, design, cell.real * cell.imag * (rises & ~hit[cell_of_part]))
         return cell_design[hit], witness[hit]
 
-    def _between_centres(self, designs: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
+    def _between_centres(
+        self, mode: Designs, designs: Ints, z: Complexes, margins: Floats, inside: Flags
+    ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places of holes between centres: a margin is negative there, but at no centre around.
 
         Parabolas lead from a centre where a margin is lower than beside it to the margin's minimum; they are exact for
@@ -146,12 +150,12 @@ class Raster:
             low &= centre <= beside
         margin, row, column, lane = np.nonzero(low)
         place, cell = z[row + 1, column + 1, lane], self.cell[designs[lane]]
-        every, places = np.arange(len(lane)), self.designs.of(designs[lane])
+        every, places = np.arange(len(lane)), mode.of(designs[lane])
         converges = np.ones(len(lane), dtype=bool)
         for step in PARABOLAS:
             x, y = step * cell.real, step * cell.imag
             around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
-            centre, right, left, up, down, across = self.designs.field.margins(around, places)[margin, :, every].T
+            centre, right, left, up, down, across = mode.field.margins(around, places)[margin, :, every].T
             with np.errstate(invalid="ignore", divide="ignore"):
                 gx, gy = 0.5 * (right - left), 0.5 * (up - down)
                 xx, yy, xy = right + left - 2 * centre, up + down - 2 * centre, across + centre - right - up

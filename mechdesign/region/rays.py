@@ -102,6 +102,11 @@ class Designs:
     effort: Effort
     centres: Complexes | None = None
 
+    @property
+    def members(self) -> tuple[Designs, ...]:
+        """The same designs in each mode of the field."""
+        return (self,)
+
     @cached_property
     def in_any_assembly(self) -> Designs:
         """The same designs without the margins of the assembly."""
@@ -210,6 +215,13 @@ class Intervals:
         meets = (ray[1:] == ray[:-1]) & (self.inner[1:] - self.outer[:-1] <= near)
         begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
         return ray[begins], self.inner[begins], self.outer[ends], self.enters[begins], self.leaves[ends]
+
+    def modes(self, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+        """As `whole`, but nothing is joined: where another assembly mode goes on, the margin is -1."""
+        meets = (self.ray[1:] == self.ray[:-1]) & (self.inner[1:] - self.outer[:-1] <= near)
+        enters, leaves = self.enters.copy(), self.leaves.copy()
+        enters[1:][meets] = leaves[:-1][meets] = -1
+        return self.ray, self.inner, self.outer, enters, leaves
 
     def kept(self, keep: Flags) -> Intervals:
         """The intervals that `keep` marks, on the same rays."""

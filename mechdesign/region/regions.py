@@ -12,6 +12,7 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism.derivatives import mixes
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.schema import Over, WorkspaceSection
+from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import HELD, LENGTH, Field
 from mechdesign.study import Study
 from mechdesign.study.expansion import Numbers
@@ -105,13 +106,14 @@ def regions(study: Study) -> list[Region]:
             "{characteristic_length: 0.1}",
         )  # fmt: skip
     field = Field(mechanism, plan, (), section.assembly == "same", section.characteristic_length)
+    whole = (lambda field: field) if field.same_assembly else in_any_assembly
     sketch = mechanism.sketch_configuration
     at_sketch = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
     about = at_sketch if section.scan.about is None else complex(*section.scan.about)
     factors = [unit if c.quantity == "angle" else 1.0 for c in plan.structure.given[2:]]
     return [
         Region(
-            replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
+            whole(replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True)))),
             dict(zip(section.at, values, strict=True)), about, scan, section.scan.rays, factors,
         )
         for values in itertools.product(*held)

@@ -105,3 +105,12 @@ def test_regions_of_five_bars(benchmark: Any, assembly: str, wanted: tuple[str, 
     given = benchmark.pedantic(lambda: answer(question, places, SOME, BATCH), rounds=3, warmup_rounds=1)
     assert (given.errors["area"] <= 1e-6 * given.values["area"]).all()
     benchmark.extra_info.update(milliseconds_a_design=1e3 * benchmark.stats["min"] / SOME)
+
+
+def test_largest_circles_of_designs(benchmark: Any) -> None:
+    """Designs whose goal is the largest circle in their region, as `optimize` evaluates them."""
+    variables = "variables: {left.length: {from: 0.23, to: 0.27, number: 24}}, maximize: workspace.circle_radius"
+    study = study_of(FIVE_BAR, f"optimize={{{variables}}}")
+    result = benchmark.pedantic(lambda: mechdesign.optimize(study, jobs=1), rounds=2, warmup_rounds=1)
+    assert np.isfinite(result.tables["designs"]["workspace.circle_radius"]).all()
+    benchmark.extra_info.update(milliseconds_a_design=1e3 * benchmark.stats["min"] / 24)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ Flags = np.ndarray
 Solve = Callable[[Complex, float], tuple[Flags, np.ndarray]]
 Seeds = Callable[[int], Iterator[int]]
 CELLS, LAYERS = 700, 41
+# Which legs have the other elbow than in the sketch.
+BOTH = np.array([(1, -1), (-1, 1), (-1, -1)])
 # A raster counts cells on the boundary wrongly by at most this share of their area.
 EDGE = 0.35
 
@@ -36,12 +39,15 @@ class Robot:
         The point's place in the sketch, which is reached.
     half : float
         The region lies within a square of twice this side about the origin.
+    modes : sequence of Solve
+        The same with other elbows than the sketch's.
     """
 
     text: str
     solve: Solve
     point: complex
     half: float
+    modes: Sequence[Solve] = ()
 
 
 def leg(z: Complex, base: complex, crank: float, rod: float, side: int) -> tuple[Flags, Complex]:
@@ -94,13 +100,13 @@ def five_bar(rng: np.random.Generator) -> Robot | None:
     low, width = rng.uniform(-180, 180, 2), rng.uniform(40, 330, 2)
     sides = rng.choice([-1, 1], 2)
 
-    def elbows(z: Complex) -> tuple[Flags, Complex, Complex]:
+    def elbows(z: Complex, sides: np.ndarray = sides) -> tuple[Flags, Complex, Complex]:
         good, one = leg(z, -h, a, b, sides[0])
         also, two = leg(z, h, c, d, sides[1])
         return good & also, one, two
 
-    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
-        good, one, two = elbows(z)
+    def solve(z: Complex, _: float, sides: np.ndarray = sides) -> tuple[Flags, np.ndarray]:
+        good, one, two = elbows(z, sides)
         good &= within(np.angle(one + h), low[0], width[0]) & within(np.angle(two - h), low[1], width[1])
         return good, cross(z - one, z - two)
 
@@ -125,7 +131,7 @@ mechanism:
   sketch: {{D: {told(one)}, E: {told(two)}, P: {told(point)}}}
 workspace: {{point: P, indices: []}}
 """
-    return Robot(text, solve, point, half)
+    return Robot(text, solve, point, half, [partial(solve, sides=sides * turn) for turn in BOTH])
 
 
 def sliders(rng: np.random.Generator) -> Robot | None:
@@ -135,12 +141,12 @@ def sliders(rng: np.random.Generator) -> Robot | None:
     rods, sides = rng.uniform(50, 150, 2), rng.choice([-1, 1], 2)
     low, stroke = rng.uniform(-100, 20, 2), rng.uniform(30, 200, 2)
 
-    def slides(z: Complex) -> tuple[Flags, list[np.ndarray]]:
+    def slides(z: Complex, sides: np.ndarray = sides) -> tuple[Flags, list[np.ndarray]]:
         parts = [sliding(z, bases[k], turns[k], rods[k], sides[k]) for k in range(2)]
         return parts[0][0] & parts[1][0], [part[1] for part in parts]
 
-    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
-        good, moved = slides(z)
+    def solve(z: Complex, _: float, sides: np.ndarray = sides) -> tuple[Flags, np.ndarray]:
+        good, moved = slides(z, sides)
         for k in range(2):
             good &= (moved[k] > low[k]) & (moved[k] < low[k] + stroke[k])
         return good, cross(*(z - bases[k] - moved[k] * turns[k] for k in range(2)))
@@ -170,7 +176,7 @@ mechanism:
   sketch: {{D: {told(pins[0])}, E: {told(pins[1])}, P: {told(point)}}}
 workspace: {{point: P, indices: []}}
 """
-    return Robot(text, solve, point, half)
+    return Robot(text, solve, point, half, [partial(solve, sides=sides * turn) for turn in BOTH])
 
 
 def slider_arm(rng: np.random.Generator) -> Robot | None:
@@ -178,7 +184,7 @@ def slider_arm(rng: np.random.Generator) -> Robot | None:
     rod, side, low, stroke = rng.uniform(50, 150), rng.choice([-1, 1]), rng.uniform(-100, 20), rng.uniform(30, 300)
     start, width = rng.uniform(-180, 180), rng.uniform(30, 300)
 
-    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
+    def solve(z: Complex, _: float, side: int = side) -> tuple[Flags, np.ndarray]:
         good, moved = sliding(z, 0, 1, rod, side)
         good &= (moved > low) & (moved < low + stroke) & within(np.angle(z - moved), start, width)
         return good, np.ones(z.shape)
@@ -202,7 +208,7 @@ mechanism:
   sketch: {{D: {told(float(sliding(np.array(point), 0, 1, rod, side)[1]))}, P: {told(point)}}}
 workspace: {{point: P, characteristic_length: 60, indices: []}}
 """
-    return Robot(text, solve, point, half)
+    return Robot(text, solve, point, half, [partial(solve, side=-side)])
 
 
 def telescopes(rng: np.random.Generator) -> Robot | None:
@@ -305,6 +311,8 @@ def raster(robot: Robot, cells: int, angle: float, same: bool) -> tuple[Flags, f
     x = (np.arange(cells) + 0.5) * side - robot.half
     with np.errstate(invalid="ignore", divide="ignore"):
         good, sign = robot.solve(x + 1j * x[:, None], angle)
+        for mode in () if same else robot.modes:
+            good = good | mode(x + 1j * x[:, None], angle)[0]
         drawn = robot.solve(np.array(robot.point), 0.0)[1]
     return np.asarray(good & (sign * drawn > 0) if same else good), side
 

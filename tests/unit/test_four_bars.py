@@ -368,3 +368,28 @@ kinematics: {sweep: {cylinder: {from: 200, to: 500, step: 10}}}
         angle = float(answer.tables["loops"][f"transmission_{end}"][0])
         assert angle == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-9)
     assert len(answer.tables["toggles"]) == 0
+
+
+@pytest.mark.slow
+def test_one_crank_moves_many_rockers() -> None:
+    """Each rod and rocker makes one four-bar with the crank, and two of them none with each other."""
+    count = 60
+    turns = np.exp(2j * np.pi * np.arange(count) / count)
+    bases, ends = 300 * turns, 300 * turns + 120j * turns
+    ground = ", ".join(f"D{k}: [{z.real:.9f}, {z.imag:.9f}]" for k, z in enumerate(bases))
+    drawn = ", ".join(f"B{k}: [{z.real:.9f}, {z.imag:.9f}]" for k, z in enumerate(ends))
+    links = "\n".join(f"    rod_{k}: [A, B{k}, 310]\n    rocker_{k}: [D{k}, B{k}, 150]" for k in range(count))
+    study = study_of(f"""
+mechanism:
+  links:
+    ground: {{O: [0, 0], {ground}}}
+    crank: [O, A, 50]
+{links}
+  drives: {{q: {{angle: crank}}}}
+  sketch: {{A: [50, 0], {drawn}}}
+kinematics: {{outputs: [B7], sweep: {{q: {{from: 0, to: 360, step: 30}}}}}}
+""")
+    loops = kinematics(study).tables["loops"]
+    assert len(loops) == count
+    # Grashof: 50 + 310 < 300 + 150.
+    assert set(loops["class"]) == {"crank-rocker"}

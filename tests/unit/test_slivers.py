@@ -35,7 +35,7 @@ mechanism:
   drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
   limits: [{{drive: q1, min: {first[0]}, max: {first[1]}}}, {{drive: q2, min: {second[0]}, max: {second[1]}}}]
   sketch: {{A: [{elbow.real}, {elbow.imag}], P: [{hand.real}, {hand.imag}]}}
-workspace: {{point: P, assembly: any, indices: [], scan: {{about: {about}}}}}
+workspace: {{point: P, indices: [], scan: {{about: {about}}}}}
 """)).main  # fmt: skip
     assert abs(found["area"][0] - area) <= found["area_error"][0] + 1e-9 * area
     assert abs(found["SUI"][0] - area / box) <= found["SUI_error"][0] + 1e-7

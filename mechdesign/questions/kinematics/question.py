@@ -141,10 +141,11 @@ class MotionQuestion:
     @cached_property
     def pairs(self) -> dict[str, Pair]:
         """Plates and pins whose clearances are asked, by the column of each."""
-        chosen, every = self.section.collisions, pairs_of(self.study.mechanism.description)
+        chosen = self.section.collisions
         if chosen is None:
             return {}
-        pairs = [Pair(plate_of(one), plate_of(other)) for one, other in chosen] or every
+        named = [Pair(plate_of(one), plate_of(other)) for one, other in chosen]
+        pairs = named or pairs_of(self.study.mechanism.description)
         return {pair.name: pair for pair in pairs}
 
     @property

@@ -12,6 +12,7 @@ from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.rounding import cleared
 from mechdesign.questions.optimize.schema import Condition, Containment, OptimizeSection, Outline
+from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
 from mechdesign.results import Result
@@ -72,7 +73,7 @@ class Goal:
     @property
     def regional(self) -> bool:
         """Whether it is a number of the whole workspace."""
-        number = self.outline is not None or self.column in COLUMNS or bool(split(self.column)[0])
+        number = self.outline is not None or self.column in (*COLUMNS, *INSCRIBED) or bool(split(self.column)[0])
         return self.command == "workspace" and number and not self.where
 
     def margin(self, values: Floats) -> Floats:

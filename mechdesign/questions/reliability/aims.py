@@ -81,7 +81,7 @@ class Reliable:
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.questions.reliability.probability import made_failure
 
-        return made_failure(linear, closing, question.bands, question.discs)[None]
+        return made_failure(linear, closing, question.bands, question.discs)[0][None]
 
     def method(self, task: Task, section: ReliabilitySection) -> str:
         """The simulation method that confirms the target."""

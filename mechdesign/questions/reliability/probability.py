@@ -8,17 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from scipy.special import erfcx, ndtr, ndtri
+from scipy.special import ndtr, ndtri
 
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
+from mechdesign.numerics.statistics import outside, rectangle_failure, student
+from mechdesign.questions.reliability.circles import (
+    disc_and_band_failure,
+    disc_chance,
+    disc_failure,
+    disc_failures,
+    standard_ends,
+)
+from mechdesign.questions.reliability.engine.problem import CONFIDENCE
 from mechdesign.questions.reliability.first_order import FirstOrder, correlation
 from mechdesign.questions.reliability.question import Band, Disc, limits_at
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Points of a lattice.
 _LATTICE_POINTS = 8191
 # Random shifts of the lattice.
@@ -34,18 +40,15 @@ _NO_PART = 1e-6
 _LEAST_PART = 1e-15
 # Sides of the polygon inside a circle, beyond whose sides points are drawn.
 _POLYGON_SIDES = 64
-# Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
-_STEPS = 9.0
-_OVAL = 4.0
-# Number of steps from which on the integral over the width of the circle is used instead.
-_MOST_STEPS = 4096
 
 
 def made_failure(
     linear: FirstOrder, closing: FirstOrder, bands: Sequence[Band], discs: Sequence[Disc],
     mean: Floats | None = None, covariance: Floats | None = None,
-) -> Floats:  # fmt: skip
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Probability that a made mechanism breaks a limit or cannot be assembled, by normal errors, shape (poses,).
+
+    With it half the width of its 99.7 % interval, 0 where it is integrated and not sampled.
 
     Parameters
     ----------
@@ -56,10 +59,11 @@ def made_failure(
     """
     mean = linear.whole.shift().T if mean is None else mean
     covariance = linear.whole.covariance() if covariance is None else covariance
-    failure = np.full(len(mean), np.nan)
+    failure, doubt = np.full((2, len(mean)), np.nan)
     # The same lengths have a law of their own at all of these poses.
     for rows in linear.alike():
-        failure[rows] = failure_probability(covariance[rows], *linear.limits(bands, discs, rows), mean[rows])
+        of_rows = estimated_failure(covariance[rows], *linear.limits(bands, discs, rows), mean[rows])
+        failure[rows], doubt[rows] = of_rows
     # What is left where a limit breaks almost surely is all that assembly can add.
     parts = np.minimum(ndtr(-closing.distance()), 1.0 - failure)
     counts = parts > np.maximum(_NO_PART * failure, _LEAST_PART)
@@ -71,14 +75,23 @@ def made_failure(
         limits, circles = linear.limits(bands, discs, [pose])
         limits, circles = limits_at(limits, circles, 0)
         margins = [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
-        failure[pose] = failure_probability(spread, [*limits, *margins], circles, middle)
-    return failure
+        failure[pose], doubt[pose] = estimated_failure(spread, [*limits, *margins], circles, middle)
+    return failure, doubt
 
 
 def failure_probability(
     covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
 ) -> Floats:
+    """Probability that normal errors break any limit, as `estimated_failure`."""
+    return estimated_failure(covariance, bands, discs, mean)[0]
+
+
+def estimated_failure(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Probability that normal errors break any limit, shape (...); nan where a limited one's moments are not finite.
+
+    With it half the width of its 99.7 % interval, 0 where it is integrated and not sampled.
 
     Parameters
     ----------
@@ -86,23 +99,25 @@ def failure_probability(
         May be singular.
     bands, discs
         The limits; ends of bands may be of shape (...). One or two limited outputs are integrated with a relative error
-        of about 1e-14; more by a randomised lattice with about 1e-5, or by sampling with about 1e-3 where failures are
-        rare.
+        of about 1e-14, a circle beside another output with about 1e-10; more by a randomised lattice with about 1e-5,
+        or by sampling with about 1e-3 where failures are rare.
     mean : ndarray, shape (..., outputs), optional
         Zero if left out.
     """
     mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
     if len(bands) <= 2 and not discs:
-        ends = [_standard(band, covariance, mean) for band in bands]
+        ends = [standard_ends(band, covariance, mean) for band in bands]
         if len(ends) < 2:
-            return outside(*ends[0])
+            single = outside(*ends[0])
+            return single, np.zeros_like(single)
         pair = [band.output for band in bands]
         low, high = (np.stack([end[k] for end in ends]) for k in (0, 1))
-        return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
+        pair_failure = rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
+        return pair_failure, np.zeros_like(pair_failure)
     limited = [band.output for band in bands] + [axis for disc in discs for axis in (disc.x, disc.y)]
     finite = np.isfinite(covariance[..., limited, :][..., limited]).all(axis=(-2, -1))
     finite &= np.isfinite(mean[..., limited]).all(axis=-1)
-    failure = np.full(finite.shape, np.nan)
+    failure, doubt = np.full(finite.shape, np.nan), np.zeros(finite.shape)
     if len(discs) == 1 and not bands:
         pair = [discs[0].x, discs[0].y]
         radius, least = (np.broadcast_to(end, finite.shape)[finite] for end in (discs[0].radius, discs[0].least))
@@ -111,25 +126,18 @@ def failure_probability(
         for row in np.flatnonzero(least > 0).tolist():
             beyond[row] += disc_chance(spread[row], float(least[row]), middle[row])
         failure[finite] = np.minimum(beyond, 1.0)
-        return failure
+        return failure, doubt
     for place in filter(np.asarray(finite).__getitem__, np.ndindex(failure.shape)):
-        failure[place] = _of_several(covariance[place], *limits_at(bands, discs, place), mean[place])
-    return failure
+        failure[place], doubt[place] = _of_several(covariance[place], *limits_at(bands, discs, place), mean[place])
+    return failure, doubt
 
 
-def _standard(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
-    """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
-    sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
-    low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (
-            np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
-            np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
-        )
-
-
-def _of_several(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float:
-    """Probability that normal errors at one pose break any of several limits."""
+def _of_several(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats
+) -> tuple[float, float]:  # fmt: skip
+    """Probability that normal errors at one pose break any of several limits, and half its interval."""
+    if len(bands) == len(discs) == 1:
+        return disc_and_band_failure(covariance, discs[0], bands[0], mean), 0.0
     rare = _rare(covariance, bands, discs, mean)
     if rare is not None:
         return rare
@@ -137,9 +145,11 @@ def _of_several(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]
     return _lattice(covariance, about_mean, discs, mean)
 
 
-def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float | None:
+def _rare(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats
+) -> tuple[float, float] | None:  # fmt: skip
     """Probability outside any of several limits where it is small; None where a lattice is better."""
-    total = sum(float(outside(*_standard(band, covariance, mean))) for band in bands)
+    total = sum(float(outside(*standard_ends(band, covariance, mean))) for band in bands)
     nearer = []
     for disc in discs:
         pair = [disc.x, disc.y]
@@ -182,8 +192,12 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     )
 
 
-def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Flags], Flags] | None = None) -> float:
+def half_spaces(
+    normals: Floats, distances: Floats, broken: Callable[[Floats, Flags], Flags] | None = None
+) -> tuple[float, float]:
     """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to about 1e-3 of it.
+
+    With it half the width of its 99.7 % interval.
 
     Parameters
     ----------
@@ -202,7 +216,7 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
     chances = ndtr(-distances)
     total = float(chances.sum())
     if total == 0 or (len(chances) < 2 and broken is None):
-        return total
+        return total, 0.0
     rng = np.random.Generator(np.random.SFC64(0))
     half = rng.choice(len(chances), _RARE_POINTS, p=chances / total)
     normal = normals[half].T
@@ -215,109 +229,17 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
     weights = 1.0 / held.sum(axis=0)
     if broken is not None:
         weights = np.where(broken(u, held), weights, 0.0)
-    return min(total * float(np.mean(weights)), 1.0)
+    doubt = student(_RARE_POINTS - 1, CONFIDENCE) * float(np.std(weights)) / np.sqrt(_RARE_POINTS)
+    return min(total * float(np.mean(weights)), 1.0), total * doubt
 
 
-def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
-    """P(bivariate normal outside a circle about zero) for n covariances, shape (n,); see `disc_failure`.
+def _lattice(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], centre: Floats
+) -> tuple[float, float]:  # fmt: skip
+    """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it.
 
-    Notes
-    -----
-    In polar coordinates r, phi in principal axes the density beyond the circle, with A r^2 - 2 B r + C in the exponent,
-    is integrated over r in closed form, and over phi by as many equal steps as its narrowest part needs: the integrand
-    is periodic and analytic, and the error of the trapezoidal rule falls exponentially [Trefethen & Weideman, 2014].
+    With half the interval that the shifts show.
     """
-    failure = np.full(len(radius), np.nan)
-    squares, axes = np.linalg.eigh(covariance)
-    b, a = np.sqrt(np.maximum(squares, 0.0)).T
-    n, m = np.einsum("pij,pi->pj", axes, mean).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steps = _STEPS * np.maximum((radius + np.hypot(n, m)) / b, _OVAL * a / b) + _STEPS
-    steps = np.exp2(np.ceil(np.log2(np.where((radius > 0) & (steps < _MOST_STEPS), steps, _MOST_STEPS))))
-    for count in np.unique(steps[steps < _MOST_STEPS]).tolist():
-        rows = steps == count
-        size, wide, narrow, x, y = (part[rows, None] for part in (radius, a, b, m, n))
-        phi = 2 * np.pi * np.arange(count) / count
-        along, across = np.cos(phi) / wide, np.sin(phi) / narrow
-        root = np.hypot(along, across)
-        nearest = (along * x / wide + across * y / narrow) / root
-        beyond = size * root - nearest
-        # exp(-C/2 + B^2/(2A) - beyond^2/2) is that of the distance of the circle's point from the mean.
-        apart = np.exp(-0.5 * ((size * np.cos(phi) - x) ** 2 / wide**2 + (size * np.sin(phi) - y) ** 2 / narrow**2))
-        with np.errstate(over="ignore", invalid="ignore"):
-            tail = apart * (1.0 + nearest * np.sqrt(0.5 * np.pi) * erfcx(beyond / np.sqrt(2.0)))
-            failure[rows] = (tail / root**2).sum(axis=1) / (count * (a * b)[rows])
-    # Errors nearly along a line, or with a mean far outside the circle.
-    for row in np.flatnonzero(np.isnan(failure)).tolist():
-        failure[row] = disc_failure(covariance[row], float(radius[row]), mean[row])
-    return np.asarray(np.minimum(failure, 1.0))
-
-
-def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) -> float:
-    """P(bivariate normal outside a circle about zero); `covariance` of shape (2, 2), `mean` of shape (2,), else zero.
-
-    Notes
-    -----
-    In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
-    """
-    if radius == np.inf:
-        return 0.0
-    a, b, m, n = _principal(covariance, mean)
-    if radius <= 0 or a == 0:
-        return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
-    if b < 1e-12 * a:
-        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
-    height, weight = _across(radius, a, b, m, n)
-    return float(outside((-radius - m) / a, (radius - m) / a)
-                 + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))  # fmt: skip
-
-
-def disc_chance(covariance: Floats, radius: float, mean: Floats) -> float:
-    """P(bivariate normal within a circle about zero), to all digits of a small one; see `disc_failure`."""
-    a, b, m, n = _principal(covariance, mean)
-    if radius <= 0 or a == 0:
-        return float(np.hypot(m, n) <= radius > 0)
-    if b < 1e-12 * a:
-        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(ndtr((half - m) / a) - ndtr((-half - m) / a))
-    height, weight = _across(radius, a, b, m, n)
-    return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
-
-
-def _principal(covariance: Floats, mean: Floats | None) -> tuple[Any, Any, Any, Any]:
-    """Standard deviations along the principal axes, the larger first, and the sizes of the mean's parts along them."""
-    squares, axes = np.linalg.eigh(covariance)
-    b, a = np.sqrt(np.maximum(squares, 0.0))
-    n, m = (0.0, 0.0) if mean is None else np.abs(axes.T @ mean)
-    return a, b, m, n
-
-
-def _across(radius: float, a: Any, b: Any, m: Any, n: Any) -> tuple[Floats, Floats]:
-    """Half the heights of a circle at places x along the first axis, and their weights by the density of x."""
-    begin, end = (np.arcsin(np.clip((m + sign * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for sign in (-1, 1))
-    if begin == end:
-        return np.zeros(0), np.zeros(0)
-    # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.
-    spread = np.array([0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0, 16.0, 40.0]) * b
-    near = np.arccos(np.clip(np.concatenate([n + spread, n - spread]) / radius, 0.0, 1.0))
-    count = min(int(np.ceil((end - begin) * radius / a)) + 8, 800)
-    edges = np.unique(np.concatenate([np.linspace(begin, end, count), near, -near]))
-    t, weight = _panels(edges[(edges >= begin) & (edges <= end)])
-    x, height = radius * np.sin(t), radius * np.cos(t)
-    density = np.exp(-0.5 * ((x - m) / a) ** 2) / (a * np.sqrt(2 * np.pi))
-    return height, weight * density * height
-
-
-def _panels(edges: Floats) -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights over all panels between `edges`."""
-    half = 0.5 * np.diff(edges)[:, None]
-    middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
-    return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
-
-
-def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], centre: Floats) -> float:
-    """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it."""
     order: list[tuple[int, float, float, float, float]] = [(b.output, b.low, b.high, 0.0, 0.0) for b in bands]
     for disc in discs:
         low, high = (sign * disc.radius - float(centre[disc.x]) for sign in (-1, 1))
@@ -360,7 +282,8 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], c
                 log_success = np.where(within, log_success, -np.inf)
             before = mean + root[k, k] * drawn[k] + centre[output]
         means.append(-np.expm1(log_success).mean())
-    return float(np.mean(means))
+    doubt = student(_LATTICE_SHIFTS - 1, CONFIDENCE) * np.std(means, ddof=1) / np.sqrt(_LATTICE_SHIFTS)
+    return float(np.mean(means)), float(doubt)
 
 
 def _pivot_free_cholesky(matrix: Floats) -> Floats:

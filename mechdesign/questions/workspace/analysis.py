@@ -41,6 +41,6 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         return Result("workspace", named, (*warnings, *rough(ranged, regions)), counts)
     first = full[0]
     assert first.boundary is not None
-    along = poses_along(study, first.question.held, first.boundary)
+    along = poses_along(first.question.field, first.boundary)
     drawn = DrawnRegion(along, ellipses(first.question.field, first.patches))
     return Result("workspace", named, tuple(warnings), counts, drawn=drawn)

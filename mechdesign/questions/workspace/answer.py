@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.box import bounding_box
+from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.peaks import find_peaks
 from mechdesign.questions.workspace.quadrature import integrate, simple_means
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.strips import Integrand
+from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import Places
 from mechdesign.region.panels import Panels
 from mechdesign.region.pieces import Pieces, counted
@@ -51,7 +53,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         If a region has no end.
     """
     keep_freed_memory()
-    designs = question.rays_through(question.field, places, count, question.about, question.scan, effort)
+    designs = question.designs(places, count, effort)
     panels, pieces = counted(designs, tuple(sorted(set(question.counted) - set(question.scan))))
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.columns}
@@ -88,6 +90,8 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
                 "box_area": (box, doubt),
                 "SUI": (share, (results["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
             }
+    shapes = inscribed(panels, [name for name in question.columns if name in INSCRIBED])
+    results |= {name: (size, np.zeros(count)) for name, size in shapes.items()}
     for column, (name, kind) in question.statistics.items():
         if kind in ("min", "max"):
             results[column] = peaks.of(name, kind)
@@ -98,17 +102,17 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
 
 
 def area_in_any_assembly(question: Question) -> float:
-    """Area of a region in both assemblies; 0 where it has no end there, and where no assembly bounds it.
+    """Area of a region in any assembly; 0 where it has no end or too many modes, and where no assembly bounds it.
 
     It is looked for as loosely as of a design of many.
     """
     if not any(name.startswith("assembly ") for _, name in question.field.labels):
         return 0.0
-    both = replace(question.field, same_assembly=False)
-    every = replace(question, field=both, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
+    loose = replace(question, indices=(), columns=("area",), rule="gauss", tolerance=LOOSE)
     try:
+        every = replace(loose, field=in_any_assembly(question.field))
         return float(answer(every, {}, 1, BATCH).values["area"][0])
-    except AssemblyError:
+    except (AssemblyError, MechanismError):
         return 0.0
 
 

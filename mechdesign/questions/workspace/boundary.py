@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +10,9 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.ranged import Ranged
-from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.field import Field
 from mechdesign.region.patches import Patch
-from mechdesign.study import Study
 
 # Where rounding leaves a drive without a value on the boundary it is read so far inside (as a part of the radius).
 BESIDE = 1e-12
@@ -67,32 +64,39 @@ def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[
     )
     about, turn = patches[0].about, np.exp(1j * theta)
     inwards, z = np.where(side == "inner", 1.0, -1.0), np.asarray(about + radius * turn)
-    if isinstance(field, Ranged):
+    if isinstance(field.members[0], Ranged):
         values = [_deciding(field, z, margin)]
     else:
-        values = _drives(field, z, np.asarray(about + radius * (1 + BESIDE * inwards) * turn), inwards)
+        within = np.asarray(about + radius * (1 + BESIDE * inwards) * turn)
+        values = _drives(field, field.on_boundary(z, margin), field.on_boundary(within, margin), inwards)
     kind, at = (np.array(words)[margin] for words in ([kind for kind, _ in field.labels], [at for _, at in reasons]))
     curve = np.repeat(np.arange(len(curves)), lengths)
     return Boundary(z, theta, kind, at, side, curve, piece, values)
 
 
-def _deciding(over: Ranged, z: Complexes, margin: Ints) -> tuple[Coordinate, Floats]:
+def _deciding(field: Field, z: Complexes, margin: Ints) -> tuple[Coordinate, Floats]:
     """The held coordinate of a range, and its value that decides at each point."""
-    row = np.array([over.extreme(label) for label in range(len(over.labels))])[margin]
-    return over.outputs[2 + over.which], np.take_along_axis(over.deciding(z)[1], row[None], axis=0)[0]
+    values, count, which = np.empty(len(z)), len(field.members[0].labels), 0
+    for number, over in enumerate(field.members):
+        assert isinstance(over, Ranged)
+        own, which = np.flatnonzero(margin // count == number), over.which
+        row = np.array([over.extreme(label) for label in range(count)])[margin[own] % count]
+        values[own] = np.take_along_axis(over.deciding(z[own])[1], row[None], axis=0)[0]
+    return field.outputs[2 + which], values
 
 
-def _drives(field: Field, z: Complexes, within: Complexes, inwards: Floats) -> list[tuple[Coordinate, Floats]]:
+def _drives(
+    field: Field, exact: Configuration, within: Configuration, inwards: Floats
+) -> list[tuple[Coordinate, Floats]]:  # fmt: skip
     """Drives on the boundary, or `within` the region where rounding opens the mechanism on it.
 
     Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is
     nearest to the sketch.
     """
     mechanism, sides = field.mechanism, np.flatnonzero(np.diff(inwards)) + 1
-    exact, near = field.configuration(z, {}), field.configuration(within, {})
     drives = []
     for drive in mechanism.forward.structure.given:
-        here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
+        here, beside = (np.broadcast_to(pose.value(drive), inwards.shape) for pose in (exact, within))
         values = np.where(np.isfinite(here), here, beside)
         if drive.quantity == "angle" and drive.name not in mechanism.turns({}):
             drawn = float(mechanism.sketch_configuration.value(drive))
@@ -103,17 +107,13 @@ def _drives(field: Field, z: Complexes, within: Complexes, inwards: Floats) -> l
     return drives
 
 
-def poses_along(study: Study, held: Mapping[str, float], boundary: Boundary) -> Configuration:
+def poses_along(field: Field, boundary: Boundary) -> Configuration:
     """Poses at places a little inside the boundary, evenly along each of its sides, shape (places,).
 
-    `held` are the coordinates that are held, in the study's units; pieces that are left out do not count.
+    Pieces that are left out do not count.
     """
-    mechanism, section = study.mechanism, WorkspaceSection.of(study)
-    own = boundary.piece == 1 if section.assembly == "same" else np.ones(len(boundary.z), dtype=bool)
-    places = _places(boundary.z[own], boundary.side[own], boundary.curve[own])
-    plan = mechanism.plan((f"{section.point}.x", f"{section.point}.y", *held))
-    values = [radians(study, mechanism.coordinate(name), value) for name, value in held.items()]
-    return plan.solve([places.real, places.imag, *values], limits=False)
+    own = boundary.piece == 1 if field.same_assembly else np.ones(len(boundary.z), dtype=bool)
+    return field.poses(_places(boundary.z[own], boundary.side[own], boundary.curve[own]))
 
 
 def _places(z: Complexes, side: np.ndarray, curve: Ints) -> Complexes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -17,15 +19,20 @@ INSCRIBED = (
 BORDER = 1e-6
 
 
-def inscribed(panels: Panels) -> Floats:
-    """The largest circle and rectangle inside the region of a single design, as `INSCRIBED` names it."""
-    unit = float(panels.reach[0])
-    radius, circle = fitted(Shape(2 * unit, 2 * unit, round=True), panels)
-    factor, rectangle = fitted(Shape(unit, unit, round=False, stretches=True), panels)
-    places = (np.asarray(shape.centre)[0] for shape in (circle, rectangle))
-    (x, y), (middle_x, middle_y) = ((z.real, z.imag) for z in places)
-    sides = factor * [rectangle.width, rectangle.height]
-    return np.array([x, y, unit * radius[0], middle_x, middle_y, *sides[:, 0]])
+def inscribed(panels: Panels, names: Collection[str] = INSCRIBED) -> dict[str, Floats]:
+    """The largest circle and rectangle inside the region of each design, those of which there are `names`."""
+    unit, sizes = panels.reach, dict[str, Floats]()
+    for name, shape in (
+        ("circle", Shape(2 * unit, 2 * unit, round=True)),
+        ("rectangle", Shape(unit, unit, round=False, stretches=True)),
+    ):
+        if not any(column.startswith(name) for column in names):
+            continue
+        factor, largest = fitted(shape, panels)
+        centre = np.asarray(largest.centre)
+        sizes |= {f"{name}_x": centre.real, f"{name}_y": centre.imag, f"{name}_width": factor * largest.width}
+        sizes |= {f"{name}_height": factor * largest.height, f"{name}_radius": 0.5 * factor * largest.width}
+    return {name: sizes[name] for name in names}
 
 
 def crossed(shapes: Floats, z: Complexes) -> list[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.mechanism.algebra import quiet
+from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, Ints
@@ -81,7 +83,7 @@ def point_path(study: Study) -> Result:
     """
     (drive,), point = study.mechanism.drives, WorkspaceSection.of(study).point
     outputs = (f"{point}.x", f"{point}.y")
-    paths = _paths(study, drive, outputs)
+    paths = _of_modes(study, drive, outputs)
     label, length = study.units.label(study.mechanism.quantity(drive)), study.units.label("length")
     power = "" if study.mechanism.quantity(drive) == "length" else length
     coordinate, t = study.mechanism.coordinate(drive), np.linspace(0, np.pi, ROWS)
@@ -127,8 +129,21 @@ def point_path(study: Study) -> Result:
     return Result("workspace", {table.name: table for table in tables}, (), {"paths": len(paths)})
 
 
+def _of_modes(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
+    """The motions in the sketch's assembly mode, and with ``assembly: any`` in every other that has one."""
+    own = _paths(study, drive, outputs)
+    if WorkspaceSection.of(study).assembly == "same":
+        return own
+    others: list[_Path] = []
+    for mode in assemblies(study.mechanism, (drive,)):
+        if not mode.drawn:
+            with suppress(AssemblyError):
+                others += _paths(replace(study, mechanism=mode.mechanism), drive, outputs)
+    return [*own, *others]
+
+
 def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
-    """The motions of the mechanism: that of the sketch, or of every range in which it can be assembled."""
+    """The motions of an assembly mode: that of the sketch, or of every range in which it can be assembled."""
     mechanism = study.mechanism
     coordinate = mechanism.coordinate(drive)
     drawn = float(mechanism.sketch_configuration.value(coordinate))

@@ -13,10 +13,13 @@ from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.index import Prepared, prepare
+from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.ranged import Every, Ranged, Some, SomeDesigns
 from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.questions.workspace.strips import Integrand
-from mechdesign.region.rays import Designs
+from mechdesign.region.any_mode import AnyMode, AnyModeDesigns, in_any_assembly
+from mechdesign.region.field import Field, Places
+from mechdesign.region.rays import Designs, Effort
 from mechdesign.region.regions import Region, problem, regions
 from mechdesign.study import Study
 from mechdesign.study.text.fields import parts_of
@@ -44,8 +47,6 @@ class Question(Region):
         Columns of the answer.
     shown : tuple of Prepared
         Local indices of the table of nodes: those of `MEANS`, then the others.
-    rays_through : type of Designs
-        How rays meet the region of the field.
     """
 
     counted: tuple[float, float]
@@ -55,7 +56,17 @@ class Question(Region):
     indices: tuple[Prepared, ...]
     columns: tuple[str, ...]
     shown: tuple[Prepared, ...]
-    rays_through: type[Designs] = Designs
+
+    @property
+    def ranged(self) -> bool:
+        """Whether it is of a range of a held coordinate."""
+        return isinstance(self.field.members[0], Ranged)
+
+    def designs(self, places: Places, count: int, effort: Effort) -> Designs:
+        """`count` designs, whose changed places are arrays of shape (count,), and how rays meet their regions."""
+        of_mode = SomeDesigns if isinstance(self.field.members[0], Some) else Designs
+        common = self.field, places, count, self.about, self.scan, effort
+        return AnyModeDesigns(*common, of_mode=of_mode) if isinstance(self.field, AnyMode) else of_mode(*common)
 
     @cached_property
     def statistics(self) -> dict[str, tuple[str, str]]:
@@ -106,13 +117,13 @@ def shared(study: Study, questions: Sequence[Question], moved: Collection[str]) 
     numbers = [part for key, part in parts_of(study.workspace, "workspace") if not key.startswith(of_field)]
     followed = {name for part in numbers if isinstance(part, Amount) and part.expression
                 for name in part.expression.names}  # fmt: skip
-    return not isinstance(field, Ranged) and followed.union(study.fixed).isdisjoint(moved)
+    return not questions[0].ranged and followed.union(study.fixed).isdisjoint(moved)
 
 
 def batched(column: str) -> bool:
-    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    """Whether a column is evaluated for many designs at once: area, shapes, and what the Jacobian gives."""
     name = split(column)[0]
-    return column in COLUMNS or bool(name and needed_section(name) is None)
+    return column in (*COLUMNS, *INSCRIBED) or bool(name and needed_section(name) is None)
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str] | None = None) -> list[Question]:
@@ -179,6 +190,6 @@ def _over_range(
             )
             raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
         common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
-        field = (Every if over.all else Some)(*common, list(section.at).index(name), low, high)
+        field: Field = (Every if over.all else Some)(*common, list(section.at).index(name), low, high)
         held = {k: v for k, v in question.held.items() if k != name}
-        yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)
+        yield replace(question, field=field if field.same_assembly else in_any_assembly(field), held=held)

@@ -13,8 +13,8 @@ from mechdesign.questions.workspace.boundary import Boundary, boundary_of
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.nodes import Nodes, nodes_of
 from mechdesign.questions.workspace.question import OF_RANGE, Question
-from mechdesign.questions.workspace.ranged import Ranged
 from mechdesign.questions.workspace.singularities import Locus, causes, loci
+from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.patches import Patch, patches_of_pieces
 from mechdesign.region.rays import SINGLE, Effort
 from mechdesign.region.regions import RAYS
@@ -66,10 +66,10 @@ def reach(question: Question) -> Reached:
     AssemblyError
         If the region has no end.
     """
-    ranged = isinstance(question.field, Ranged)
+    ranged = question.ranged
     singular = not ranged and question.field.singular_everywhere
     if singular:
-        question = replace(question, field=replace(question.field, same_assembly=False))
+        question = replace(question, field=in_any_assembly(question.field))
         evaluation = answer(replace(question, indices=(), columns=OF_RANGE), {}, 1, SINGLE)
         nothing = {name: np.full(1, np.nan) for name in question.columns}
         evaluation = replace(evaluation, values=nothing | evaluation.values, errors=nothing | evaluation.errors)
@@ -86,7 +86,6 @@ def reach(question: Question) -> Reached:
     region = Reached(question, evaluation, singular, patches, pieces, everywhere, boundary=boundary)
     if ranged:
         return region
-    return replace(
-        region, shapes=inscribed(evaluation.panels), nodes=nodes_of(field, question.shown, patches),
-        loci=loci(field, reasons, patches, singular=singular),
-    )  # fmt: skip
+    shapes = np.concatenate(list(inscribed(evaluation.panels).values()))
+    curves = loci(field, reasons, patches, singular=singular)
+    return replace(region, shapes=shapes, nodes=nodes_of(field, question.shown, patches), loci=curves)

@@ -12,7 +12,6 @@ from mechdesign.errors import AssemblyError
 from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.quadrature import FINEST_AREA
 from mechdesign.questions.workspace.question import Question
-from mechdesign.questions.workspace.ranged import Ranged
 from mechdesign.questions.workspace.reached import Reached
 from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.study import Study
@@ -26,7 +25,7 @@ ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; re
 def remarks(study: Study, region: Reached, row: int) -> Iterator[Caution]:
     """Warnings about one region, which is a row of the indices."""
     question, there = region.question, region.question.where
-    ranged = isinstance(question.field, Ranged)
+    ranged = question.ranged
     if region.singular:
         words = f"every pose{there} is a forward singularity: indices have no value"
         yield Caution("singular", words, "indices", row)
@@ -135,12 +134,12 @@ def _left_out(study: Study, region: Reached) -> Caution:
 
 
 def _in_other_assembly(study: Study, region: Reached) -> Caution:
-    """That more lies in the other assembly than in the piece that is reported, with both areas."""
+    """That more lies in other assemblies than in the piece that is reported, with both areas."""
     unit = study.units.label("area")
     inside, beyond = (f"{area:.3g} {unit}".rstrip() for area in (sum(region.areas[:1]), region.beyond))
     return Caution(
         "incomplete",
-        f"more of the region{region.question.where} lies beyond a forward singularity, in the other assembly: about "
-        f"{beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch in the other assembly",
+        f"more of the region{region.question.where} lies beyond a forward singularity or with other elbows, in another "
+        f"assembly: about {beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch there",
         "indices",
     )

@@ -25,7 +25,7 @@ _RULES = {
 }
 _ASSEMBLIES = {
     "same": "at singularities, where another assembly begins; of several pieces that of the sketch counts",
-    "any": "nowhere else: places reached in the other assembly count as well",
+    "any": "nowhere else: places reached in any other assembly count as well, and with any elbows",
 }
 
 

@@ -64,6 +64,9 @@ def causes(field: Field) -> list[tuple[str, str]]:
         # Those inside the range, at its low end and at its high end; then pairs that leave no value between them.
         single = causes(field.sliced)
         return [*single * 3, *((kind, f"{one} and {other}") for kind, one in single for _, other in single)]
+    if len(field.members) > 1:
+        first = field.members[0]
+        return causes(first)[: len(first.labels)] * len(field.members)
     names = forward_names(field.mechanism)
     stated = {bound.label: bound.coordinate.name for bound in field.mechanism.bounds}
     words = []

@@ -63,8 +63,8 @@ def curves(table: Table) -> Iterator[Ints]:
 def index_columns(study: Study, question: Question) -> dict[str, Column]:
     """The columns of the answer, without values."""
     words = study.units.labels | {"as resistivity": index("resistivity").unit(study, question.field)}
-    kinds = {column.name: column for column in INDICES.columns(words, **dict.fromkeys(COLUMNS, ()))}
-    for name in (name for name in question.columns if name not in COLUMNS):
+    kinds = {column.name: column for column in INDICES.columns(words, **dict.fromkeys((*COLUMNS, *INSCRIBED), ()))}
+    for name in (name for name in question.columns if name not in kinds):
         local, kind = split(name)
         words = {"index": local, "meaning of the index": index(local).meaning}
         kinds[name] = INDICES[f"<index>_{kind}"].column((), index(local).unit(study, question.field), **words)

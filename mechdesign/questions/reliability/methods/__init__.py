@@ -42,7 +42,8 @@ def run(name: str, task: Task) -> MethodResult:
 def normal(task: Task, mean: Floats, covariance: Floats) -> MethodResult:
     """Result for normal errors with these means, shape (channels, poses), and covariances, (poses, channels, channels).
 
-    The channels are those of the linear model's `whole`. Its estimates have no interval.
+    The channels are those of the linear model's `whole`. Its estimates have no interval but that of limits
+    whose common probability is sampled.
     """
     estimates = of_normal(task, task.question, mean, covariance) if task.question.limited else {}
     return MethodResult(estimates, normal=(mean, covariance))
@@ -59,8 +60,9 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
     rows = np.flatnonzero(task.assembled)
     question = question.take(rows).at(task.nominal[:, rows])
     linear, closing = task.linear.take(rows), task.closing.take(rows)
-    values = made_failure(linear, closing, question.bands, question.discs, mean.T[rows], covariance[rows])
-    return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
+    values = np.stack(made_failure(linear, closing, question.bands, question.discs, mean.T[rows], covariance[rows]))
+    return {pose: Estimate(value, max(value - doubt, 0.0), min(value + doubt, 1.0), 0)
+            for pose, (value, doubt) in zip(rows.tolist(), values.T.tolist(), strict=True)}  # fmt: skip
 
 
 def pose_by_pose(task: Task, work: Callable[[Task, Setting], MethodResult]) -> MethodResult:

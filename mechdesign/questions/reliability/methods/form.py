@@ -68,7 +68,7 @@ def form(problem: Problem, points: DesignPoints) -> Estimate:
     if len(points.u) and len(problem.circles):
         value = _mean(problem, points)
     else:
-        value = half_spaces(points.normal, points.distance)
+        value, _ = half_spaces(points.normal, points.distance)
     return Estimate(value, value, value, problem.evaluations)
 
 

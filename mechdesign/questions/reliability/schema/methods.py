@@ -63,7 +63,8 @@ class Method:
     @property
     def detail(self) -> str:
         """What it computes, when to use it, how accurate it is, and the keys that it takes."""
-        interval = "a 99.7 % interval" if self.sampled else "no interval: it is as good as its model"
+        many = ", but where many limits are summed by sampling" if self.pin == "analytic" else ""
+        interval = "a 99.7 % interval" if self.sampled else f"no interval{many}: it is as good as its model"
         keys = ["samples"] * self.sampled + ["precision"] * self.precise + [f"clearances.*.pin.{self.pin}"]
         return (
             f"{self.meaning[0].upper()}{self.meaning[1:]}. {self.use} Its probability of failure has {interval}. "

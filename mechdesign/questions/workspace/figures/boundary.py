@@ -13,9 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, evenly
-from mechdesign.questions.poses import in_study_units, radians
+from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
     ROOM,
@@ -33,6 +32,7 @@ from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
+from mechdesign.region.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -117,11 +117,8 @@ def _pose_inside(study: Study, region: Region) -> Configuration:
 
 def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = slice(None)) -> Configuration:
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
-    point, local = WorkspaceSection.of(study).point, region.local
-    coordinates: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
-    plan = study.mechanism.plan(tuple(coordinates))
-    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in coordinates.items()]
-    return plan.solve(np.broadcast_arrays(*values), limits=False)
+    field = next(own.field for own in regions(study) if own.held == region.held)
+    return field.poses(places(region.local)[rows])
 
 
 @picture(WorkspaceView, "inscribed", order=50)

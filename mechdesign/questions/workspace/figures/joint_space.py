@@ -85,7 +85,9 @@ def _page(study: Study, drawn: Complexes, *, cut: bool) -> tuple[Axes, Sheet]:
         room, height = scale * wide, scale * tall * stretch
     figure, (axes,) = style.page(1, 1, height, left=LEFT, right=style.width() - LEFT - room, top=_ABOVE,
                                  bottom=BELOW + _LEGEND)  # fmt: skip
-    note = "joint space, in the working mode of the sketch" + "; cut open at edges without a line" * cut
+    any_mode = study.workspace is not None and study.workspace.assembly == "any"
+    note = f"joint space, in the working mode {'that counts at each place' if any_mode else 'of the sketch'}"
+    note += "; cut open at edges without a line" * cut
     if stretch != 1.0:
         note += f"; {names[stretch > 1]} drawn {max(stretch, 1 / stretch):g} times larger"
     title(figure, "Workspace in the plane of the drives", note, left=LEFT)

@@ -55,7 +55,8 @@ def prepare(study: Study) -> Evaluate:
         )[:-1])  # fmt: skip
         linear = model_of(question, linear, nominal)
         bands = question.at(nominal).bands
-        return 1.0 - made_failure(linear, linear_margins(mechanism, configuration, sources), bands, question.discs)
+        margins = linear_margins(mechanism, configuration, sources)
+        return 1.0 - made_failure(linear, margins, bands, question.discs)[0]
 
     return of_configurations(evaluate)
 

@@ -1,0 +1,176 @@
+"""Regions in any assembly: where the point can be with some way of putting the legs together, both elbows of an arm.
+
+Each assembly mode has a region of its own, and a place belongs to the first mode, the sketch's before others, that
+reaches it. Along a ray an interval ends, too, where the mode changes, so that indices are smooth within each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.plan import Plan
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.region.field import Field, Places
+from mechdesign.region.rays import NARROWEST, SAME_ROOT, Designs, Intervals, intervals_between
+
+
+def in_any_assembly(field: Field) -> Field:
+    """The field without margins of the assembly, in every mode in which limits are met elsewhere.
+
+    Poses that are continued, as the inverse problem has no closed form, stay in the mode of the sketch.
+    """
+    drawn, choosing = replace(field, same_assembly=False), _choosing(field.plan)
+    if not choosing:
+        return drawn
+    given = tuple(output.name for output in drawn.outputs)
+    every = [mode.mechanism.plan(given) for mode in assemblies(drawn.mechanism, given, choosing) if not mode.drawn]
+    modes = (drawn, *(replace(drawn, plan=plan) for plan in every))
+    return AnyMode(drawn.mechanism, drawn.plan, drawn.held, False, drawn.length, modes)
+
+
+def _choosing(plan: Plan) -> list[int]:
+    """Groups of a plan whose mode decides on a limit, or on whether groups that are solved later close."""
+    if plan.iterative:
+        return []
+    core, structure = plan.core, plan.structure
+    behind = frozenset[int]().union(*(structure.behind(bound.coordinate, core.graph) for bound in core.bounds))
+    later = frozenset[int]().union(*(chain - {index} for index, chain in enumerate(structure.chains)))
+    # A telescopic leg has no length in its other mode.
+    legs = {index for index, group in enumerate(structure.groups)
+            if group.form == "angle and turning slide" and core.graph.telescopic.issuperset(group.slides)}  # fmt: skip
+    return [index for index, mode in enumerate(plan.modes) if mode and index in (behind | later) - legs]
+
+
+@dataclass(frozen=True, eq=False)
+class AnyMode(Field):
+    """A field in any of several assembly modes, each a field of its own, the sketch's first.
+
+    Its margins are those of all modes, one mode after the other; those of one mode are positive inside the region.
+    """
+
+    modes: tuple[Field, ...] = ()
+
+    @property
+    def members(self) -> tuple[Field, ...]:
+        """The field of each mode."""
+        return self.modes
+
+    @property
+    def accuracy(self) -> float:  # type: ignore[override]
+        """Accuracy of the ray angles at which the region's bounding margins change (radians)."""
+        return self.modes[0].accuracy
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Kind and cause of the margins."""
+        return self.modes[0].labels * len(self.modes)
+
+    @property
+    def singular(self) -> Flags:
+        """Which margins vanish where a leg is stretched or folded."""
+        return np.tile(self.modes[0].singular, len(self.modes))
+
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
+        """As `Field.margins`, of all modes."""
+        return np.concatenate([mode.margins(z, places, assembly=assembly) for mode in self.modes])
+
+    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
+        """As `Field.sampled`; the turn is the largest in any mode."""
+        margins, turned = zip(*(mode.sampled(z, places) for mode in self.modes), strict=True)
+        return np.concatenate(margins), np.fmax.reduce(turned)
+
+    def poses(self, z: Complexes) -> Configuration:
+        """As `Field.poses`, each place in the mode of `configuration`."""
+        pose = self.configuration(z, {})
+        closed = np.logical_and.reduce([np.isfinite(np.broadcast_to(node, z.shape)) for node in pose.nodes])
+        return replace(pose, reason=np.where(closed, Reason.OK, Reason.NOT_CLOSED).astype(np.int8))
+
+    def configuration(self, z: Complexes, places: Places, modes: Sequence[Value] | None = None) -> Configuration:
+        """As `Field.configuration`, each place in the first mode that reaches it, or that comes nearest to."""
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            least = np.stack([mode.margins(z, places).min(axis=0, initial=np.inf) for mode in self.modes])
+        least = np.where(np.isnan(least), -np.inf, least)
+        first = np.where((least > 0).any(axis=0), (least > 0).argmax(axis=0), least.argmax(axis=0))
+        return self._in_modes(z, places, first)
+
+    def on_boundary(self, z: Complexes, margin: Ints) -> Configuration:
+        """As `Field.on_boundary`, in the mode that has the margin."""
+        return self._in_modes(z, {}, margin // len(self.modes[0].labels))
+
+    def _in_modes(self, z: Complexes, places: Places, chosen: Ints) -> Configuration:
+        """Each place in the mode of the number `chosen`."""
+        signs = np.array([mode.plan.modes for mode in self.modes])
+        pose = super().configuration(z, places, [*np.moveaxis(signs[chosen], -1, 0)])
+        nears = [mode.near(z, places) for mode in self.modes]
+        every = range(len(nears))
+        near = {name: np.select([chosen == k for k in every], [nears[k][name] for k in every]) for name in nears[0]}
+        return replace(pose, near=near)
+
+
+@dataclass(frozen=True, eq=False)
+class AnyModeDesigns(Designs):
+    """Rays through a region of `AnyMode`; those of each mode are traced as `of_mode`."""
+
+    of_mode: type[Designs] = Designs
+
+    @cached_property
+    def members(self) -> tuple[Designs, ...]:
+        """The designs in each mode."""
+        common = self.places, self.count, self.about, self.scan, self.effort, self.centres
+        return tuple(self.of_mode(field, *common) for field in self.field.members)
+
+    @property
+    def in_any_assembly(self) -> Designs:
+        """The same designs: no margin of the assembly is among theirs."""
+        return self
+
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
+        """As `Designs.look`, with the margins of all modes."""
+        inside, margins = zip(*(mode.look(z, design, assembly=assembly) for mode in self.members), strict=True)
+        return np.logical_or.reduce(inside), np.concatenate(margins)
+
+    def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
+        """As `Designs.traced`: the intervals of each mode, less those of the modes before it."""
+        first, *others = (mode.traced(design, theta, reach, slack) for mode in self.members)
+        labels = len(self.members[0].field.labels)
+        for number, other in enumerate(others, start=1):
+            first = _with(first, _renamed(other, number * labels), reach, slack)
+        return first
+
+
+def _renamed(intervals: Intervals, shift: int) -> Intervals:
+    """Intervals whose labels are counted from `shift`."""
+    enters, leaves = (np.where(ends >= 0, ends + shift, ends) for ends in (intervals.enters, intervals.leaves))
+    return replace(intervals, enters=enters, leaves=leaves)
+
+
+def _with(before: Intervals, other: Intervals, reach: Floats, slack: float) -> Intervals:
+    """Intervals of both on the same rays, the other ones less those `before`; ends at which both meet are the same."""
+    # Of the other ones an end is a root of their own margin, and the gaps between those before are where another is
+    # positive: its roots keep the names of the margins that bound the gap.
+    rising = [(other.enters, other.inner, other.ray), (before.leaves, before.outer, before.ray)]
+    falling = [(other.leaves, other.outer, other.ray), (before.enters, before.inner, before.ray)]
+    roots = [tuple(values[ends[0] >= 0] for values in ends) for ends in (*rising, *falling)]
+    margin, radius, ray = (np.concatenate(column) for column in zip(*roots, strict=True))
+    turn = np.repeat([1, 1, -1, -1], [len(root[0]) for root in roots])
+    rays = len(reach)
+    start = 1 - np.bincount(other.ray[other.enters < 0], minlength=rays)
+    start = start + np.bincount(before.ray[before.enters < 0], minlength=rays)
+    rest = intervals_between(margin, ray, turn, radius, start, reach, slack)
+    # What rounding leaves beside an interval is none; by itself it may be the tip of a cusp.
+    tie = SAME_ROOT * reach[rest.ray]
+    beside = np.zeros(len(rest.ray), dtype=bool)
+    for inner, outer in zip(*before.by_ray(before.inner, before.outer), strict=True):
+        beside |= (inner[rest.ray] <= rest.outer + tie) & (rest.inner - tie <= outer[rest.ray])
+    rest = rest.kept((rest.outer - rest.inner > NARROWEST * reach[rest.ray]) | (~beside & (slack > 0)))
+    order = np.lexsort((np.concatenate([before.inner, rest.inner]), np.concatenate([before.ray, rest.ray])))
+    columns = {name: np.concatenate([getattr(before, name), getattr(rest, name)])[order]
+               for name in ("ray", "inner", "outer", "enters", "leaves")}  # fmt: skip
+    return Intervals(**columns, beyond=before.beyond | other.beyond, cut=before.cut | other.cut)
