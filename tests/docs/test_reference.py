@@ -7,6 +7,7 @@ import json
 import re
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import examples
@@ -79,6 +80,14 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     cases = study_of(FOUR_BAR, "matrix.vary={mechanism.links.rod.length: [85, 90]}",
                      "matrix.best={maximize: kinematics.B.x.max}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "study.yaml").write_text(FOUR_BAR, encoding="utf-8")
+        (Path(folder) / "cases.csv").write_text(
+            "label,mechanism.links.rod.length\nshort,85\nlong,90\n", encoding="utf-8"
+        )
+        labelled = mechdesign.load(Path(folder) / "study.yaml", [
+            "matrix={cases: cases.csv, results: [kinematics.B.x.max]}"
+        ])  # fmt: skip
     slopes = study_of(
         FOUR_BAR,
         "kinematics={poses: [{crank: 30}], outputs: [B]}",
@@ -133,6 +142,7 @@ dynamics: {gravity: [0, -9.81 m/s^2], rates: {arm: 10}, flywheel: {fluctuation: 
         ("modes", mechdesign.kinematics(four, all_modes=True), four),
         ("centres", mechdesign.kinematics(four), four),
         ("cases", mechdesign.sweep(cases), cases),
+        ("labels", mechdesign.sweep(labelled), labelled),
         ("slopes", mechdesign.sensitivities(slopes), slopes),
         ("range", mechdesign.workspace(ranged), ranged),
         ("graded", mechdesign.reliability(graded), graded),

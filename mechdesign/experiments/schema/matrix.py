@@ -174,7 +174,7 @@ class Best(fields.Model):
         return self
 
 
-class Table(NamedTuple):
+class CaseTable(NamedTuple):
     """A file of cases: the entries that vary, a row of values for each case, and the labels, if it has any."""
 
     names: tuple[str, ...]
@@ -236,7 +236,7 @@ class MatrixSection(fields.Model):
                 check_result(checker, result.result, (*place, k))
         return self
 
-    def table(self, folder: Folder) -> Table:
+    def table(self, folder: Folder) -> CaseTable:
         """Names of entries, values and labels of the cases, as their file has them.
 
         Raises
@@ -259,7 +259,7 @@ class MatrixSection(fields.Model):
             if len(row) != len(head):
                 raise StudyError(f"{self.cases}:{number}: {len(row)} values for {len(head)} names")
         labels = tuple(printable(row[head.index(LABEL)]) for _, row in lines) if LABEL in head else ()
-        return Table(tuple(names), tuple(self._row(number, head, row) for number, row in lines), labels)
+        return CaseTable(tuple(names), tuple(self._row(number, head, row) for number, row in lines), labels)
 
     def _row(self, number: int, head: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:
         values: list[Any] = []
