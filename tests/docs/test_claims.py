@@ -123,3 +123,12 @@ def test_pages_for_contributors_name_every_folder_and_files_that_exist() -> None
     for page in ("index", "adding", "testing"):
         for path in re.findall(r"`((?:mechdesign|tests|docs|configs)/[\w./-]+)`", read(f"docs/contributing/{page}.md")):
             assert (ROOT / path).exists(), path
+
+
+def test_pages_of_results_show_every_study_of_the_gallery_and_pictures_that_exist() -> None:
+    gallery = read("results/gallery/README.md")
+    for study in (ROOT / "configs" / "gallery").glob("*.yaml"):
+        assert f"]({study.stem})" in gallery, study.stem
+    for page in ("results/README.md", "results/gallery/README.md"):
+        for path in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", read(page)):
+            assert ((ROOT / page).parent / path).exists(), path
