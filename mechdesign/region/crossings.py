@@ -121,7 +121,7 @@ def resolved(
             for table, new in zip((lane, place, values, rotations), (*more, *at_more), strict=True)
         )
         order = np.lexsort((place, lane))
-        lane, place, values, rotations = (table[..., order] for table in (lane, place, values, rotations))
+        lane, place, values, rotations = lane[order], place[order], values[:, order], rotations[:, order]
     lane, place, values = (np.concatenate(part, axis=-1) for part in zip(*done, strict=True))
     order = np.argsort(lane, kind="stable")
     doubt_lane, doubt = (np.concatenate(part) for part in zip(*left, strict=True))
@@ -152,9 +152,9 @@ def _open(
         # A margin that touches zero changes no sign.
         doubtful &= (bend > safety * noise) & (least > noise)
         doubtful[legs] = 4 * np.maximum(size[legs, 1:], size[legs, :-1]) <= bend[legs]
-        turned = (norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
+        turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
     outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
-    return ((doubtful.any(axis=0) & ~outside) | turned) & same
+    return np.asarray(((doubtful.any(axis=0) & ~outside) | turned) & same)
 
 
 def _without_rounding(values: Floats, lane: Ints, noise: Floats) -> Floats:

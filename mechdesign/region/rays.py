@@ -172,12 +172,13 @@ class Designs:
     ) -> Intervals:
         """Intervals less the parts where one of the margins `rows`, where it is `counted`, is negative or unknown."""
         width = intervals.outer - intervals.inner
-        sampled = np.flatnonzero(counted.any(axis=0)[intervals.ray] & (width > slack * reach[intervals.ray]))
+        sampled = np.flatnonzero(
+            np.asarray(counted.any(axis=0))[intervals.ray] & (width > slack * reach[intervals.ray])
+        )
         if not sampled.size:
             return intervals
-        owner, inner, outer, width = (
-            values[sampled] for values in (intervals.ray, intervals.inner, intervals.outer, width)
-        )
+        owner, width = intervals.ray[sampled], width[sampled]
+        inner, outer = intervals.inner[sampled], intervals.outer[sampled]
         local = self.of(design[owner])
         start, direction = self.starts(design[owner]), np.exp(1j * theta[owner])
         # Links turn as the square roots of the margins of legs that are solved already.

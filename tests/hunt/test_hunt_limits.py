@@ -1,7 +1,7 @@
 """Regions between limits of angles and stretched or folded legs, against the plane of the joint angles.
 
-In the sketch's assembly modes a place of the point belongs to one pair of joint angles, so that the area is the integral
-of the Jacobian's determinant over the pairs within the limits. However narrow a limit is, that is a smooth sum.
+In the sketch's assembly modes a place of the point belongs to one pair of joint angles, so that the area is the
+integral of the Jacobian's determinant over the pairs within the limits: a smooth sum, however narrow a limit is.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def asked(text: str, effort: Effort, tolerance: float, *columns: str) -> list[tu
 
 @dataclass(frozen=True)
 class FiveBar:
-    """Motors in `bases` turn `cranks`; `rods` meet in a pin, and the point `at` is fixed to the first rod (its frame)."""
+    """Motors in `bases` turn `cranks`; `rods` meet in a pin, and the point `at` is fixed to the first rod."""
 
     bases: Complex
     cranks: np.ndarray
