@@ -133,6 +133,8 @@ def _open(
 ) -> Flags:
     """Which cells between neighbouring samples may hide sign changes inside the region."""
     same = lane[1:] == lane[:-1]
+    if not same.size:
+        return np.zeros(0, dtype=bool)
     width = np.where(same, np.diff(place), 1.0)
     positive, size, noise = values > 0, np.abs(values), noise[:, None]
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
