@@ -27,6 +27,9 @@ SAFETY = 4.0
 FARTHEST_TURN = 0.5
 # Where a cell is divided, as parts of it.
 DIVIDED = np.array([0.25, 0.5, 0.75])
+# Where a margin may dip below zero, or rise above it, samples are so far on either side of its parabola's vertex (part of
+# the cell); the third is in the middle of what is left.
+BESIDE = 0.02
 # Cells of one lane that are divided at once; where more are in doubt, they are rounding's.
 MOST_CELLS = 96
 
@@ -102,7 +105,8 @@ def resolved(
     done: list[tuple[Ints, Floats, Floats]] = []
     lanes, left = len(nearest), [(lane[:0], place[:0])]
     while True:
-        cell = np.flatnonzero(_open(lane, place, values, rotations, noise, legs, safety))
+        undecided, parts = _open(lane, place, values, rotations, noise, legs, safety)
+        cell = np.flatnonzero(undecided)
         number = np.bincount(lane[cell], minlength=lanes)
         wide = (place[cell + 1] - place[cell] > nearest[lane[cell]]) & (number[lane[cell]] <= MOST_CELLS)
         left.append((lane[cell[~wide]], 0.5 * (place[cell] + place[cell + 1])[~wide]))
@@ -113,7 +117,7 @@ def resolved(
         done.append((lane[ready], place[ready], values[:, ready]))
         if not cell.size:
             break
-        between = place[cell] + DIVIDED[:, None] * (place[cell + 1] - place[cell])
+        between = place[cell] + parts[:, cell] * (place[cell + 1] - place[cell])
         more = np.tile(lane[cell], len(DIVIDED)), between.ravel()
         at_more = look(*more)
         lane, place, values, rotations = (
@@ -130,11 +134,12 @@ def resolved(
 
 def _open(
     lane: Ints, place: Floats, values: Floats, rotations: Complexes, noise: Floats, legs: Flags, safety: float
-) -> Flags:
-    """Which cells between neighbouring samples may hide sign changes inside the region."""
+) -> tuple[Flags, Floats]:
+    """Which cells between neighbouring samples may hide sign changes inside the region; and where to divide each."""
     same = lane[1:] == lane[:-1]
+    parts = np.tile(DIVIDED[:, None], len(same))
     if not same.size:
-        return np.zeros(0, dtype=bool)
+        return same, parts
     width = np.where(same, np.diff(place), 1.0)
     positive, size, noise = values > 0, np.abs(values), noise[:, None]
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -146,17 +151,25 @@ def _open(
             one, two = at + step, at + 2 * step
             share = (place[one] - place[at]) / (place[two] - place[one])
             second[:, at] = second[:, one] + share * (second[:, one] - second[:, two])
-        second = np.abs(second)
-        bend = np.fmax(second[:, 1:], second[:, :-1])
-        bend = safety * bend * width**2
+        bend = np.fmax(np.abs(second[:, 1:]), np.abs(second[:, :-1]))
+        # Where bends hardly change from sample to sample they are known the better.
+        varies = np.abs(np.diff(second))
+        beside = varies.copy()
+        beside[:, 1:] = np.where(same[:-1], np.fmax(beside[:, 1:], varies[:, :-1]), beside[:, 1:])
+        beside[:, :-1] = np.where(same[1:], np.fmax(beside[:, :-1], varies[:, 1:]), beside[:, :-1])
+        bend = np.fmin(safety * bend, bend + safety * beside) * width**2
         least = np.minimum(size[:, 1:], size[:, :-1])
         doubtful = (2 * np.abs(change) <= bend) & ((positive[:, 1:] != positive[:, :-1]) | (8 * least <= bend))
         # A margin that touches zero changes no sign.
         doubtful &= (bend > safety * noise) & (least > noise)
         doubtful[legs] = 4 * np.maximum(size[legs, 1:], size[legs, :-1]) <= bend[legs]
+        row, cell = np.nonzero(doubtful & (positive[:, 1:] == positive[:, :-1]) & same)
+        middle = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
+        vertex = np.clip(np.nan_to_num(0.5 - change[row, cell] / middle, nan=0.5), 2 * BESIDE, 1 - 2 * BESIDE)
+        parts[:, cell] = np.sort([vertex - BESIDE, vertex + BESIDE, np.where(vertex < 0.5, 1 + vertex, vertex) / 2], axis=0)
         turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
     outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
-    return np.asarray(((doubtful.any(axis=0) & ~outside) | turned) & same)
+    return np.asarray(((doubtful.any(axis=0) & ~outside) | turned) & same), parts
 
 
 def _without_rounding(values: Floats, lane: Ints, noise: Floats) -> Floats:

@@ -177,12 +177,14 @@ class Designs:
         )
         if not sampled.size:
             return intervals
+        first, rows = rows[0], rows[counted.any(axis=1)]
+        counted = counted[counted.any(axis=1)]
         owner, width = intervals.ray[sampled], width[sampled]
         inner, outer = intervals.inner[sampled], intervals.outer[sampled]
         local = self.of(design[owner])
         start, direction = self.starts(design[owner]), np.exp(1j * theta[owner])
         # Links turn as the square roots of the margins of legs that are solved already.
-        legs = np.flatnonzero(self.field.singular[: rows[0]])
+        legs = np.flatnonzero(self.field.singular[:first])
         assembly = bool(rows[-1] == len(self.field.labels) - 1)
         expressions = any(bound.coordinate.kind == "expression" for bound in self.field.mechanism.bounds)
 
