@@ -121,14 +121,21 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         cut |= np.bincount(probed.ravel(), traced.cut, count) > 0
         codes = signatures(traced, len(designs.field.labels)).reshape(rays.shape)
         differ = (codes != codes[0]).any(axis=0) & wide
+        # What closes within a hair of a break is no interval of the panel. Names may be rounding's there.
+        ends, each = np.stack([begin + TOGETHER, end - TOGETHER]), np.tile(owner[tested], 2)
+        near = np.flatnonzero(~np.isin([begin, end], fixed[1]) & wide)
+        counts = traced.counts.reshape(rays.shape)[[0, -1]].ravel()
+        at_ends = trace(designs, each[near], ends.ravel()[near], reach[each[near]]).counts
+        differ[near[at_ends != counts[near]] % len(wide)] = True
         panel, between, jump = _along_ends(designs, probed[0], rays, traced, reach, wide & ~differ)
         differ[panel] = True
         if not differ.any():
             break
         turned = owner[tested[panel]]
         jumped, jumps = turned[jump], between[jump]
-        design = np.concatenate([probed[:, differ].ravel(), turned])
-        angle = np.concatenate([rays[:, differ].ravel(), between])
+        rays = np.concatenate([ends[:1], rays, ends[1:]])[:, differ]
+        design = np.concatenate([np.tile(probed[0, differ], len(rays)), turned])
+        angle = np.concatenate([rays.ravel(), between])
         order = np.lexsort((angle, design))
         design, angle = design[order], angle[order]
         intervals = trace(designs, design, angle, reach[design])
