@@ -1,14 +1,15 @@
 """Arms, five-bars and 3-RRR with limits of angles, and their regions in the plane of the first leg's two angles.
 
-A place of the point is met at one pair of the crank's angle and the rod's angle beside it, for each elbow. For a row of
-crank angles the rod's angles at which anything ends are bisected, so that area and means are sums over the rows of exact
-integrals: a limit may be as narrow as it likes.
+A place of the point is met at one pair of the crank's angle and the rod's angle beside it, for each elbow. For a row
+of crank angles the rod's angles at which anything ends are bisected, so that area and means are sums over the rows of
+exact integrals: a limit may be as narrow as it likes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -98,7 +99,7 @@ class Robot:
         raise NotImplementedError
 
     def circles(self, pin: Complex) -> list[tuple[Complex, float, float, complex, float]]:
-        """Centre, radius and angle from the rod of a point that turns with it, and the circles on which something ends."""
+        """Centre, radius and angle from the rod of a point that turns with it, and circles on which something ends."""
         return []
 
     def text(self, assembly: str) -> str:
@@ -121,12 +122,14 @@ class Robot:
         other = 2 * np.angle(z + self.corners[0] - self.bases[0]) - angle
         beside = self.bases[0] + self.cranks[0] * np.exp(1j * other)
         here, there = (np.any([self.reached(z, a, mode, False) for mode in self.modes], axis=0) for a in (pin, beside))
-        return here / (1.0 + (there & within(other, self.low[0], self.high[0])))
+        return np.asarray(here / (1.0 + (there & within(other, self.low[0], self.high[0]))))
 
     def turns(self, angle: np.ndarray, low: float, high: float, samples: int) -> np.ndarray:
         """Angles of the rod that are looked at: even ones, and one between any two at which something ends."""
         ends = []
-        for centre, radius, offset, other, distance in self.circles(self.bases[0] + self.cranks[0] * np.exp(1j * angle)):
+        for centre, radius, offset, other, distance in self.circles(
+            self.bases[0] + self.cranks[0] * np.exp(1j * angle)
+        ):
             k = other - centre
             half = np.arccos((radius**2 + np.abs(k) ** 2 - distance**2) / (2 * radius * np.abs(k)))
             ends += [np.angle(k) + side * half - offset - angle for side in (1, -1)]
@@ -179,13 +182,15 @@ class Robot:
         v = np.pi * ((np.arange(parts)[:, None] + 0.5 + 0.5 * NODES) / parts).ravel()
         at = begin[:, None] + (end - begin)[:, None] * 0.5 * (1 - np.cos(v))
         weight = (scale * (end - begin))[:, None] * 0.25 * np.pi * np.sin(v) * np.tile(WEIGHTS / parts, parts)
-        means = [(weight * np.abs(np.sin(at)) * values).sum() for values in self.indices(*self.pose(angle[row][:, None], at))]
+        means = [
+            (weight * np.abs(np.sin(at)) * values).sum() for values in self.indices(*self.pose(angle[row][:, None], at))
+        ]
         return np.array([area, *(mean / area for mean in means)])
 
     def _with_sketch(self, row: np.ndarray, begin: np.ndarray, end: np.ndarray, rows: int) -> Flags | None:
         """Which intervals hang together with the one that is nearest to the sketch."""
         first = np.searchsorted(row, np.arange(rows + 2))
-        slot, most = np.arange(len(row)) - first[row], int(np.diff(first).max(initial=0))
+        most = int(np.diff(first).max(initial=0))
         pairs = [np.zeros((2, 0), dtype=np.intp)]
         for other in range(most):
             beside = first[row + 1] + other
@@ -204,7 +209,7 @@ class Robot:
         away = np.maximum(np.maximum(begin[near] - self.turn, self.turn - end[near]), 0) + 1e-6 * np.abs(row[near] - at)
         return np.asarray(piece == piece[near[away.argmin()]])
 
-    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Robot:
+    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Self:
         """The same robot turned and scaled by a complex number and moved, mirrored before that."""
 
         def place(z: Complex) -> Complex:
@@ -236,7 +241,11 @@ class Arm(Robot):
     @staticmethod
     def of(seed: int) -> Arm:
         rng = np.random.default_rng(seed)
-        base, lengths, angles = complex(*rng.uniform(-30, 30, 2)), rng.uniform(40, 120, 2), rng.uniform(-np.pi, np.pi, 2)
+        base, lengths, angles = (
+            complex(*rng.uniform(-30, 30, 2)),
+            rng.uniform(40, 120, 2),
+            rng.uniform(-np.pi, np.pi, 2),
+        )
         pin = base + lengths[0] * np.exp(1j * angles[0])
         point = complex(pin + lengths[1] * np.exp(1j * angles.sum()))
         limits = random_limits(rng, angles)
@@ -293,9 +302,9 @@ class FiveBar(Robot):
         limits = random_limits(rng, angles)
         return FiveBar(bases, cranks, rods, *limits, point, pins, np.zeros(1, complex), 1 / at)
 
-    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Robot:
-        other = Robot.moved(self, turn, shift, mirrored)
-        return replace(other, end=np.conj(self.end)) if mirrored else other
+    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Self:
+        other = super().moved(turn, shift, mirrored)
+        return replace(other, end=complex(np.conj(self.end))) if mirrored else other
 
     @property
     def joint(self) -> complex:
@@ -318,7 +327,7 @@ class FiveBar(Robot):
         good, other, joint = self.second(z, pin, *sides)
         good = good & within(np.angle(other - self.bases[1]), self.low[1], self.high[1])
         drawn = cross(self.joint - self.pins[0], self.joint - self.pins[1])
-        return good & (cross(joint - pin, joint - other) * drawn > 0) if same else good
+        return np.asarray(good & (cross(joint - pin, joint - other) * drawn > 0) if same else good)
 
     def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
         _, other, joint = self.second(z, pin, *self.drawn)
@@ -360,15 +369,18 @@ class Platform(Robot):
 
     length: float = 60.0
 
-    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Robot:
-        return replace(Robot.moved(self, turn, shift, mirrored), length=self.length * abs(turn))
+    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Self:
+        return replace(super().moved(turn, shift, mirrored), length=self.length * abs(turn))
 
     @staticmethod
     def of(seed: int) -> Platform:
         rng = np.random.default_rng(seed)
         while True:
             places = np.exp(1j * np.radians(np.array([-150, -30, 90]) + rng.uniform(-30, 30, 3)))
-            bases, corners = rng.uniform(120, 300, 3) * places, rng.uniform(20, 80, 3) * np.roll(places, rng.integers(3))
+            bases, corners = (
+                rng.uniform(120, 300, 3) * places,
+                rng.uniform(20, 80, 3) * np.roll(places, rng.integers(3)),
+            )
             cranks, rods, sides = rng.uniform(60, 220, 3), rng.uniform(60, 220, 3), rng.choice([-1, 1], 3)
             point = complex(*rng.uniform(-150, 150, 2))
             ends = point + corners
@@ -407,14 +419,16 @@ class Platform(Robot):
         good, pins = self.legs(z, pin, sides)
         for k in (1, 2):
             good = good & within(np.angle(pins[k] - self.bases[k]), self.low[k], self.high[k])
-        return good & (self.determinant(z, pins) * self.determinant(self.point, self.pins) > 0) if same else good
+        return good & (self.determinant(z, pins) * self.determinant(self.point, list(self.pins)) > 0) if same else good
 
     def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
         rows = []
         for k, end in enumerate(self.legs(z, pin, self.drawn)[1]):
             bar = z + self.corners[k] - end
             by_rate = cross(end - self.bases[k], bar)
-            rows.append(np.stack([bar.real, bar.imag, cross(self.corners[k], bar) / self.length], axis=-1) / by_rate[..., None])
+            rows.append(
+                np.stack([bar.real, bar.imag, cross(self.corners[k], bar) / self.length], axis=-1) / by_rate[..., None]
+            )
         inverse = np.stack(rows, axis=-2)
         values = np.linalg.svd(inverse, compute_uv=False)
         return values[..., 2] / values[..., 0], self.length * np.abs(np.linalg.det(inverse))
@@ -440,7 +454,8 @@ class Platform(Robot):
         )
         cranks = ["crank", *(f"{crank:.17g}" for crank in self.cranks[1:])]
         legs = "".join(
-            f"\n    crank_{k}: [O{k}, A{k}, {cranks[k]}]\n    rod_{k}: [A{k}, C{k}, {self.rods[k]:.17g}]" for k in range(3)
+            f"\n    crank_{k}: [O{k}, A{k}, {cranks[k]}]\n    rod_{k}: [A{k}, C{k}, {self.rods[k]:.17g}]"
+            for k in range(3)
         )
         return f"""
 units: {{length: mm}}

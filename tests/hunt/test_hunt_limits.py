@@ -1,4 +1,4 @@
-"""Regions between limits of 2 to 180 degrees and stretched or folded legs, against the plane of the first leg's angles."""
+"""Regions between limits of 2 to 180 degrees and stretched or folded legs, against the first leg's two angles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INDICES = ("area", "GII", "GRI")
 
 
 def columns(kind: str, assembly: str) -> tuple[str, ...]:
-    """What is compared: in any assembly indices are those of one of several modes, which only an arm's do not notice."""
+    """What is compared: in any assembly indices are those of one of several modes, which an arm's do not notice."""
     return INDICES if assembly == "same" or kind == "arm" else INDICES[:1]
 
 
@@ -103,7 +103,14 @@ def test_designs_of_many_have_the_numbers_of_single_ones(seeds: Seeds, kind: str
             change = f"mechanism.parameters.crank={length:.17g}"
             (values, errors), (_, of_many) = (asked(text, effort, names, change) for effort in EFFORTS)
             found = np.array([float(designs[name][row]) for name in names])
-            assert (np.abs(found - values) <= 2 * (errors + of_many)).all(), (kind, seed, found, values, errors, of_many)
+            assert (np.abs(found - values) <= 2 * (errors + of_many)).all(), (
+                kind,
+                seed,
+                found,
+                values,
+                errors,
+                of_many,
+            )
 
 
 @pytest.mark.parametrize(("kind", "assembly"), [
