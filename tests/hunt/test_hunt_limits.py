@@ -74,7 +74,7 @@ def compare(kind: str, assembly: str, seed: int, effort: str) -> None:
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize(("kind", "assembly", "cases"), [
-    ("arm", "any", 2), ("five_bar", "same", 2), ("3-RRR", "same", 2), ("arm", "same", 1),
+    ("arm", "any", 1), ("five_bar", "same", 1), ("3-RRR", "same", 1), ("arm", "same", 1),
     pytest.param("five_bar", "any", 2, marks=pytest.mark.nightly),
     pytest.param("3-RRR", "any", 2, marks=pytest.mark.nightly),
 ])  # fmt: skip
@@ -85,12 +85,19 @@ def test_areas_and_indices_with_narrow_and_wide_limits(
         compare(kind, assembly, seed, effort)
 
 
+# Spikes beyond the farthest cell, bumps between samples, notches between rays and other elbows were lost in these.
+@pytest.mark.parametrize(("kind", "assembly", "seed"), [("five_bar", "same", 15), ("five_bar", "same", 25),
+                         ("3-RRR", "same", 19), ("arm", "any", 11), ("arm", "any", 27)])  # fmt: skip
+def test_regions_that_were_lost(kind: str, assembly: str, seed: int) -> None:
+    compare(kind, assembly, seed, "of many")
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("assembly", ["same", "any"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_designs_of_many_have_the_numbers_of_single_ones(seeds: Seeds, kind: str, assembly: str) -> None:
     names = columns(kind, assembly)[:2]
-    for seed in seeds(2):
+    for seed in seeds(1):
         robot = KINDS[kind].of(seed)
         text = robot.text(assembly)
         if not drawn_clearly(text):
@@ -145,7 +152,7 @@ def test_turned_moved_scaled_mirrored_or_seen_from_elsewhere_nothing_changes(
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
-@pytest.mark.parametrize("width", [0.5, 2.0, 8.0])
+@pytest.mark.parametrize("width", [0.5, *(pytest.param(width, marks=pytest.mark.nightly) for width in (2.0, 8.0))])
 @pytest.mark.parametrize(("shoulder", "elbow"), [(20, 90), (-70, -120)])
 def test_an_arm_whose_shoulder_hardly_turns(shoulder: float, elbow: float, width: float, effort: str) -> None:
     """The crescent that the forearm sweeps: A = 2 w l1 l2, and the mean of 1/|det J| is w pi/A."""
