@@ -18,7 +18,8 @@ from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.field import Field, Places
-from mechdesign.region.rays import NARROWEST, SAME_ROOT, Designs, Intervals, intervals_between
+from mechdesign.region.intervals import SAME_ROOT, Intervals, intervals_between
+from mechdesign.region.rays import NARROWEST, Designs
 
 
 def in_any_assembly(field: Field) -> Field:
@@ -81,10 +82,10 @@ class AnyMode(Field):
         """As `Field.margins`, of all modes."""
         return np.concatenate([mode.margins(z, places, assembly=assembly) for mode in self.modes])
 
-    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
-        """As `Field.sampled`; the turn is the largest in any mode."""
-        margins, turned = zip(*(mode.sampled(z, places) for mode in self.modes), strict=True)
-        return np.concatenate(margins), np.fmax.reduce(turned)
+    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
+        """As `Field.sampled`, of all modes."""
+        margins, rotations = zip(*(mode.sampled(z, places, assembly=assembly) for mode in self.modes), strict=True)
+        return np.concatenate(margins), np.concatenate(rotations)
 
     def poses(self, z: Complexes) -> Configuration:
         """As `Field.poses`, each place in the mode of `configuration`."""

@@ -20,7 +20,8 @@ from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.region.field import Places
-from mechdesign.region.rays import Designs, Intervals, trace
+from mechdesign.region.intervals import Intervals
+from mechdesign.region.rays import Designs, trace
 
 # Panel ends nearer to each other than this angle (radians) are one: rounding hides what lies between them.
 TOGETHER = 1e-7

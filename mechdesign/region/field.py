@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value, norm2
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -148,19 +148,11 @@ class Field:
         """
         return self.look(z, places, assembly)[0]
 
-    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
-        """All margins at samples `z` of rays, shape (samples, rays), and the largest turn of a link between neighbours.
-
-        Turns are chords of the unit circle, shape (samples - 1, rays); nan where unknown.
-        """
-        margins, configuration = self.look(z, places, assembly=True)
-        turned = np.zeros((len(z) - 1, *z.shape[1:]))
-        with np.errstate(invalid="ignore"):
-            for rotation in configuration.rotations:
-                if np.ndim(rotation):
-                    rotation = np.broadcast_to(rotation, z.shape)
-                    turned = np.maximum(turned, norm2(rotation[1:] - rotation[:-1]))
-        return margins, np.sqrt(turned)
+    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
+        """Margins at points `z`, as `margins`, and the rotations of the links that turn, shape (links, *z.shape)."""
+        margins, configuration = self.look(z, places, assembly)
+        turning = [np.broadcast_to(rotation, z.shape) for rotation in configuration.rotations if np.ndim(rotation)]
+        return margins, np.array(turning, dtype=complex).reshape(len(turning), *z.shape)
 
     def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
         """Margins at points `z`, as `margins`, and the configuration to which they belong."""
@@ -171,7 +163,7 @@ class Field:
                 configuration = self.configuration(z, places)
             margins = [*configuration.closures]
             margins += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
-            margins += [margin for _, margin in self.mechanism.margins(configuration)]
+            margins += [margin for _, margin in self.mechanism.margins(configuration, smooth=True)]
             if self.plan.iterative:
                 margins.append(fold_distance)
             if self.same_assembly and assembly:
@@ -211,6 +203,16 @@ class Field:
         """Which margins vanish where a leg is stretched or folded: indices behave as square roots there."""
         closures = sum(cause.role == "closure" for cause in self._causes)
         return np.arange(len(self.labels)) < closures
+
+    @cached_property
+    def tiers(self) -> list[Ints]:
+        """Margins in the order in which they are solved: those of each leg, then all others.
+
+        Where a leg is stretched or folded, links that are placed after it turn as square roots do.
+        """
+        groups = [cause.group for cause in self._causes if cause.role == "closure"]
+        legs = np.split(np.flatnonzero(self.singular), np.flatnonzero(np.diff(groups)) + 1)
+        return [rows for rows in (*legs, np.flatnonzero(~self.singular)) if rows.size]
 
     @cached_property
     def _signs(self) -> list[float]:

@@ -13,8 +13,9 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.contacts import CONTACTS, Contacts, within_scan
+from mechdesign.region.intervals import SAME_ROOT
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import SAME_ROOT, is_turn
+from mechdesign.region.rays import is_turn
 from mechdesign.region.rules import cubic, spread
 from mechdesign.region.shapes import Shape
 

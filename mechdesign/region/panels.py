@@ -12,9 +12,13 @@ import numpy as np
 
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.region.breaks import TOGETHER, all_breaks
+from mechdesign.region.breaks import TOGETHER, all_breaks, signatures
+from mechdesign.region.crossings import resolved
+from mechdesign.region.field import ROUNDING
+from mechdesign.region.intervals import SAME_ROOT, Intervals, joined
 from mechdesign.region.raster import Raster
-from mechdesign.region.rays import FARTHEST_TURN, SAME_ROOT, Designs, Intervals, joined, ray_through, trace
+from mechdesign.region.rays import Designs, ray_through, trace
+from mechdesign.region.rules import cubic, spread
 
 # Largest number of times that the reach is doubled.
 DOUBLINGS = 16
@@ -23,8 +27,8 @@ ROUNDS = 4
 # Place of the ray that stands for a panel, as a fraction of the panel. In symmetric mechanisms the ray at exactly half
 # of it may pass through a single point that divides its interval.
 MIDDLE = 0.4871
-# Rays that test a panel, as fractions of it: where they meet unequal numbers of intervals, the panel is divided.
-PROBES = np.array([0.01, 0.13, 0.31, MIDDLE, 0.69, 0.87, 0.99])
+# Rays that test a panel, by the variable of `cubic`: they are dense near its ends, where a boundary may have a notch.
+PROBES = np.array([0.02, 0.15, 0.3, 0.49, 0.7, 0.85, 0.98])
 # Width (radians) below which a panel may hold nothing but the tip of a cusp.
 NARROW = 1e-3
 
@@ -110,19 +114,28 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         # Rays at both ends of a panel may be alike though two breaks lie between: rays between them differ, or a link
         # jumps from one to the next.
         tested = np.flatnonzero(np.isin(owner, split) | (rounds == 0))
-        probed, rays = np.tile(owner[tested], (len(PROBES), 1)), low[tested] + (high - low)[tested] * PROBES[:, None]
-        wide = (high - low)[tested] > TOGETHER / PROBES[0]
+        begin, end = low[tested], high[tested]
+        probed, wide = np.tile(owner[tested], (len(PROBES), 1)), end - begin > 100 * TOGETHER
+        rays = np.clip(spread(begin, end, PROBES[:, None], cubic)[0], begin + TOGETHER, end - TOGETHER)
         traced = trace(designs, probed.ravel(), rays.ravel(), reach[probed.ravel()])
         cut |= np.bincount(probed.ravel(), traced.cut, count) > 0
-        differ = (np.ptp(traced.counts.reshape(rays.shape), axis=0) > 0) & wide
-        panel, between, jump = _split_by_turns(designs, probed, rays, traced, reach, wide & ~differ)
+        codes = signatures(traced, len(designs.field.labels)).reshape(rays.shape)
+        differ = (codes != codes[0]).any(axis=0) & wide
+        # What closes within a hair of a break is no interval of the panel. Names may be rounding's there.
+        ends, each = np.stack([begin + TOGETHER, end - TOGETHER]), np.tile(owner[tested], 2)
+        near = np.flatnonzero(~np.isin([begin, end], fixed[1]) & wide)
+        counts = traced.counts.reshape(rays.shape)[[0, -1]].ravel()
+        at_ends = trace(designs, each[near], ends.ravel()[near], reach[each[near]]).counts
+        differ[near[at_ends != counts[near]] % len(wide)] = True
+        panel, between, jump = _along_ends(designs, probed[0], rays, traced, reach, wide & ~differ)
         differ[panel] = True
         if not differ.any():
             break
         turned = owner[tested[panel]]
         jumped, jumps = turned[jump], between[jump]
-        design = np.concatenate([probed[:, differ].ravel(), turned])
-        angle = np.concatenate([rays[:, differ].ravel(), between])
+        rays = np.concatenate([ends[:1], rays, ends[1:]])[:, differ]
+        design = np.concatenate([np.tile(probed[0, differ], len(rays)), turned])
+        angle = np.concatenate([rays.ravel(), between])
         order = np.lexsort((angle, design))
         design, angle = design[order], angle[order]
         intervals = trace(designs, design, angle, reach[design])
@@ -140,14 +153,13 @@ def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Inter
 
     The reach is of shape (designs,).
     """
-    scan, least, number, searched = designs.scan, raster.farthest, designs.effort.rays + 1, np.arange(designs.count)
+    scan, reach, number, searched = designs.scan, raster.reach, designs.effort.rays + 1, np.arange(designs.count)
     design, angle = np.repeat(searched, number), np.tile(np.linspace(*scan, number), designs.count)
     owner, hole = raster.holes
     through = ray_through(hole - designs.about, scan[0])
     design, angle = _with_rays(design, angle, owner[through < scan[1]], through[through < scan[1]])
-    reach = np.where(least > 0, least, raster.reach)
     for rounds in range(ROUNDS + 1):
-        reach, intervals = _extent(designs, design, angle, reach, least)
+        reach, intervals = _extent(designs, design, angle, reach)
         before = len(design)
         if rounds < ROUNDS:
             searched, hidden = raster.hidden(np.unique(searched), design, angle, intervals)
@@ -163,64 +175,70 @@ def _with_rays(design: Ints, angle: Floats, owner: Ints, place: Floats) -> tuple
     return rays.real.astype(np.intp), rays.imag
 
 
-def _split_by_turns(
+def _along_ends(
     designs: Designs, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
 ) -> tuple[Ints, Floats, Flags]:
-    """Further rays of panels whose rays are `alike`, where a link turns far from one interval end to the next ray's.
+    """Further rays of panels whose rays are `alike`, where the ends of their intervals may not go on between them.
 
-    Two such rays are halved until the rays between have other intervals, or no link turns far from ray to ray, or they
-    are `TOGETHER`: there the link jumps.
+    Along an end every other margin is positive and links turn little from ray to ray. Where a margin may dip below
+    zero between two rays (a notch in the boundary), or a link turns far, rays between them are traced.
 
     Parameters
     ----------
-    design, theta : ndarray, shape (rays, panels)
-        Design and angle of the rays of each panel.
+    design : ndarray, shape (panels,)
+    theta : ndarray, shape (rays, panels)
+        Angles of the rays of each panel.
     traced : Intervals
         Those of all these rays.
 
     Returns
     -------
     (panel, angle, jumps)
-        Of each further ray; `jumps` where a link jumps at it.
+        Of each ray that is unlike those of its panel, and of those (`jumps`) at which a link jumps.
     """
-    counts = traced.counts.reshape(theta.shape)[0]
-    panel = np.flatnonzero(alike & (counts > 1))
-    most = int(counts[panel].max(initial=0))
+    field = designs.field
+    labels, size = len(field.labels), len(field.members[0].labels)
+    counts = traced.counts.reshape(theta.shape)[0] * alike
+    codes = signatures(traced, labels).reshape(theta.shape)[0]
+    owner = np.repeat(np.arange(len(counts)), 2 * counts)
+    end = np.arange(len(owner)) - np.repeat(np.cumsum(2 * counts) - 2 * counts, 2 * counts)
+    panels, angles = [owner[:0]], [theta[0, :0]]
 
-    def ends(traced: Intervals) -> Floats:
-        """Inner and outer radii of each ray, shape (2 largest count, rays); nan beyond its last interval."""
-        radii = np.full((2, most, len(traced.beyond)), np.nan)
-        of_rays = traced.by_ray(traced.inner, traced.outer)[:, :most]
-        radii[:, : of_rays.shape[1]] = of_rays
-        return radii.reshape(2 * most, -1)
+    def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Complexes]:
+        """Margins but that of the end itself, and rotations, at ends of rays; nan where a ray is unlike its panel."""
+        like = signatures(traced, labels)[ray] == codes[owner[lane]]
+        slot = np.where(like, np.searchsorted(traced.ray, ray) + end[lane] // 2, -1)
+        last = end[lane] % 2 == 1
+        radius = np.where(last, np.append(traced.outer, np.nan)[slot], np.append(traced.inner, np.nan)[slot])
+        name = np.where(last, np.append(traced.leaves, -1)[slot], np.append(traced.enters, -1)[slot])
+        z = designs.about + radius * np.exp(1j * angle)
+        margins, rotations = field.sampled(z, designs.of(design[owner[lane]]))
+        own = np.flatnonzero(name >= 0)
+        margins[name[own], own] = 1.0
+        # Of several assembly modes that of the end counts.
+        margins[name // size != np.arange(labels)[:, None] // size] = 1.0
+        # Where a link jumps while a ray's only interval goes on, another margin bounds it.
+        rotations[:, counts[owner[lane]] == 1] = 1.0
+        return margins, rotations
 
-    def turned(panel: Ints, theta: Floats, radii: Floats) -> Flags:
-        """Whether a link turns far from each ray to the next, shape (rays - 1, panels)."""
-        z = designs.about + radii * np.exp(1j * theta[:, None])
-        owner = np.tile(design[0, panel], z.shape[1])
-        turns = designs.field.sampled(z.reshape(len(z), -1), designs.of(owner))[1].reshape(len(z) - 1, *z.shape[1:])
-        return np.asarray((turns > FARTHEST_TURN).any(axis=1))
+    def look(lane: Ints, angle: Floats) -> tuple[Floats, Complexes]:
+        rays, ray = np.unique(owner[lane] + 1j * angle, return_inverse=True)
+        panel, directions = rays.real.astype(np.intp), rays.imag
+        traced = trace(designs, design[panel], directions, reach[design[panel]])
+        unlike = signatures(traced, labels) != codes[panel]
+        panels.append(panel[unlike])
+        angles.append(directions[unlike])
+        return at_ends(lane, angle, ray.ravel(), traced)
 
-    panels, angles, jumps = [panel[:0]], [theta[0, :0]], [alike[:0]]
-    if panel.size:
-        radii = ends(traced).reshape(2 * most, *theta.shape).swapaxes(0, 1)[:, :, panel]
-        ray, which = np.nonzero(turned(panel, theta[:, panel], radii))
-        panel = panel[which]
-        pair, radii = theta[[ray, ray + 1], panel], radii[[ray, ray + 1], :, which].swapaxes(1, 2)
-    while panel.size:
-        middle, last = 0.5 * (pair[0] + pair[1]), pair[1] - pair[0] < TOGETHER
-        panels.append(panel)
-        angles.append(middle)
-        jumps.append(last)
-        panel, middle, pair, radii = panel[~last], middle[~last], pair[:, ~last], radii[:, :, ~last]
-        traced = trace(designs, design[0, panel], middle, reach[design[0, panel]])
-        same = traced.counts == counts[panel]
-        pair, radii = np.insert(pair, 1, middle, axis=0)[:, same], np.insert(radii, 1, ends(traced), axis=0)[:, :, same]
-        panel = panel[same]
-        half, which = np.nonzero(turned(panel, pair, radii))
-        panel = panel[which]
-        pair, radii = pair[[half, half + 1], which], radii[[half, half + 1], :, which].swapaxes(1, 2)
-    return np.concatenate(panels), np.concatenate(angles), np.concatenate(jumps)
+    lane, row = np.repeat(np.arange(len(owner)), len(theta)), np.tile(np.arange(len(theta)), len(owner))
+    angle = theta[row, owner[lane]]
+    first = (lane, angle, *at_ends(lane, angle, row * theta.shape[1] + owner[lane], traced))
+    # Two margins may be zero all along an end: which of them is positive there is rounding's.
+    sizes = np.where(np.isfinite(first[2]), np.abs(first[2]), 0.0).max(axis=1, initial=0.0)
+    nearest, noise = np.full(len(owner), TOGETHER), ROUNDING * sizes
+    _, _, _, (lane, angle) = resolved(look, first, nearest, noise, np.zeros(labels, dtype=bool), designs.effort.bends)
+    jumps = np.arange(sum(map(len, panels)) + len(lane)) >= sum(map(len, panels))
+    return np.concatenate([*panels, owner[lane]]), np.concatenate([*angles, angle]), jumps
 
 
 def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:
@@ -239,25 +257,15 @@ def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats) -> tuple[
     return owner[:-1][keep], place[:-1][keep], place[1:][keep]
 
 
-def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats) -> tuple[Floats, Intervals]:
-    """Trace rays, doubling the reach until no ray ends inside.
-
-    Returns
-    -------
-    (reach, intervals)
-        The reach that each design needs, at least `least`, and the intervals of all rays.
-    """
+def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> tuple[Floats, Intervals]:
+    """The reach that each design needs, doubled until no ray ends inside, and the intervals of all rays."""
     for _ in range(DOUBLINGS):
         intervals = trace(designs, design, theta, reach[design])
         beyond = np.bincount(design, intervals.beyond, designs.count) > 0
         if not beyond.any():
-            break
+            return reach, intervals
         reach = np.where(beyond, 2 * reach, reach)
-    else:
-        raise AssemblyError(
-            "the workspace has no end: a ray from "
-            f"({designs.about.real:g}, {designs.about.imag:g}) stays inside; give the drives limits"
-        )
-    farthest = np.zeros(designs.count)
-    np.maximum.at(farthest, design[intervals.ray], intervals.outer)
-    return np.where(farthest > 0, 1.2 * np.maximum(farthest, least), reach), intervals
+    raise AssemblyError(
+        "the workspace has no end: a ray from "
+        f"({designs.about.real:g}, {designs.about.imag:g}) stays inside; give the drives limits"
+    )

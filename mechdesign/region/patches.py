@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.region.intervals import SAME_ROOT
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import SAME_ROOT, ray_through
+from mechdesign.region.rays import ray_through
 
 # An interval is kept down to minus this width (fraction of the reach): rounding may exchange two equal ends.
 SLACK = 1e-9

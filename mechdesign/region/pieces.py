@@ -15,8 +15,9 @@ import numpy as np
 from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import Panels, find_panels
-from mechdesign.region.rays import SAME_ROOT, Designs, Intervals, is_turn
+from mechdesign.region.rays import Designs, is_turn
 from mechdesign.region.rules import cubic, spread
 
 # Distances of rays from the end of a panel (radians), tried one after the other until a ray meets as many intervals as

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.region.rays import Designs, Intervals, ray_through
+from mechdesign.region.intervals import Intervals
+from mechdesign.region.rays import Designs, ray_through
 
 # Fraction by which a box is widened, so that rounding leaves no part of the region outside.
 ROOM = 1e-6
@@ -183,16 +184,6 @@ class Raster:
         size = self.inside.shape[1] * self.cell
         corners = self.low + np.stack([0 * size, size.real + 0j, 1j * size.imag, size])
         return np.asarray(np.abs(corners - self.designs.about).max(axis=0))
-
-    @property
-    def farthest(self) -> Floats:
-        """Radius about the centre of the rays that holds all inside cells, shape (designs,); 0 where there are none."""
-        farthest = np.zeros(len(self.low))
-        for chunk, part, z in self._centres(np.arange(len(self.low))):
-            inside = np.moveaxis(self.inside[chunk, *part], 0, 2)
-            distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=(0, 1))
-            farthest[chunk] = np.where(distance > 0, distance + np.abs(self.cell[chunk]), 0.0)
-        return farthest
 
     def hidden(self, searched: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
         """Designs and angles of further rays, to pieces and holes that the given rays miss in the `searched` designs.

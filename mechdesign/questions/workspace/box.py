@@ -8,8 +8,9 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.numerics.roots import dips
+from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import SAME_ROOT, Designs, Intervals
+from mechdesign.region.rays import Designs
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9

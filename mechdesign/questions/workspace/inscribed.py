@@ -21,7 +21,10 @@ BORDER = 1e-6
 
 def inscribed(panels: Panels, names: Collection[str] = INSCRIBED) -> dict[str, Floats]:
     """The largest circle and rectangle inside the region of each design, those of which there are `names`."""
-    unit, sizes = panels.reach, dict[str, Floats]()
+    traced, sizes = panels.trace(panels.design, 0.5 * (panels.low + panels.high)), dict[str, Floats]()
+    unit = np.where(panels.closes, 0.0, 1.0)
+    np.maximum.at(unit, panels.design[traced.ray], traced.outer)
+    unit = np.where(unit > 0, unit, panels.reach)
     for name, shape in (
         ("circle", Shape(2 * unit, 2 * unit, round=True)),
         ("rectangle", Shape(unit, unit, round=False, stretches=True)),

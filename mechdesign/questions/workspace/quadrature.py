@@ -34,8 +34,8 @@ from mechdesign.questions.workspace.strips import (
     evaluate,
 )  # fmt: skip
 from mechdesign.questions.workspace.tips import ended_at, isotropic_points, through_points
+from mechdesign.region.intervals import Intervals
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import Intervals
 from mechdesign.region.rules import Rule, cubic, spread
 
 ANGLES = Rule.of(20, 4, 6.0)

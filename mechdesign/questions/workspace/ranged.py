@@ -21,16 +21,10 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.region.crossings import sign_changes
 from mechdesign.region.field import Field, Places
-from mechdesign.region.rays import (
-    NARROWEST,
-    Designs,
-    Intervals,
-    intervals_between,
-    sign_changes,
-    trace,
-    with_dips,
-)
+from mechdesign.region.intervals import Intervals, intervals_between
+from mechdesign.region.rays import NARROWEST, Designs, trace
 
 # Samples of the range: with half as many a stretch was missed, 2e-4 of the area of a 3-RPR's.
 SAMPLES = 49
@@ -100,9 +94,9 @@ class Ranged(Field):
         """Margins at single values of the range, shape (margins, *z.shape)."""
         return self.sliced.margins(z, {VALUE: value}, assembly=assembly)
 
-    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
-        """As `Field.sampled`; how far links turn at all values of the range is not known."""
-        return self.margins(z, places), np.zeros((len(z) - 1, *z.shape[1:]))
+    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
+        """As `Field.sampled`; of links that turn over all values of the range none is known."""
+        return self.margins(z, places), np.zeros((0, *z.shape), dtype=complex)
 
     def extreme(self, label: int) -> int:
         """Which of the extremes over the range is zero where a label ends the region."""
@@ -229,7 +223,7 @@ class Some(Ranged):
 
     def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """Unknown, shape (labels, *z.shape): nothing but rays tells where labels change."""
-        return np.broadcast_to(np.nan, (len(self.labels), *z.shape))
+        return np.full((len(self.labels), *z.shape), np.nan)
 
     def _stretches(self, z: Complexes) -> tuple[Ints, Floats, Floats, Flags]:
         """Those over which all legs reach, or the whole range."""
@@ -237,13 +231,12 @@ class Some(Ranged):
         if not count:
             return whole
 
-        def legs(lane: Ints, part: Floats) -> Floats:
-            return self.at(np.broadcast_to(z[lane], part.shape), self.low + part * width, assembly=False)[:count]
+        def legs(lane: Ints, part: Floats) -> tuple[Floats, Complexes]:
+            margins = self.at(np.broadcast_to(z[lane], part.shape), self.low + part * width, assembly=False)
+            return margins[:count], np.zeros((0, *part.shape), dtype=complex)
 
-        every, none = np.arange(len(z)), np.zeros(count)
-        parts = np.tile(np.linspace(0.0, 1.0, OF_LEGS)[:, None], len(z))
-        parts, values = with_dips(legs, parts, legs(every, parts), none)
-        margin, lane, turn, part, start = sign_changes(legs, parts, values, np.full(len(z), ROUNDING))
+        accuracy, no = np.full(len(z), ROUNDING), np.zeros(count)
+        margin, lane, turn, part, start = sign_changes(legs, len(z), OF_LEGS, accuracy, accuracy, no, no > 0)
         reached = intervals_between(margin, lane, turn, part, start, np.ones(len(z)), 0.0)
         reached = reached.kept(reached.outer - reached.inner > NARROWEST)
         if not len(reached.ray):

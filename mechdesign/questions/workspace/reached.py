@@ -20,7 +20,7 @@ from mechdesign.region.rays import SINGLE, Effort
 from mechdesign.region.regions import RAYS
 
 # How finely a region over a range is looked for; its margins cost a hundred times as much.
-OVER_RANGE = Effort(48, 16, 96)
+OVER_RANGE = Effort(48, 16, 96, 1.5)
 
 
 @dataclass(frozen=True, eq=False)
