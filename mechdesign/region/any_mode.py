@@ -174,4 +174,5 @@ def _with(before: Intervals, other: Intervals, reach: Floats, slack: float) -> I
     order = np.lexsort((np.concatenate([before.inner, rest.inner]), np.concatenate([before.ray, rest.ray])))
     columns = {name: np.concatenate([getattr(before, name), getattr(rest, name)])[order]
                for name in ("ray", "inner", "outer", "enters", "leaves")}  # fmt: skip
-    return Intervals(**columns, beyond=before.beyond | other.beyond, cut=before.cut | other.cut)
+    return Intervals(**columns, beyond=before.beyond | other.beyond, cut=before.cut | other.cut,
+                     doubt=before.doubt + other.doubt)  # fmt: skip

@@ -20,6 +20,8 @@ from mechdesign.numerics.roots import bracketed_roots
 Look = Callable[[Ints, Floats], tuple[Floats, Complexes]]
 # Lane, place, margins and rotations of samples, in order.
 Samples = tuple[Ints, Floats, Floats, Complexes]
+# Lane of cells, and places of both ends, shape (2, cells).
+Cells = tuple[Ints, Floats]
 # Bends are taken so many times as large along rays as second differences tell: cells with a kink are then divided until
 # the kink cannot reach zero.
 SAFETY = 4.0
@@ -27,8 +29,8 @@ SAFETY = 4.0
 FARTHEST_TURN = 0.5
 # Where a cell is divided, as parts of it.
 DIVIDED = np.array([0.25, 0.5, 0.75])
-# Where a margin may dip below zero, or rise above it, samples are so far on either side of its parabola's vertex (part of
-# the cell); the third is in the middle of what is left.
+# Where a margin may dip below zero, or rise above it, samples are so far on either side of its parabola's vertex (part
+# of the cell); the third is in the middle of what is left.
 BESIDE = 0.02
 # Cells of one lane that are divided at once; where more are in doubt, they are rounding's.
 MOST_CELLS = 96
@@ -36,7 +38,7 @@ MOST_CELLS = 96
 
 def sign_changes(
     look: Look, lanes: int, count: int, tolerance: Floats, nearest: Floats, noise: Floats, legs: Flags
-) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+) -> tuple[Ints, Ints, Ints, Floats, Ints, Cells]:
     """Roots of margins on several lanes.
 
     Parameters
@@ -52,12 +54,12 @@ def sign_changes(
 
     Returns
     -------
-    (margin, lane, direction, place, negative)
+    (margin, lane, direction, place, negative, open)
         Of each root its margin, lane, direction (1 rising, -1 falling) and place; of each lane the number of margins
-        that are negative at its begin.
+        that are negative at its begin; and what is in doubt still.
     """
     lane, place = np.repeat(np.arange(lanes), count), np.tile(np.linspace(0.0, 1.0, count), lanes)
-    lane, place, values, _ = resolved(look, (lane, place, *look(lane, place)), nearest, noise, legs)
+    lane, place, values, left = resolved(look, (lane, place, *look(lane, place)), nearest, noise, legs)
     positive = _without_rounding(values, lane, noise) > 0
     negative = np.zeros(lanes, dtype=np.intp)
     first = np.flatnonzero(np.diff(lane, prepend=-1))
@@ -79,12 +81,12 @@ def sign_changes(
         return look(lane[cells[which]], where)[0][margins[which], np.arange(len(which))]
 
     root[bounding] = bracketed_roots(evaluate, x[0], f[0], x[1], f[1], x[2], f[2], tolerance[lane[cells]])
-    return margin, lane[cell], np.where(positive[margin, cell + 1], 1, -1), root, negative
+    return margin, lane[cell], np.where(positive[margin, cell + 1], 1, -1), root, negative, left
 
 
 def resolved(
     look: Look, first: Samples, nearest: Floats, noise: Floats, legs: Flags, safety: float = SAFETY
-) -> tuple[Ints, Floats, Floats, tuple[Ints, Floats]]:
+) -> tuple[Ints, Floats, Floats, Cells]:
     """Samples of lanes that leave no sign change inside the region between two of them, in order.
 
     Parameters
@@ -99,17 +101,17 @@ def resolved(
     Returns
     -------
     (lane, place, margins, open)
-        Of all samples; and lane and place of what is in doubt still, as nothing is divided further.
+        Of all samples; and the cells in doubt still, as nothing is divided further.
     """
     lane, place, values, rotations = first
     done: list[tuple[Ints, Floats, Floats]] = []
-    lanes, left = len(nearest), [(lane[:0], place[:0])]
+    lanes, left = len(nearest), [(lane[:0], np.zeros((2, 0)))]
     while True:
         undecided, parts = _open(lane, place, values, rotations, noise, legs, safety)
         cell = np.flatnonzero(undecided)
         number = np.bincount(lane[cell], minlength=lanes)
         wide = (place[cell + 1] - place[cell] > nearest[lane[cell]]) & (number[lane[cell]] <= MOST_CELLS)
-        left.append((lane[cell[~wide]], 0.5 * (place[cell] + place[cell + 1])[~wide]))
+        left.append((lane[cell[~wide]], np.stack([place[cell], place[cell + 1]])[:, ~wide]))
         cell = cell[wide]
         again = np.zeros(lanes, dtype=bool)
         again[lane[cell]] = True
@@ -128,7 +130,7 @@ def resolved(
         lane, place, values, rotations = lane[order], place[order], values[:, order], rotations[:, order]
     lane, place, values = (np.concatenate(part, axis=-1) for part in zip(*done, strict=True))
     order = np.argsort(lane, kind="stable")
-    doubt_lane, doubt = (np.concatenate(part) for part in zip(*left, strict=True))
+    doubt_lane, doubt = (np.concatenate(part, axis=-1) for part in zip(*left, strict=True))
     return lane[order], place[order], values[:, order], (doubt_lane, doubt)
 
 
@@ -164,9 +166,10 @@ def _open(
         doubtful &= (bend > safety * noise) & (least > noise)
         doubtful[legs] = 4 * np.maximum(size[legs, 1:], size[legs, :-1]) <= bend[legs]
         row, cell = np.nonzero(doubtful & (positive[:, 1:] == positive[:, :-1]) & same)
-        middle = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
-        vertex = np.clip(np.nan_to_num(0.5 - change[row, cell] / middle, nan=0.5), 2 * BESIDE, 1 - 2 * BESIDE)
-        parts[:, cell] = np.sort([vertex - BESIDE, vertex + BESIDE, np.where(vertex < 0.5, 1 + vertex, vertex) / 2], axis=0)
+        curved = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
+        vertex = np.clip(np.nan_to_num(0.5 - change[row, cell] / curved, nan=0.5), 2 * BESIDE, 1 - 2 * BESIDE)
+        middle = np.where(vertex < 0.5, 1 + vertex, vertex) / 2
+        parts[:, cell] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
         turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
     outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
     return np.asarray(((doubtful.any(axis=0) & ~outside) | turned) & same), parts

@@ -31,6 +31,8 @@ class Intervals:
         Rays that are still inside at their reach.
     cut : ndarray of bool, shape (rays,)
         Rays that margins which are not quadratic along them, such as those of the assembly, shorten or divide.
+    doubt : ndarray, shape (rays,)
+        Integral of the radius over the stretches of each ray of which it stays undecided whether they are inside.
     """
 
     ray: Ints
@@ -40,6 +42,7 @@ class Intervals:
     leaves: Ints
     beyond: Flags
     cut: Flags
+    doubt: Floats
 
     @property
     def counts(self) -> Ints:
@@ -93,7 +96,8 @@ def joined(rays: Sequence[Ints], parts: Sequence[Intervals]) -> Intervals:
         return np.concatenate([getattr(part, name) for part in parts])[order]
 
     inner, outer, enters, leaves = (column(name, order) for name in ("inner", "outer", "enters", "leaves"))
-    return Intervals(ray[order], inner, outer, enters, leaves, column("beyond", ray_order), column("cut", ray_order))
+    return Intervals(ray[order], inner, outer, enters, leaves,
+                     *(column(name, ray_order) for name in ("beyond", "cut", "doubt")))  # fmt: skip
 
 
 def shortened(intervals: Intervals, lanes: Ints, remaining: Intervals, tie: Floats) -> Intervals:
@@ -117,7 +121,8 @@ def shortened(intervals: Intervals, lanes: Ints, remaining: Intervals, tie: Floa
     beyond[owner[leaves < 0]] = True
     cut = intervals.cut.copy()
     cut[intervals.ray[lanes]] = True
-    return Intervals(owner[order], inner[order], outer[order], enters[order], leaves[order], beyond, cut)
+    return Intervals(owner[order], inner[order], outer[order], enters[order], leaves[order], beyond, cut,
+                     intervals.doubt)  # fmt: skip
 
 
 def intervals_between(
@@ -169,7 +174,8 @@ def intervals_between(
     tie = SAME_ROOT * reach
     enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
     leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
-    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, np.ones(rays, dtype=bool))
+    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, np.ones(rays, dtype=bool),
+                     np.zeros(rays))  # fmt: skip
 
 
 def _ascending(values: Ints) -> Ints:

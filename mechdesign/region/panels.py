@@ -103,20 +103,22 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     closes = np.bincount(design, intervals.counts, count) > 0
     cut = raster.cut | (np.bincount(design, intervals.cut, count) > 0)
     fixed = np.repeat(np.arange(count), 2 + len(cuts)), np.tile([*designs.scan, *cuts], count)
+    # Breaks are one, and rays tell nothing beside them, where they are no farther apart than their accuracy.
+    together = max(TOGETHER, 2 * designs.field.accuracy)
     broken, breaks, jumped, jumps = design[:0], angle[:0], design[:0], angle[:0]
     for rounds in range(ROUNDS + 1):
         split, angles = all_breaks(designs, reach, intervals, design, angle)
         split, angles = np.concatenate([split, jumped]), np.concatenate([angles, jumps])
         broken, breaks = np.concatenate([broken, split]), np.concatenate([breaks, angles])
-        owner, low, high = _between(*fixed, broken, breaks)
+        owner, low, high = _between(*fixed, broken, breaks, together)
         if rounds == ROUNDS:
             break
         # Rays at both ends of a panel may be alike though two breaks lie between: rays between them differ, or a link
         # jumps from one to the next.
         tested = np.flatnonzero(np.isin(owner, split) | (rounds == 0))
         begin, end = low[tested], high[tested]
-        probed, wide = np.tile(owner[tested], (len(PROBES), 1)), end - begin > 100 * TOGETHER
-        rays = np.clip(spread(begin, end, PROBES[:, None], cubic)[0], begin + TOGETHER, end - TOGETHER)
+        probed, wide = np.tile(owner[tested], (len(PROBES), 1)), end - begin > 100 * together
+        rays = np.clip(spread(begin, end, PROBES[:, None], cubic)[0], begin + together, end - together)
         traced = trace(designs, probed.ravel(), rays.ravel(), reach[probed.ravel()])
         cut |= np.bincount(probed.ravel(), traced.cut, count) > 0
         codes = signatures(traced, len(designs.field.labels)).reshape(rays.shape)
@@ -236,19 +238,19 @@ def _along_ends(
     # Two margins may be zero all along an end: which of them is positive there is rounding's.
     sizes = np.where(np.isfinite(first[2]), np.abs(first[2]), 0.0).max(axis=1, initial=0.0)
     nearest, noise = np.full(len(owner), TOGETHER), ROUNDING * sizes
-    _, _, _, (lane, angle) = resolved(look, first, nearest, noise, np.zeros(labels, dtype=bool), designs.effort.bends)
+    _, _, _, (lane, ends) = resolved(look, first, nearest, noise, np.zeros(labels, dtype=bool), designs.effort.bends)
     jumps = np.arange(sum(map(len, panels)) + len(lane)) >= sum(map(len, panels))
-    return np.concatenate([*panels, owner[lane]]), np.concatenate([*angles, angle]), jumps
+    return np.concatenate([*panels, owner[lane]]), np.concatenate([*angles, ends.mean(axis=0)]), jumps
 
 
-def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:
+def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats, together: float) -> tuple[Ints, Floats, Floats]:
     """Design and both ends of the panels between `fixed` angles of the designs `every` and `breaks` of `broken`."""
     owner, place = np.concatenate([every, broken]), np.concatenate([fixed, breaks])
     firm = np.arange(len(place)) < len(fixed)
     order = np.lexsort((place, owner))
     owner, place, firm = owner[order], place[order], firm[order]
     # Breaks that rounding sets beside each other, or beside a fixed end, are one.
-    near = (owner[1:] == owner[:-1]) & (np.diff(place) < TOGETHER)
+    near = (owner[1:] == owner[:-1]) & (np.diff(place) < together)
     drop = np.zeros(len(place), dtype=bool)
     drop[1:] |= near & ~firm[1:]
     drop[:-1] |= near & firm[1:] & ~firm[:-1]

@@ -202,7 +202,7 @@ class Designs:
             values[margin, ..., column] = 1.0
             return np.concatenate([values, lengths]), rotations
 
-        margin, lane, turn, part, negative = sign_changes(
+        margin, lane, turn, part, negative, (doubtful, ends) = sign_changes(
             look, len(sampled), max(self.effort.samples, OF_EXPRESSIONS if expressions else 0),
             ROUNDING * outer / width, SAME_ROOT * reach[owner] / width,
             np.append(self.field.rounding[rows], np.zeros(len(legs))), np.arange(len(rows) + len(legs)) >= len(rows),
@@ -211,6 +211,9 @@ class Designs:
         remaining = intervals_between(
             rows[margin], np.searchsorted(less, lane), turn, radius_at(lane, part), negative[less], outer[less], slack
         )
+        near, far = radius_at(doubtful, ends)
+        doubt = np.bincount(owner[doubtful], 0.5 * (far - near) * (far + near), len(theta))
+        intervals = replace(intervals, doubt=intervals.doubt + doubt)
         return shortened(intervals, sampled[less], remaining, NARROWEST * reach)
 
 

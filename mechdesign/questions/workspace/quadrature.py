@@ -241,6 +241,8 @@ class Fan:
         value = value.reshape(-1, *self.area.shape) * cells["counted"]
         rows = self.area, self.area * cells["counted"], *value
         values, errors = np.stack([ANGLES.apply(row * self.weight) for row in rows], axis=1)
+        doubt = ANGLES.weights @ (self.boundary[2].doubt.reshape(self.area.shape) * self.weight)
+        errors[:2] += doubt * np.stack([np.ones(count), cells["counted"]])
         errors[2:] += error + self._lost(value)
         return Integrals(cells, values, errors).kept(keep)
 

@@ -236,7 +236,7 @@ class Some(Ranged):
             return margins[:count], np.zeros((0, *part.shape), dtype=complex)
 
         accuracy, no = np.full(len(z), ROUNDING), np.zeros(count)
-        margin, lane, turn, part, start = sign_changes(legs, len(z), OF_LEGS, accuracy, accuracy, no, no > 0)
+        margin, lane, turn, part, start, _ = sign_changes(legs, len(z), OF_LEGS, accuracy, accuracy, no, no > 0)
         reached = intervals_between(margin, lane, turn, part, start, np.ones(len(z)), 0.0)
         reached = reached.kept(reached.outer - reached.inner > NARROWEST)
         if not len(reached.ray):
