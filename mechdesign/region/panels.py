@@ -250,7 +250,7 @@ def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats, together:
     order = np.lexsort((place, owner))
     owner, place, firm = owner[order], place[order], firm[order]
     # Breaks that rounding sets beside each other, or beside a fixed end, are one.
-    near = (owner[1:] == owner[:-1]) & (np.diff(place) < together)
+    near = (owner[1:] == owner[:-1]) & (np.diff(place) < 1.001 * together)
     drop = np.zeros(len(place), dtype=bool)
     drop[1:] |= near & ~firm[1:]
     drop[:-1] |= near & firm[1:] & ~firm[:-1]

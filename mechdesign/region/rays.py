@@ -164,8 +164,17 @@ class Designs:
         for rows in self.field.tiers:
             if others[rows].any():
                 intervals = self._cut(intervals, rows, others[rows], design, theta, reach, slack)
-        wide = intervals.outer - intervals.inner > NARROWEST * reach[intervals.ray]
-        return intervals if slack else intervals.kept(wide)
+        width = intervals.outer - intervals.inner
+        if not slack:
+            return intervals.kept(width > NARROWEST * reach[intervals.ray])
+        # What rounding has closed is a tip only where no other margin is clearly negative.
+        narrow = np.flatnonzero(width <= slack * reach[intervals.ray])
+        lane, closed = intervals.ray[narrow], np.zeros(len(width), dtype=bool)
+        z = centre[lane] + intervals.inner[narrow] * direction[lane]
+        there = self.field.margins(z, {name: picked(value, lane) for name, value in places.items()}, assembly=False)
+        with np.errstate(invalid="ignore"):
+            closed[narrow] = (there < -np.sqrt(slack) * np.abs(values).max(axis=1)[:, lane]).any(axis=0)
+        return intervals.kept(~closed)
 
     def _cut(
         self, intervals: Intervals, rows: Ints, counted: Flags, design: Ints, theta: Floats, reach: Floats, slack: float
