@@ -127,8 +127,9 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         ends, each = np.stack([begin + TOGETHER, end - TOGETHER]), np.tile(owner[tested], 2)
         near = np.flatnonzero(~np.isin([begin, end], fixed[1]) & wide)
         counts = traced.counts.reshape(rays.shape)[[0, -1]].ravel()
-        at_ends = trace(designs, each[near], ends.ravel()[near], reach[each[near]]).counts
-        differ[near[at_ends != counts[near]] % len(wide)] = True
+        if near.size:
+            at_ends = trace(designs, each[near], ends.ravel()[near], reach[each[near]]).counts
+            differ[near[at_ends != counts[near]] % len(wide)] = True
         panel, between, jump = _along_ends(designs, probed[0], rays, traced, reach, wide & ~differ)
         differ[panel] = True
         if not differ.any():
