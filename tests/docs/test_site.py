@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import re
 import subprocess
 import sys
+import tempfile
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +55,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the built site."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-n", "-W", "-q", "-d", str(folder / "doctrees"), str(ROOT / "docs")]
-    done = subprocess.run([*command, str(folder / "html")], capture_output=True, text=True, check=False, timeout=400)
+    # Two workers of the tests would run the pages' examples in one folder.
+    with (Path(tempfile.gettempdir()) / "mechdesign-site.lock").open("w") as lock:
+        fcntl.lockf(lock, fcntl.LOCK_EX)
+        done = subprocess.run(
+            [*command, str(folder / "html")], capture_output=True, text=True, check=False, timeout=400
+        )
     assert done.returncode == 0, done.stderr
     return folder / "html"
 
