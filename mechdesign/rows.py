@@ -74,12 +74,17 @@ class Chosen:
         scope = self.table.scope
         return scope is not None and (scope.poses_only or not (scope.follow is None or self.picked or self.courses))
 
+    def counted(self, *, assembled: bool) -> Flags:
+        """Rows that count; `assembled`: of these only assembled poses do."""
+        valid = self.table["valid"].astype(bool) if assembled and "valid" in self.table else True
+        return np.asarray(self.counts & valid)
+
     @property
     def lacking(self) -> str:
         """Where a row that counts, or the motion between the rows, has no value, in words; empty where it has."""
         if self.table.lacking is not None:
             return next(filter(None, self.table.lacking[self.counts].tolist()), "")
-        counts = self.counts & (self.table["valid"].astype(bool) if "valid" in self.table else True)
+        counts = self.counted(assembled=True)
         lost = int(np.count_nonzero(np.isnan(self.values[counts])))
         if lost and self.table.scope is not None and len(self.table) > 1:
             return no_value(lost, int(np.count_nonzero(counts)), "pose" if self.table.strands is None else "row")
@@ -128,10 +133,8 @@ class Chosen:
 
     def shaped(self, designs: int, *, assembled: bool = False) -> tuple[Floats, Flags]:
         """Values of several designs, shape (designs, rows), and which count; `assembled`: only assembled poses do."""
-        shape, counts = (designs, len(self.values) // designs), self.counts
-        if assembled and "valid" in self.table:
-            counts = counts & self.table["valid"].astype(bool)
-        return self.values.reshape(shape), counts.reshape(shape)
+        shape = designs, len(self.values) // designs
+        return self.values.reshape(shape), self.counted(assembled=assembled).reshape(shape)
 
     def numbers(self, designs: int = 1, *, assembled: bool = False) -> Floats:
         """The one number of each design, shape (designs,): its statistic, or the row that counts.

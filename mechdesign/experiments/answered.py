@@ -82,7 +82,7 @@ class Sheet:
     def __init__(self, study: Study, results: Sequence[CaseNumber], count: int) -> None:
         self._required, self._results, self._mobility = study.requirements, results, study.mechanism.mobility
         #: by the row: what the case requires, the study's own until it is set
-        self.judging = [Judging(study.requirements, study.fail_on)] * count
+        self.judging = [Judging.of(study)] * count
         self._numbers = np.full((count, len(results)), np.nan)
         self._worst, self._margins = np.full((2, count, len(self._required)), np.nan)
         self._met = np.zeros((count, len(self._required)), dtype=bool)

@@ -106,7 +106,7 @@ class Answer:
         """Answer one case, loaded as if its file had the changed entries."""
         try:
             study = with_entries(self.study, case)
-            own = Judging(study.requirements, study.fail_on)
+            own = Judging.of(study)
             if not self._comparable(own):
                 raise StudyError("a case is judged on the results of the study; only limits and rows may be otherwise")
         except Exception as error:

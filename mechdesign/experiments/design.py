@@ -159,9 +159,10 @@ def cases_of(study: Study) -> Design:
 
 def _as_written(study: Study, name: str, value: Any) -> Any:
     """A value of an entry that is judged, as a quantity where it is written as one, since columns have own units."""
-    for part in _parts(study.resolved["matrix"]["vary"][name]):
+    varied = study.resolved["matrix"]["vary"][name]
+    for part in _parts(varied):
         if isinstance(part, str) and QUANTITY.fullmatch(part) and isinstance(value, int | float):
-            if not isinstance(study.resolved["matrix"]["vary"][name], list):
+            if not isinstance(varied, list):
                 return study.units.as_written(value, part)
             if study.units.convert(part) == value:
                 return part

@@ -186,8 +186,8 @@ class Designs:
         )
         if not sampled.size:
             return intervals
-        first, rows = rows[0], rows[counted.any(axis=1)]
-        counted = counted[counted.any(axis=1)]
+        first, used = rows[0], counted.any(axis=1)
+        rows, counted = rows[used], counted[used]
         owner, width = intervals.ray[sampled], width[sampled]
         inner, outer = intervals.inner[sampled], intervals.outer[sampled]
         local = self.of(design[owner])

@@ -12,7 +12,6 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
-from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.report.row_words import place_of
 from mechdesign.results import POSES_ONLY, Drawn, Result
@@ -280,7 +279,7 @@ def _of_number(terms: Chosen | Sum, requirement: Requirement, freedom: int) -> V
 def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str:
     """Where the largest or smallest value is that a statistic takes; empty of a mean and a range."""
     statistic = STATISTICS[chosen.statistic] if chosen.statistic else None
-    counts = _counted(chosen, requirement) & ~np.isnan(chosen.values)
+    counts = chosen.counted(assembled=bool(requirement.unassembled)) & ~np.isnan(chosen.values)
     if statistic is None or not statistic.end or not counts.any():
         return ""
     sign, rows = statistic.end, np.flatnonzero(counts)
@@ -339,16 +338,9 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))]))
 
 
-def _counted(chosen: Chosen, requirement: Requirement) -> Flags:
-    """Rows that count; those of poses that are not valid do not where the study allows them."""
-    if requirement.unassembled and "valid" in chosen.table:
-        return np.asarray(chosen.counts & chosen.table["valid"].astype(bool))
-    return chosen.counts
-
-
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
     """The worst row: one without a value, or else the farthest beyond a limit; None without rows."""
-    rows, values = np.flatnonzero(_counted(chosen, requirement)), chosen.values
+    rows, values = np.flatnonzero(chosen.counted(assembled=bool(requirement.unassembled))), chosen.values
     if not rows.size:
         return None
     undefined = rows[np.isnan(values[rows])]

@@ -40,6 +40,11 @@ class Judging(NamedTuple):
     requirements: tuple[Requirement, ...]
     fail_on: tuple[str, ...]
 
+    @classmethod
+    def of(cls, study: Study) -> Judging:
+        """What a study requires."""
+        return cls(study.requirements, study.fail_on)
+
 
 def overrides(changes: Changes) -> tuple[str, ...]:
     """Changes as ``a.b.c=value``."""
@@ -83,7 +88,7 @@ def split(changes: Changes) -> tuple[list[tuple[str, Any]], list[tuple[str, Any]
 def judging(study: Study, changes: Changes) -> Judging | None:
     """What a study requires with changes of that alone; None where they are wrong, as loading the whole study says."""
     if not changes:
-        return Judging(study.requirements, study.fail_on)
+        return Judging.of(study)
     document = Document.of(plain({key: study.resolved[key] for key in JUDGED if key in study.resolved}))
     context = context_of(study.resolved, Reporter(document))[0]
     try:

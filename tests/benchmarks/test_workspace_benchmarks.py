@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.studies import study_of
+from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
 from mechdesign.numerics.arrays import Floats, Ints
@@ -78,19 +78,6 @@ def test_whole_command_with_pictures(benchmark: Any, tmp_path: Path) -> None:
     benchmark.pedantic(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL), rounds=3)
 
 
-FIVE_BAR = """
-units: {length: m}
-mechanism:
-  links:
-    ground: {A: [-0.15, 0], B: [0.15, 0]}
-    left: [A, D, 0.25]
-    left_rod: [D, P, 0.40]
-    right: [B, E, 0.25]
-    right_rod: [E, P, 0.40]
-  drives: {q1: {angle: left}, q2: {angle: right}}
-  sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
-workspace: {point: P, assembly: any}
-"""
 SOME = 384
 
 

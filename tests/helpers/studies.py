@@ -16,6 +16,20 @@ mechanism:
   drives: [crank]
   sketch: {A: [0, 30], B: [95, 0]}
 """
+# A five-bar robot whose legs are alike, with all its assembly modes.
+FIVE_BAR = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A: [-0.15, 0], B: [0.15, 0]}
+    left: [A, D, 0.25]
+    left_rod: [D, P, 0.40]
+    right: [B, E, 0.25]
+    right_rod: [E, P, 0.40]
+  drives: {q1: {angle: left}, q2: {angle: right}}
+  sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
+workspace: {point: P, assembly: any}
+"""
 
 
 def study_of(text: str, *overrides: str) -> Study:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.studies import study_of
+from helpers.studies import FIVE_BAR, study_of
 from scipy.optimize import brentq
 
 import mechdesign
 from mechdesign.questions.workspace.inscribed import crossed
 
+# The workspace of a point in the assembly of the sketch, without indices.
+PLAIN = "workspace={point: P, indices: []}"
 LEGS = """
 units: {length: dimensionless}
 mechanism:
@@ -147,27 +149,13 @@ def test_a_place_on_the_border_crosses_nothing() -> None:
 def test_largest_circles_and_rectangles_are_goals_of_designs() -> None:
     """Those of the workspace, design by design, in its unit: they were found by a whole answer for every design."""
     goals = "maximize: [workspace.circle_radius, workspace.rectangle_width]"
-    designs = mechdesign.optimize(
-        study_of(SHARED, f"optimize={{variables: {{left.length: {{from: 0.22, to: 0.26, step: 0.02}}}}, {goals}}}")
-    ).tables["designs"]
+    lengths = "left.length: {from: 0.22, to: 0.26, step: 0.02}"
+    designs = mechdesign.optimize(study_of(FIVE_BAR, PLAIN, f"optimize={{variables: {{{lengths}}}, {goals}}}")).tables[
+        "designs"
+    ]
     for goal in ("circle_radius", "rectangle_width"):
         column = designs.column(f"workspace.{goal}")
         assert column.unit == "m"
         for length, value in zip(designs["left.length"], column.values, strict=True):
-            alone = mechdesign.workspace(study_of(SHARED, f"mechanism.links.left=[A, D, {length}]")).main
+            alone = mechdesign.workspace(study_of(FIVE_BAR, PLAIN, f"mechanism.links.left=[A, D, {length}]")).main
             assert value == pytest.approx(alone[goal][0], rel=1e-6)
-
-
-SHARED = """
-units: {length: m}
-mechanism:
-  links:
-    ground: {A: [-0.15, 0], B: [0.15, 0]}
-    left: [A, D, 0.25]
-    left_rod: [D, P, 0.40]
-    right: [B, E, 0.25]
-    right_rod: [E, P, 0.40]
-  drives: {q1: {angle: left}, q2: {angle: right}}
-  sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
-workspace: {point: P, indices: []}
-"""

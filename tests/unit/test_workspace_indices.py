@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.studies import study_of
+from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
 from mechdesign import indices
@@ -36,19 +36,6 @@ mechanism:
   drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
   sketch: {E: [1, 1], P: [2, 1]}
 workspace: {point: P, scan: {about: [0, 0]}, integrate: {tolerance: 1e-7}}
-"""
-FIVE_BAR = """
-units: {length: m}
-mechanism:
-  links:
-    ground: {A: [-0.15, 0], B: [0.15, 0]}
-    left: [A, D, 0.25]
-    left_rod: [D, P, 0.40]
-    right: [B, E, 0.25]
-    right_rod: [E, P, 0.40]
-  drives: {q1: {angle: left}, q2: {angle: right}}
-  sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
-workspace: {point: P, assembly: any}
 """
 ERRORS = (
     "reliability={dimensions: {'*.length': 0.001}, outputs: [P], methods: [analytic], limits: {P.x: 0.002, P.y: 0.002},"

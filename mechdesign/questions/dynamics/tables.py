@@ -16,7 +16,7 @@ from mechdesign.questions.columns import VALID
 from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
 from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
 from mechdesign.questions.kinematics.along import Along, of_swept, over
-from mechdesign.questions.kinematics.extremes import without_value
+from mechdesign.questions.kinematics.extremes import gaps_in_words
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.results import Table
 
@@ -93,7 +93,7 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
         of_swept(question.study, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
         max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, unit=np.array(units, dtype=str),
     )  # fmt: skip
-    lacking = np.array([without_value(motion, along, static.name) for static in statics]).reshape(len(statics), -1)
+    lacking = np.array([gaps_in_words(motion, along, static.name) for static in statics]).reshape(len(statics), -1)
     table = EXTREMES.table(columns, **over(along, [static.name for static in statics]))
     return replace(table, lacking=lacking.T.ravel())
 

@@ -19,7 +19,7 @@ from mechdesign.statistics import no_value, no_value_along
 AT_ROW = 1e-9
 
 
-def without_value(motion: Motion, along: Along | None, name: str) -> list[str]:
+def gaps_in_words(motion: Motion, along: Along | None, name: str) -> list[str]:
     """Of each design, where a column has no value though the mechanism assembles, in words; empty where it has one."""
     poses, valid = motion.question.poses, motion.valid
     lost = (valid & np.isnan(motion.arrays[name])).reshape(poses.designs, -1).sum(axis=1)
@@ -119,7 +119,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
 def _lacking(motion: Motion, along: Along | None, outputs: Sequence[str]) -> NDArray[np.str_]:
     """Where outputs, or coordinates of points, have no value: a row each, design by design."""
     parts = [[name] if name in motion.arrays else [f"{name}.{axis}" for axis in "xy"] for name in outputs]
-    words = [[max(pair) for pair in zip(*(without_value(motion, along, name) for name in part), strict=True)]
+    words = [[max(pair) for pair in zip(*(gaps_in_words(motion, along, name) for name in part), strict=True)]
              for part in parts]  # fmt: skip
     return np.array(words, dtype=str).reshape(len(outputs), -1).T.ravel()
 
