@@ -15,7 +15,7 @@ from mechdesign.reference.entries import Entry
 from mechdesign.statistics import STATISTICS as WORDS
 from mechdesign.study.text.fields import quoted
 from mechdesign.study.text.forms import TERMS
-from mechdesign.study.text.units import listed
+from mechdesign.study.text.unit_table import listed
 
 
 def terms() -> Iterator[Entry]:

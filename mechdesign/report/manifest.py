@@ -31,7 +31,7 @@ _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"
 _OWN = "sha256"  # of the manifest itself
 _MOST_BYTES = 100_000_000  # of a manifest; a larger one might not fit into memory
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "moocore")
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pyyaml", "moocore")
 
 
 @dataclass(frozen=True)

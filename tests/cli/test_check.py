@@ -130,7 +130,7 @@ def test_checking_imports_no_solver_of_scipy(folder, arguments):
     assert done.returncode == 0, done.stderr
     modules = set(json.loads((folder / "modules.json").read_text()))
     assert ("matplotlib" in modules) == (not arguments)
-    assert not modules & {"scipy", "rich", "pint"}
+    assert not modules & {"scipy", "rich"}
 
 
 def test_centres_and_inertias_that_are_left_out_are_said(folder, invoke):

@@ -1,13 +1,13 @@
 """Quantities in the study's units, and labels for tables."""
 
 import math
-import subprocess
-import sys
+import re
 
 import pytest
 
-from mechdesign.study.text import units as unit_rules
-from mechdesign.study.text.units import QuantityError, Units
+import mechdesign
+from mechdesign.study.text.unit_table import listed
+from mechdesign.study.text.units import QUANTITY, QuantityError, Units, measure
 
 MM = Units("mm", "deg", "s", "N")
 SI = Units("m", "rad", "s", "N")
@@ -99,23 +99,114 @@ def test_a_unit_over_another(above, below, ratio):
     assert Units.ratio(above, below) == ratio
 
 
+# Each unit by its ways to write it: its value in SI units and radians, and its powers of m, rad, s and kg.
+Powers = tuple[int, int, int, int]
+BOOK: dict[str, tuple[float, Powers]] = {
+    "meter metre m": (1.0, (1, 0, 0, 0)),
+    "second sec s": (1.0, (0, 0, 1, 0)),
+    "gram g": (1e-3, (0, 0, 0, 1)),
+    "tonne t": (1e3, (0, 0, 0, 1)),
+    "radian rad": (1.0, (0, 1, 0, 0)),
+    "degree degrees deg °": (math.pi / 180, (0, 1, 0, 0)),
+    "arcminute arcmin": (math.pi / 10_800, (0, 1, 0, 0)),
+    "arcsecond arcsec": (math.pi / 648_000, (0, 1, 0, 0)),
+    "grade gon": (math.pi / 200, (0, 1, 0, 0)),
+    "revolution revolutions rev turn turns": (2 * math.pi, (0, 1, 0, 0)),
+    "minute min": (60.0, (0, 0, 1, 0)),
+    "hour h": (3600.0, (0, 0, 1, 0)),
+    "rpm": (math.pi / 30, (0, 1, -1, 0)),
+    "inch inches in": (0.0254, (1, 0, 0, 0)),
+    "foot feet ft": (0.3048, (1, 0, 0, 0)),
+    "yard yd": (0.9144, (1, 0, 0, 0)),
+    "thou mil": (2.54e-5, (1, 0, 0, 0)),
+    "newton N": (1.0, (1, 0, -2, 1)),
+    "pound lb": (0.45359237, (0, 0, 0, 1)),
+    "pound_force lbf": (4.4482216152605, (1, 0, -2, 1)),
+    "kilopond kgf kp": (9.80665, (1, 0, -2, 1)),
+    "dyne dyn": (1e-5, (1, 0, -2, 1)),
+    "pascal Pa": (1.0, (-1, 0, -2, 1)),
+    "bar": (1e5, (-1, 0, -2, 1)),
+    "psi": (6894.757293168361, (-1, 0, -2, 1)),
+    "ksi": (6894757.293168361, (-1, 0, -2, 1)),
+    "joule J": (1.0, (2, 0, -2, 1)),
+    "watt W": (1.0, (2, 0, -3, 1)),
+}
+SPELLINGS = {name: unit for names, unit in BOOK.items() for name in names.split()}
+PREFIXES = {
+    "kilo": 1e3,
+    "mega": 1e6,
+    "giga": 1e9,
+    "deci": 0.1,
+    "centi": 0.01,
+    "milli": 1e-3,
+    "micro": 1e-6,
+    "nano": 1e-9,
+}
+PREFIXES |= {"k": 1e3, "M": 1e6, "G": 1e9, "d": 0.1, "c": 0.01, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "n": 1e-9}
+STUDY = "mechanism:\n  links: {ground: {O: [0, 0]}, arm: [O, P, 2]}\n  drives: [arm]\n  sketch: {P: [1, 1]}\n"
+
+
+def read(quantities: dict[str, tuple[float, Powers]]) -> None:
+    """Read each quantity of one unit as a parameter of a study in SI units, and compare its value and dimensions."""
+    parameters = "".join(f"    p{row}: '{text}'\n" for row, text in enumerate(quantities))
+    study = mechdesign.load(text=f"units: {{length: m, angle: rad}}\n{STUDY}  parameters:\n{parameters}")
+    for row, (text, (value, powers)) in enumerate(quantities.items()):
+        assert study.parameters.nominal[f"p{row}"] == pytest.approx(value, rel=1e-13), text
+        length, angle, time, mass = powers
+        # A mass is a force over an acceleration.
+        assert measure(text)[1] == (length - mass, angle, time + 2 * mass, mass), text
+
+
 @pytest.mark.slow
-def test_pint_is_imported_only_for_an_uncommon_unit(tmp_path):
-    study = tmp_path / "study.yaml"
-    study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")
-    code = f"import sys, mechdesign; mechdesign.load({str(study)!r}); print('pint' in sys.modules)"
-    code += f"; mechdesign.load({str(study)!r}, ['mechanism.links.arm.length=2 ft']); print('pint' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
-    assert done.stdout.split() == ["False", "True"]
+def test_every_unit_has_its_value_by_every_name_and_prefix():
+    assert set(SPELLINGS) == {
+        name for written, (_, others) in listed().items() if written[-1] != "-" for name in (written, *others)
+    }
+    quantities = {f"1 {name}": unit for name, unit in SPELLINGS.items()}
+    for prefix, factor in PREFIXES.items():
+        for name in ("meter", "s", "gram", "gon", "rpm", "in", "N", "Pa", "bar"):
+            value, powers = SPELLINGS[name]
+            quantities.setdefault(f"1 {prefix}{name}", (factor * value, powers))
+    read(quantities)
 
 
-@pytest.mark.parametrize("text", ["3 mm", "2 rad/s", "2 deg / s", "5 cm/min", "4 N", "4 kN/m", "1 in/s"])
-def test_common_units_are_those_of_the_registry(text: str) -> None:
-    number, powers, factor = unit_rules.measure(text)
-    unit = text.split(" ", 1)[1]
-    assert (number, powers) == (float(text.split()[0]), unit_rules._unit(unit)[0])
-    assert factor == pytest.approx(unit_rules._unit(unit)[1], rel=1e-14)
-    assert unit_rules._common(unit) is not None
+@pytest.mark.slow
+def test_every_unit_has_powers_and_quotients():
+    quantities = {}
+    for name, (value, powers) in SPELLINGS.items():
+        for text, power in (("^2", 2), ("**2", 2), (" ^ 3", 3), ("3", 3), ("^-1", -1), ("**-2", -2), ("1", 1)):
+            quantities[f"1 {name}{text}"] = value**power, tuple(power * exponent for exponent in powers)
+        along, below, above = (
+            tuple(exponent + change for exponent, change in zip(powers, changes, strict=True))
+            for changes in ((1, 0, 0, 0), (-1, 0, -2, 0), (-1, 0, 2, 0))
+        )
+        for text in (f"{name}*mm", f"mm {name}", f"{name} · mm", f"({name} * mm)", f"mm/min*{name}*min"):
+            quantities[f"1 {text}"] = value / 1e3, along
+        for text in (f"{name}/(mm*min^2)", f"{name}/mm/min2", f"{name} / (mm min min)", f"1/(mm/{name}*min^2)"):
+            quantities[f"1 {text}"] = value * 1e3 / 3600, below
+        for text in (f"{name}/mm*min^2", f"1/mm {name} min min", f"{name}/(mm/min^2)"):
+            quantities[f"1 {text}"] = value * 1e3 * 3600, above
+    read(quantities)
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "(mm", "mm)", "N/(mm", "N/mm)", "N)/(mm", "mm^0", "mm0", "kkm", "mkm", "k", "µ", "kilo", "MM", "ns N s x",
+        "m per s", "square mm", "mm squared", "pounds_", "eV", "Hz",
+    ],
+)  # fmt: skip
+def test_what_is_no_unit_is_refused(unit):
+    with pytest.raises(mechdesign.StudyError, match=re.escape(f"unknown unit '{unit}'")):
+        mechdesign.load(text=STUDY.replace("2]", f"'3 {unit}']"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "near"), [("cn", "N"), ("U/min", "rpm"), ("grad", "deg"), ("zoll", "in"), ("metr", "meter")]
+)
+def test_an_unknown_unit_names_the_nearest(unit, near):
+    with pytest.raises(mechdesign.StudyError, match=f"unknown unit '{unit}'; did you mean '{near}'?"):
+        mechdesign.load(text=STUDY.replace("2]", f"'3 {unit}']"))
 
 
 @pytest.mark.parametrize("unit", ["*".join(["km"] * 100), "/".join(["mm"] * 100), " ".join(["m"] * 110), "a" * 3000])
@@ -134,4 +225,4 @@ def test_a_power_that_no_quantity_has(length, unit):
 
 @pytest.mark.parametrize("text", ["3 m" + "  m" * 1000 + "!", "3" * 5000 + "!", "3 m" + " m ^" * 1000])
 def test_what_is_no_quantity_is_found_out_at_once(text):
-    assert unit_rules.QUANTITY.fullmatch(text) is None
+    assert QUANTITY.fullmatch(text) is None

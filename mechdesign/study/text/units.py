@@ -1,8 +1,6 @@
 """The study's units, and quantities such as ``"40 mm"`` converted to them.
 
-A *kind* of quantity is a product of powers of length, angle, time and force. Pint is imported only where a string with
-a unit occurs; its registry here knows the units of mechanics alone and keeps the angle as a dimension of its own, so
-that ``rad/s`` is never taken for a frequency.
+A *kind* of quantity is a product of powers of length, angle, time and force.
 """
 
 from __future__ import annotations
@@ -12,18 +10,17 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any, Self
+from functools import cached_property
+from itertools import chain
+from typing import Self
 
 from numpy.typing import ArrayLike
 
 from mechdesign.errors import nearest
 from mechdesign.expressions import Expression, Number
+from mechdesign.study.text.unit_table import Powers, listed, unit_value
 
 HELP_PAGE = "reference/expressions"
-
-Powers = tuple[int, ...]
-"""Exponents of length, angle, time and force."""
 
 KINDS: dict[str, Powers] = {
     "none": (0, 0, 0, 0),
@@ -59,7 +56,7 @@ A mass is a force over an acceleration; what has mass in it is told in the study
 
 _PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance", "damping")))
 
-_FACTOR = r"\(?(?![eE]\d)[A-Za-zµμ°]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
+_FACTOR = r"\(?(?![eE]\d)[A-Za-zµμ°_]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
     rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
@@ -73,54 +70,8 @@ No text matches in two ways: what does not match is found out in time that grows
 MAX_UNIT = 60
 MAX_POWER = 9
 
-_DEFINITIONS = """
-kilo- = 1000 = k-
-mega- = 1e6 = M-
-giga- = 1e9 = G-
-deci- = 0.1 = d-
-centi- = 0.01 = c-
-milli- = 1e-3 = m-
-micro- = 1e-6 = µ- = μ- = u-
-nano- = 1e-9 = n-
-meter = [length] = m = metre
-second = [time] = s = sec
-gram = [mass] = g
-tonne = 1e6 * gram = t
-radian = [angle] = rad
-degree = 0.017453292519943295 * radian = deg = ° = degrees
-arcminute = degree / 60 = arcmin
-arcsecond = arcminute / 60 = arcsec
-grade = 0.015707963267948967 * radian = gon
-revolution = 6.283185307179586 * radian = rev = turn = turns = revolutions
-minute = 60 * second = min
-hour = 60 * minute = h
-rpm = revolution / minute
-inch = 0.0254 * meter = in = inches
-foot = 12 * inch = ft = feet
-yard = 3 * foot = yd
-thou = 0.001 * inch = mil
-newton = kilogram * meter / second ** 2 = N
-pound = 0.45359237 * kilogram = lb
-pound_force = 4.4482216152605 * newton = lbf
-kilopond = 9.80665 * newton = kgf = kp
-dyne = 1e-5 * newton = dyn
-pascal = newton / meter ** 2 = Pa
-bar = 1e5 * pascal
-psi = pound_force / inch ** 2
-ksi = 1000 * psi
-joule = newton * meter = J
-watt = joule / second = W
-"""
-
-
 # Units as other languages and programs write them.
 _SYNONYMS = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
-
-
-def listed() -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Units and prefixes (``kilo-``) by name: what each is, and the other ways to write it."""
-    lines = [[part.strip() for part in line.split(" = ")] for line in _DEFINITIONS.strip().splitlines()]
-    return {name: (meaning.replace(" ** ", "^"), tuple(others)) for name, meaning, *others in lines}
 
 
 class QuantityError(ValueError):
@@ -297,21 +248,13 @@ def kind_of(value: object) -> str | None:
     return next((name for name, exponents in KINDS.items() if exponents == powers), None)
 
 
-# Common units with their kind and SI value, read without pint's registry, which takes long to build.
-_COMMON = {
-    "mm": ("length", 1e-3),
-    "cm": ("length", 1e-2),
-    "m": ("length", 1.0),
-    "in": ("length", 0.0254),
-    "deg": ("angle", math.pi / 180.0),
-    "rad": ("angle", 1.0),
-    "s": ("time", 1.0),
-    "min": ("time", 60.0),
-    "N": ("force", 1.0),
-    "kN": ("force", 1e3),
-    "lbf": ("force", 4.4482216152605),
-    "kg": ("mass", 1.0),
-    "g": ("mass", 1e-3),
+# Units that messages name, by kind.
+_EXAMPLES = {
+    "length": ("mm", "cm", "m", "in"),
+    "angle": ("deg", "rad"),
+    "time": ("s", "min"),
+    "force": ("N", "kN", "lbf"),
+    "mass": ("kg", "g"),
 }
 
 
@@ -326,8 +269,7 @@ def check_unit(kind: str, name: str) -> None:
     with contextlib.suppress(QuantityError):
         if (kind, name) == ("length", "dimensionless") or measure(f"1 {name}")[1] == KINDS[kind]:
             return
-    examples = ", ".join(unit for unit, (unit_kind, _) in _COMMON.items() if unit_kind == kind)
-    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {examples}")
+    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {', '.join(_EXAMPLES[kind])}")
 
 
 def _masses(powers: Powers) -> int:
@@ -356,7 +298,12 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     unit = match["unit"]
     if len(unit) > MAX_UNIT:
         raise QuantityError(f"{unit[:MAX_UNIT]!r}... is no unit: none is longer than {MAX_UNIT} characters")
-    powers, factor = _common(unit) or _unit(unit)
+    value = unit_value(unit)
+    if value is None:
+        names = (*chain(*_EXAMPLES.values()), *listed())
+        near = _SYNONYMS.get(unit.replace(" ", "").casefold()) or nearest(unit, names)
+        raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None))
+    powers, factor = value
     if max(map(abs, powers)) > MAX_POWER:
         raise QuantityError(f"{unit!r} is no unit: it is {_describe(powers)}, and no power is beyond {MAX_POWER}")
     if kind is not None:
@@ -368,49 +315,6 @@ def _check_kind(text: str, powers: Powers, expected: Powers) -> None:
     radian_left_out = expected == KINDS["rotational_stiffness"] and powers == KINDS["moment"]
     if powers != expected and not radian_left_out:
         raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(expected)} is expected")
-
-
-def _common(unit: str) -> tuple[Powers, float] | None:
-    """A common unit or a quotient of two, such as ``rad/s``."""
-    names = [name.strip() for name in unit.split("/")]
-    if len(names) > 2 or any(name not in _COMMON for name in names):
-        return None
-    kind, factor = _COMMON[names[0]]
-    powers = KINDS[kind]
-    if len(names) == 2:
-        kind, divisor = _COMMON[names[1]]
-        powers, factor = tuple(a - b for a, b in zip(powers, KINDS[kind], strict=True)), factor / divisor
-    return powers, factor
-
-
-@cache
-def _unit(unit: str) -> tuple[Powers, float]:
-    registry = _registry()
-    try:
-        power = re.sub(r"([^\W\d_])(\d)", r"\1**\2", unit)  # m/s2
-        parsed = registry.parse_units(power.replace("^", "**").replace("·", "*"))
-        base = registry.Quantity(1.0, parsed).to_base_units()
-    except Exception:  # pint raises errors of many classes
-        defined = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
-        near = _SYNONYMS.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *defined))
-        raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None)) from None
-    dimensions = {str(name): power for name, power in base.dimensionality.items()}
-    mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)
-    angle, time = dimensions.get("[angle]", 0), dimensions.get("[time]", 0)
-    exponents = (length - mass, angle, time + 2 * mass, mass)
-    if any(exponent != int(exponent) for exponent in exponents):
-        raise QuantityError(f"the unit {unit!r} has a broken power; powers are whole, as in mm^2")
-    # The registry's base of mass is the gram.
-    return tuple(map(int, exponents)), float(base.magnitude) * 1e-3**mass
-
-
-@cache
-def _registry() -> Any:
-    import pint
-
-    registry: Any = pint.UnitRegistry(None, on_redefinition="ignore")
-    registry.load_definitions(_DEFINITIONS.strip().splitlines())
-    return registry
 
 
 def _describe(powers: Powers) -> str:
