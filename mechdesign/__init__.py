@@ -72,10 +72,16 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("mechdesign")
-    if name in _HOMES:
-        from importlib import import_module
+    from importlib import import_module
 
+    from mechdesign.commands import QUESTIONS
+
+    if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
+    if name in QUESTIONS:
+        from mechdesign.api.questions import question
+
+        return question(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 MAX_JOBS = 512  # threads or processes of one command
 MERGE = "merge"  # the command that puts shards together
@@ -18,6 +20,17 @@ class Command:
     answer: str
     room: str = ""  # package of its function, columns and pictures; empty: that of the question of its name
     section: str = ""  # of the study; empty: that of its name
+    schema: str = "schema"  # module in its package that has the model of its section
+
+    @property
+    def key(self) -> str:
+        """The key of its section in a study."""
+        return self.section or self.name
+
+    @property
+    def model(self) -> Any:
+        """The model of its section, `KinematicsSection` of `kinematics`; imported when a study has one."""
+        return getattr(import_module(f"{self.package}.{self.schema}"), f"{self.key.capitalize()}Section")
 
     @property
     def package(self) -> str:
@@ -53,6 +66,7 @@ COMMANDS = {
             "reliability",
             "How precise is it when it is made?",
             "Error moments, reliability and what contributes to them.",
+            schema="schema.section",
         ),
         Command(
             "stiffness", "How stiff is it?", "Stiffness and compliance matrices, equivalent springs and deflections."
@@ -70,12 +84,16 @@ SWEEP = Command(
     "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
     room="experiments",
     section="matrix",
+    schema="schema.matrix",
 )
 SENSITIVITIES = Command(
     "sensitivities",
     "What does each number change?",
     "Derivatives of chosen results with respect to numbers of the study, with error estimates.",
     room="experiments",
+    schema="schema.sensitivities",
 )
 # Of their cases the questions above are asked.
 QUESTIONS = COMMANDS | {SWEEP.name: SWEEP, SENSITIVITIES.name: SENSITIVITIES}
+# By the keys of their sections.
+SECTIONS = {command.key: command for command in QUESTIONS.values()}

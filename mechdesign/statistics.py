@@ -163,7 +163,7 @@ class Interval(NamedTuple):
 
 @runtime_checkable
 class Span(Protocol):
-    """Values from one to another, such as `mechdesign.questions.optimize.schema.Span`."""
+    """Values from one to another, such as `mechdesign.study.schema.conditions.Span`."""
 
     def interval(self, unit: str) -> Interval:
         """The values in a unit of a table; raises ValueError if it is another kind of quantity."""

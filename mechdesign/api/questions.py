@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -428,6 +429,11 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     array([2., 0.])
     """
     return _ask("sensitivities", study, seed, jobs=jobs, progress=progress)
+
+
+def question(command: str) -> Callable[..., Answer]:
+    """The function of a question that has none of its own above."""
+    return partial(_ask, command, seed=None)
 
 
 def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:

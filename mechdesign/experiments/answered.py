@@ -11,13 +11,13 @@ from mechdesign.cautions import fails
 from mechdesign.errors import explain
 from mechdesign.experiments.case_numbers import CaseNumber, judged
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
+from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.variants import Judging
 
 # Exit code of a case that misses a requirement, or has a warning that the study forbids.

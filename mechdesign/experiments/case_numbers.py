@@ -11,9 +11,9 @@ import numpy as np
 from mechdesign.experiments.schema.matrix import Named
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.optimize.goals import bounds_of
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.together import Group
 from mechdesign.rows import Chosen, UnknownColumnError
+from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, path_of, terms_of

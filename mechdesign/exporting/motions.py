@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -214,7 +214,7 @@ def _forward(study: Study, step: float) -> Table:
     if not 2 <= len(times) <= MAX_ROWS:
         raise StudyError(f"{len(times)} instants; from 2 to {MAX_ROWS} are possible: ask for another --rate")
     sampled = section.forward.model_copy(update={"rows": len(times), "duration": float(times[-1])})
-    moving = replace(study, dynamics=section.model_copy(update={"forward": sampled}))
+    moving = study.with_sections(dynamics=section.model_copy(update={"forward": sampled}))
     table = forward(moving, NULL)[0].tables["forward"]
     names = [(drive, *(f"{drive}_{word}" for word in ORDERS)) for drive in study.mechanism.drives]
     return Table("motion", tuple(table.column(name) for name in ("time", *sum(names, ()))))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Collection
 from importlib import import_module
 
 from mechdesign.commands import COMMANDS
-from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.work.chunks import here
@@ -15,7 +13,6 @@ from mechdesign.work.chunks import here
 # Enough designs that one of them may well be feasible.
 DESIGNS = 10
 SAMPLES = 2
-LOOSE = Precision.model_construct(relative=100.0, half_width=None)
 # Part of the duration of a motion in time that a look at it takes.
 INSTANT = 1e-6
 
@@ -49,7 +46,10 @@ def look(study: Study, command: str) -> Result:
     """
     reliability, optimize = study.reliability, study.optimize
     if reliability is not None:
-        few = {"samples": SAMPLES, "precision": LOOSE, "sobol": reliability.sobol and SAMPLES}
+        from mechdesign.questions.reliability.schema.section import Precision
+
+        loose = Precision.model_construct(relative=100.0, half_width=None)
+        few = {"samples": SAMPLES, "precision": loose, "sobol": reliability.sobol and SAMPLES}
         reliability = reliability.model_copy(update=few)
     if optimize is not None:
         method = "search" if optimize.method == "grid" else optimize.method
@@ -59,5 +59,5 @@ def look(study: Study, command: str) -> Result:
         moment = {"duration": INSTANT * float(dynamics.forward.duration), "rows": 2}
         dynamics = dynamics.model_copy(update={"forward": dynamics.forward.model_copy(update=moment)})
     with here():
-        few_study = dataclasses.replace(study, reliability=reliability, optimize=optimize, dynamics=dynamics)
+        few_study = study.with_sections(reliability=reliability, optimize=optimize, dynamics=dynamics)
         return ask(few_study, command)

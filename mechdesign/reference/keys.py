@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, get_args, get_origin
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from mechdesign.commands import SECTIONS
 from mechdesign.indices import INDEX_NAMES
 from mechdesign.reference.entries import Entry
 from mechdesign.study import Units
-from mechdesign.study.schema.study_file import StudyFile, schema
+from mechdesign.study.schema.study_file import model_of, schema
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Model, Read, meaning
 from mechdesign.study.text.forms import properties
@@ -33,7 +34,7 @@ class Key(NamedTuple):
 @cache
 def keys() -> tuple[Key, ...]:
     """Every key of the study format, a section's keys after it."""
-    return tuple(_walk(StudyFile, ""))
+    return tuple(_walk(model_of(SECTIONS), ""))
 
 
 def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
@@ -60,7 +61,7 @@ def entries() -> Iterator[Entry]:
     for key in keys():
         said = key.model.said(key.name)
         inner = list(_models(key.field.annotation))
-        model = forms if key.model is StudyFile else forms["$defs"][key.model.__name__]
+        model = forms if key.model is model_of(SECTIONS) else forms["$defs"][key.model.__name__]
         reads = list(fields.reads(key.field.annotation, key.field.metadata))
         words = _words(reads)
         about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))

@@ -12,12 +12,12 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.report.row_words import place_of
 from mechdesign.results import POSES_ONLY, Drawn, Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.statistics import AT_END, STATISTICS
 from mechdesign.study import Study
+from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named

@@ -87,11 +87,10 @@ class Designs:
 
         sections: dict[str, Any] = {
             name: section.with_numbers(number)
-            for name in COMMANDS if isinstance(section := getattr(study, name), Model)
+            for name in COMMANDS if isinstance(section := study.sections.get(name), Model)
         }  # fmt: skip
         return replace(
-            study,
-            **sections,
+            study.with_sections(**sections),
             requirements=tuple(requirement.with_numbers(number) for requirement in study.requirements),
             targets={owner: _retabled(target, number) for owner, target in study.targets.items()},
             resolved=resolved,
@@ -145,7 +144,7 @@ class Designs:
         with np.errstate(all="ignore"):
             self._judge_geometry(note)
             for command in COMMANDS:
-                section = getattr(self.study, command)
+                section = self.study.sections.get(command)
                 if isinstance(section, Model):
                     self._judge(section, command, note)
         return reasons

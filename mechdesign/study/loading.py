@@ -12,26 +12,18 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.cautions import ALL, Caution
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, SECTIONS
 from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
-from mechdesign.experiments.schema.matrix import MatrixSection
-from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.questions.dynamics.schema import DynamicsSection
-from mechdesign.questions.kinematics.schema import KinematicsSection
-from mechdesign.questions.optimize.schema import OptimizeSection, Requirement, check_result
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
-from mechdesign.questions.stiffness.schema import StiffnessSection
-from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
@@ -40,9 +32,10 @@ from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.conditions import Requirement, check_result
 from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.schema.study_file import StudyFile, override
+from mechdesign.study.schema.study_file import keys_at, model_of, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
@@ -50,6 +43,16 @@ from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread
+
+if TYPE_CHECKING:
+    from mechdesign.experiments.schema.matrix import MatrixSection
+    from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
+    from mechdesign.questions.dynamics.schema import DynamicsSection
+    from mechdesign.questions.kinematics.schema import KinematicsSection
+    from mechdesign.questions.optimize.schema import OptimizeSection
+    from mechdesign.questions.reliability.schema.section import ReliabilitySection
+    from mechdesign.questions.stiffness.schema import StiffnessSection
+    from mechdesign.questions.workspace.schema import WorkspaceSection
 
 # Characters that are replaced in the folder's name, and the name of a study without one.
 _UNFIT = re.compile(r"[^\w.-]+")
@@ -91,14 +94,7 @@ class Study:
     resolved: dict[str, Any]  #: the study as plain data, overrides applied
     mechanism: Mechanism  #: which solves any pose
     parameters: Parameters
-    kinematics: KinematicsSection | None
-    workspace: WorkspaceSection | None
-    optimize: OptimizeSection | None
-    reliability: ReliabilitySection | None
-    stiffness: StiffnessSection | None
-    dynamics: DynamicsSection | None
-    matrix: MatrixSection | None
-    sensitivities: SensitivitiesSection | None
+    sections: Mapping[str, Any]  #: by their keys; also as attributes, ``study.kinematics``
     requirements: tuple[Requirement, ...]  #: in the order of the file
     fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
     targets: Mapping[str, Target]  # by the coordinate or point
@@ -109,10 +105,29 @@ class Study:
     strict: bool = False  #: whether every kind of warning fails, not only those of `fail_on`
     warnings: tuple[Problem, ...] = ()  #: likely mistakes, such as a parameter that nothing uses
 
+    if TYPE_CHECKING:
+        kinematics: ClassVar[KinematicsSection | None]
+        workspace: ClassVar[WorkspaceSection | None]
+        optimize: ClassVar[OptimizeSection | None]
+        reliability: ClassVar[ReliabilitySection | None]
+        stiffness: ClassVar[StiffnessSection | None]
+        dynamics: ClassVar[DynamicsSection | None]
+        matrix: ClassVar[MatrixSection | None]
+        sensitivities: ClassVar[SensitivitiesSection | None]
+
+    def __getattr__(self, name: str) -> Any:
+        if name in SECTIONS:
+            return self.sections.get(name)
+        raise AttributeError(f"a study has no {name!r}")
+
+    def with_sections(self, **sections: Any) -> Self:
+        """The study with other sections, by their keys."""
+        return dataclasses.replace(self, sections={**self.sections, **sections})
+
     @cached_property
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
-        return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+        return tuple(command for command in COMMANDS if self.sections.get(command) is not None)
 
     @property
     def source(self) -> Source:
@@ -363,9 +378,7 @@ def load_document(
         resolved=plain(document.data) | named,
         mechanism=mechanism,
         parameters=parameters,
-        **{command: parts.get(command) for command in COMMANDS},
-        matrix=parts.get("matrix"),
-        sensitivities=parts.get("sensitivities"),
+        sections={key: parts[key] for key in SECTIONS if key in parts},
         requirements=parts["requirements"],
         fail_on=parts["fail_on"],
         strict=False,
@@ -424,11 +437,12 @@ def context_of(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, di
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
     """Validate each top-level key by itself, so that all mistakes are found; wrong parts are left out."""
     parts: dict[str, Any] = {"seed": 0, "requirements": (), "fail_on": ()}
-    fields = StudyFile.model_fields
+    names = keys_at(())
     for key in data:
-        if key not in fields:
-            reporter.report((key,), unknown_key(key, fields), at_key=True)
-    for key, field in fields.items():
+        if key not in names:
+            reporter.report((key,), unknown_key(key, names), at_key=True)
+    model = model_of(data)
+    for key, field in model.model_fields.items():
         raw = data.get(key)
         if raw is None:
             if field.is_required():
@@ -443,10 +457,10 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
         try:
             parts[key] = validator.validate_python(raw, context=context)
         except ValidationError as error:
-            reporter.report_validation(error, StudyFile, (key,))
+            reporter.report_validation(error, model, (key,))
             # If only numbers and keys are wrong, the names in this part can still be checked.
             with contextlib.suppress(ValidationError):
-                parts[key] = validator.validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
+                parts[key] = validator.validate_python(reporter.mended(error, model, key, raw), context=context)
     return parts
 
 
@@ -527,7 +541,7 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
 @cache
 def adapter(key: str) -> TypeAdapter[Any]:
     """Validator of one top-level key."""
-    return TypeAdapter(StudyFile.model_fields[key].rebuild_annotation())
+    return TypeAdapter(model_of((key,)).model_fields[key].rebuild_annotation())
 
 
 def _compiled(description: Description, reporter: Reporter, original: Mechanism | None) -> Mechanism | None:

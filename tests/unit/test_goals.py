@@ -14,9 +14,9 @@ from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import Goal, goal, goals_of, unit_of
 from mechdesign.questions.optimize.question import designs_question
-from mechdesign.questions.optimize.schema import Condition
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
+from mechdesign.study.schema.conditions import Condition
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 Designs = Mapping[str, np.ndarray]

@@ -10,7 +10,6 @@ import pytest
 
 from mechdesign.questions.columns import GIVEN, VALID
 from mechdesign.questions.kinematics.columns import MOTION
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.reliability.columns import RELIABILITY
 from mechdesign.questions.stiffness.columns import STIFFNESS
 from mechdesign.questions.workspace.columns import INDICES
@@ -19,6 +18,7 @@ from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
 from mechdesign.report.requirements import judge
 from mechdesign.results import Column, Result, Table
+from mechdesign.study.schema.conditions import Requirement
 
 X = np.linspace(0, 10, 400)
 

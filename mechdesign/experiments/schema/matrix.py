@@ -12,9 +12,9 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.errors import StudyError, printable
 from mechdesign.expressions import Expression
-from mechdesign.questions.optimize.schema import WORDS as WORDS
-from mechdesign.questions.optimize.schema import Chosen, check_result, read_result
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.conditions import WORDS as WORDS
+from mechdesign.study.schema.conditions import Chosen, check_result, read_result
 from mechdesign.study.schema.variable import LIST_FORM, plainly, read_values
 from mechdesign.study.text import fields
 from mechdesign.study.text.csv_files import read_cells

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import model_validator
 
 from mechdesign.experiments.schema.matrix import Results
-from mechdesign.questions.optimize.schema import check_result
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.text import fields
 
 HELP_PAGE = "howto/sensitivities"

@@ -330,7 +330,7 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
         # What efforts bring about is a motion over time, whose poses are there already.
         rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
-    question = motion_question(replace(study, kinematics=motion, targets={}), poses)
+    question = motion_question(replace(study.with_sections(kinematics=motion), targets={}), poses)
     borne = ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo)
     if study.dynamics is None and not borne.size and not (motion.rated and weighed_beams(study)):
         message = (

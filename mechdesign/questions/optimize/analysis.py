@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -332,7 +331,7 @@ def drawn_design(designs: Designs, design: Design) -> DrawnDesign:
     judged = (*designs.goals, *designs.conditions)
     if made.workspace is not None and any(goal.command == "workspace" for goal in judged):
         # Only the region is drawn.
-        plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
+        plain = made.with_sections(workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
             shapes = _shapes(designs.conditions, study, numbers)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
 from typing import Any
@@ -121,7 +120,7 @@ class Evaluator:
         section = lifted.study.optimize
         assert section is not None
         variables = {lifted.parameters.get(name, name): variable for name, variable in section.variables.items()}
-        named = replace(lifted.study, optimize=section.model_copy(update={"variables": variables}))
+        named = lifted.study.with_sections(optimize=section.model_copy(update={"variables": variables}))
         return Evaluator(designs_question(named, self.goals, graded=graded), lifted.parameters)
 
     def _alike(self, designs: Mapping[str, Floats]) -> Evaluated:
@@ -219,7 +218,7 @@ class Evaluator:
             section = section.model_copy(update={"allocate": None})
         if not any(column.startswith("sobol_") for column in columns):
             section = section.model_copy(update={"sobol": 0})
-        return replace(study, reliability=section)
+        return study.with_sections(reliability=section)
 
     def _one(self, batch: Batch, k: int) -> str:
         """Evaluate the other goals of one design; returns why it is infeasible, empty if it is not."""

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.rounding import cleared
-from mechdesign.questions.optimize.schema import Condition, Containment, OptimizeSection, Outline
+from mechdesign.questions.optimize.schema import Containment, OptimizeSection, Outline
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
@@ -19,6 +19,7 @@ from mechdesign.results import Result
 from mechdesign.rows import Chosen
 from mechdesign.statistics import STATISTICS, Request, worst
 from mechdesign.study import Study
+from mechdesign.study.schema.conditions import Condition
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, command_of, path_of, terms_of

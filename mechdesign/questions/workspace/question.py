@@ -180,7 +180,7 @@ def _over_range(
               "characteristic_length": section.characteristic_length or 1.0}  # fmt: skip
     coordinate = study.mechanism.coordinate(name)
     low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
-    single = replace(study, workspace=section.model_copy(update=update))
+    single = study.with_sections(workspace=section.model_copy(update=update))
     for question in questions(single, tolerance, columns):
         base = question.field
         if base.plan.iterative:

@@ -24,7 +24,6 @@ from PIL import Image
 from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
-from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -39,6 +38,7 @@ from mechdesign.report.page.pages import harmless
 from mechdesign.report.page.tracks import joined
 from mechdesign.report.requirements import Verdict, judged_by, named
 from mechdesign.study import Study
+from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import path_of
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Link
 from mechdesign.mechanism.wheels import carrier_of
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection, PoseSection
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
+
+if TYPE_CHECKING:
+    from mechdesign.questions.reliability.schema.section import ReliabilitySection
 
 # Likely angles in turns, and the relative accuracy of radians written with few digits, such as 6.28.
 TURNS = (0.25, 0.5, 1.0, 2.0)

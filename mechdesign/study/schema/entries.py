@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError, suggestion
-from mechdesign.experiments.schema.matrix import MatrixSection
-from mechdesign.questions.optimize.schema import OptimizeSection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import shown
+
+if TYPE_CHECKING:
+    from mechdesign.experiments.schema.matrix import MatrixSection
+    from mechdesign.questions.optimize.schema import OptimizeSection
 
 HELP_PAGE = "theory/optimize"
 

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, create_model
+from pydantic.fields import FieldInfo
 
 from mechdesign.cautions import ALL, KINDS
+from mechdesign.commands import SECTIONS
 from mechdesign.errors import StudyError, cut, suggestion
-from mechdesign.experiments.schema.matrix import MatrixSection
-from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
-from mechdesign.questions.dynamics.schema import DynamicsSection
-from mechdesign.questions.kinematics.schema import KinematicsSection
-from mechdesign.questions.optimize.schema import OptimizeSection, Requirement
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
-from mechdesign.questions.stiffness.schema import StiffnessSection
-from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, Mark, dotted, has, read, value_at
 from mechdesign.study.text.forms import Generator, name_forms
@@ -37,14 +33,6 @@ class StudyFile(fields.Model):
     seed: Annotated[int, fields.whole(0)] = 0
     """Seed of the random numbers; ``--seed`` goes before. Example: 1"""
     mechanism: MechanismSection
-    kinematics: KinematicsSection | None = None
-    workspace: WorkspaceSection | None = None
-    optimize: OptimizeSection | None = None
-    reliability: ReliabilitySection | None = None
-    stiffness: StiffnessSection | None = None
-    dynamics: DynamicsSection | None = None
-    matrix: MatrixSection | None = None
-    sensitivities: SensitivitiesSection | None = None
     requirements: tuple[Requirement, ...] = ()
     """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts, along a motion the
     worst place between the rows, too. Example: [{result: kinematics.mu, abs: true, at_least: 40}, {result:
@@ -56,9 +44,27 @@ class StudyFile(fields.Model):
     """
 
 
+def model_of(keys: Collection[object]) -> type[StudyFile]:
+    """The model of a study with the sections among some keys; others are not imported."""
+    return _model_of(tuple(key for key in SECTIONS if key in keys))
+
+
+@cache
+def _model_of(sections: tuple[str, ...]) -> type[StudyFile]:
+    keys: dict[str, Any] = {key: (SECTIONS[key].model | None, None) for key in sections}
+    return create_model(StudyFile.__name__, __base__=StudyFile, __doc__=StudyFile.__doc__, **keys)
+
+
+def keys_at(path: Sequence[str | int]) -> Mapping[str, FieldInfo | None]:
+    """The keys that the format has at a path of a study, with their fields below the top level."""
+    if not path:
+        return dict.fromkeys((*StudyFile.model_fields, *SECTIONS))
+    return schema_fields(model_of(path[:1]), path)
+
+
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a study file, with which editors complete and check."""
-    form = StudyFile.model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
+    form = model_of(SECTIONS).model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
     name_forms(form)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mechdesign study"}
     return head | {key: value for key, value in form.items() if key not in head}
@@ -103,7 +109,7 @@ def _apply(document: Document, text: str, label: str) -> None:
     there = has(holder, key)
     if isinstance(holder, dict) and parsed.data is None:
         # An empty value removes the entry: `--set kinematics.sweep=` makes room for other poses.
-        if not there and key not in schema_fields(StudyFile, path[:-1]):
+        if not there and key not in keys_at(path[:-1]):
             raise StudyError(f"there is no {dotted(path)} to take away{suggestion(key, holder)}")
         holder.pop(key, None)
     elif isinstance(holder, list) and not there:
@@ -158,9 +164,9 @@ def _next_key(data: Any, path: list[str | int], rest: list[str]) -> tuple[str | 
     # A new key that contains dots ends where the schema knows what follows.
     for length in range(1, len(rest)):
         key = ".".join(rest[:length])
-        if rest[length] in schema_fields(StudyFile, [*path, key]):
+        if rest[length] in keys_at([*path, key]):
             return key, rest[length:]
-    if schema_fields(StudyFile, path):
+    if keys_at(path):
         return rest[0], rest[1:]
     if len(rest) > 1 and _INDEX.fullmatch(rest[-1]):
         place, hint = dotted([*path, *rest[:-1]]), suggestion(rest[0], data)
@@ -182,7 +188,7 @@ def entry(data: Any, name: str) -> KeyPath:
     _, path = _descend(Document("", data), segments, "", making=False)
     here = data
     for k, key in enumerate(path):
-        keys = schema_fields(StudyFile, path[:k])
+        keys = keys_at(path[:k])
         if not has(here, key) and key not in keys:
             names = [*keys, *(here if isinstance(here, dict) else ())]
             hint = suggestion(str(key), names) or "; give it a value there first"
@@ -196,5 +202,5 @@ def entry(data: Any, name: str) -> KeyPath:
 
 def kinds_of(keys: KeyPath) -> set[str]:
     """Kinds (of `units.KINDS`) of the number at a path, if the format determines them."""
-    field = schema_fields(StudyFile, keys[:-1]).get(str(keys[-1]))
+    field = keys_at(keys[:-1]).get(str(keys[-1]))
     return {read.kind for read in fields.reads(field.annotation, field.metadata) if read.kind} if field else set()

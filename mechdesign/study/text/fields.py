@@ -453,7 +453,7 @@ class Model(BaseModel):
     The docstring under an attribute is the description of its key; after it ``Example:`` may stand, also repeatedly.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True, defer_build=True)
     bare: ClassVar[str] = ""  # key of a value that may stand alone, in place of the mapping
     short: ClassVar[tuple[Form, ...]] = ()  # JSON Schema of the short forms
     one_of: ClassVar[tuple[str, ...]] = ()  # a message, and keys of which exactly one is given
