@@ -263,7 +263,7 @@ _add(
     ),
     "Write a file for other tools: parts to cut, a drawing, a simulator's model.",
     "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "
-    "nothing meets, a drawing sheet, a model for MuJoCo or Gazebo, curves, the motion for a controller, the study as "
+    "nothing meets, a drawing sheet, a model for MuJoCo, curves, the motion for a controller, the study as "
     "JSON.",
 )
 _add(

@@ -1,4 +1,4 @@
-"""The mechanism as rigid bodies for simulators: a tree of joints, the joints that close its loops, in SI units.
+"""The mechanism as rigid bodies for a simulator: a tree of joints, the joints that close its loops, in SI units.
 
 Slides and clamps come first into the tree, then pins that are drives, then other pins; each joint that would close a
 loop stands among the `closures`. A pin in a slot is pinned to a block of its own that slides there. Where a slide

@@ -1,4 +1,4 @@
-"""What models for simulators share as text: numbers, comments, colours, and the shapes of links."""
+"""A model for a simulator as text: numbers, comments, colours, and the shapes of links."""
 
 from __future__ import annotations
 

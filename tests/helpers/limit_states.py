@@ -11,9 +11,8 @@ import numpy as np
 from scipy.special import gammaincc, ndtr, ndtri
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.questions.reliability.engine.problem import Problem
 from mechdesign.questions.reliability.laws import Measured
-from mechdesign.questions.reliability.methods import quasi_monte_carlo as quasi
 
 
 @dataclass(frozen=True)
@@ -176,15 +175,3 @@ def noisy() -> Case:
         return (factors @ values + 0.001 * np.sin(100 * values).sum(axis=0))[None]
 
     return Case(6, margins, float(step * (load @ below)))
-
-
-def quasi_monte_carlo(problem: Problem, seed: int, samples: int) -> Estimate:
-    """Scrambled points; `seed` names the scramblings."""
-    counts, broken, invalid = quasi.replicates(samples), [], 0
-    for k, count in enumerate(counts):
-        broken.append(0)
-        for u in quasi.points(problem.dimension, count, seed + k):
-            margins = problem.margins(u)
-            broken[-1] += int(failed(margins).sum())
-            invalid += int(np.isnan(margins).any(axis=0).sum())
-    return quasi.estimate(broken, counts[0], invalid)

@@ -20,7 +20,7 @@ from mechdesign.results import Result, Table
 CONFIGS = Path(__file__).parents[2] / "configs"
 ARM = {0.03: 1.4855308e-1, 0.05: 6.5387526e-3, 0.08: 3.218867e-6, 0.10: 1.6566e-9}
 SLIDER_CRANK = {30.0: 2.7717025e-2, 60.0: 4.0996265e-2}
-SAMPLED = ("monte_carlo", "quasi_monte_carlo", "importance_sampling", "auto")
+SAMPLED = ("monte_carlo", "importance_sampling", "auto")
 # P(|error| > limit) of the arm by FORM over the exact one, in the isotropic map of the clearance disc.
 FORM = {0.03: (1.0, 1.1), 0.05: (1.1, 1.3), 0.08: (2.2, 2.6), 0.10: (4.4, 5.0)}
 FOUR_BAR = """

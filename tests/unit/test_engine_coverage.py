@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers import limit_states
-from helpers.limit_states import Case, quasi_monte_carlo
+from helpers.limit_states import Case
 
 from mechdesign.questions.reliability.engine.design_points import find
 from mechdesign.questions.reliability.engine.problem import (
@@ -93,24 +93,6 @@ def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
         intervals.append((found.low, found.high))
         assert found.high - found.low <= 0.2 * found.failure
     check(intervals, case.exact)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(("name", "samples"), [("half_space_2", 2**14), ("parabola", 2**17), ("half_space_5", 2**15)])
-def test_quasi_monte_carlo(name: str, samples: int) -> None:
-    """Where replicates give the interval, and not the few failures."""
-    case = {**CASES, "half_space_2": limit_states.linear(2, 1.0), "half_space_5": limit_states.linear(5, 1.5)}[name]
-    found = [quasi_monte_carlo(case.problem, 16 * seed, samples) for seed in range(50)]
-    assert min(each.failures for each in found) >= 200
-    check([(each.low, each.high) for each in found], case.exact)
-
-
-@pytest.mark.slow
-def test_quasi_monte_carlo_of_few_failures() -> None:
-    case = CASES["four_branches"]
-    found = [quasi_monte_carlo(case.problem, 16 * seed, 2**12) for seed in range(50)]
-    assert max(each.failures for each in found) < 200
-    check([(each.low, each.high) for each in found], case.exact)
 
 
 @pytest.mark.nightly

@@ -14,7 +14,6 @@ from mechdesign.questions.kinematics.figures.animation import _frames as frames_
 from mechdesign.questions.kinematics.figures.animation import in_order
 from mechdesign.questions.kinematics.figures.centrodes import centrodes
 from mechdesign.questions.kinematics.figures.curves import curves_figure, motion_figure
-from mechdesign.questions.kinematics.figures.hodographs import hodographs_figure
 from mechdesign.questions.kinematics.figures.paths import draw_paths, path_looks
 from mechdesign.questions.kinematics.figures.polygons import centripetal, images
 from mechdesign.questions.kinematics.figures.poses import place_of
@@ -384,7 +383,7 @@ def test_a_pin_has_no_centrodes():
 
 
 RATES = ("kinematics.rates={theta: 60 rpm}", "kinematics.outputs=[A, B, C]")
-ASKED = (*RATES, "kinematics.pictures=[hodographs, polygons]")
+ASKED = (*RATES, "kinematics.pictures=[polygons]")
 
 
 def test_a_velocity_polygon_ends_at_the_velocities_of_the_table():
@@ -411,21 +410,11 @@ def test_a_velocity_polygon_ends_at_the_velocities_of_the_table():
 
 
 @pytest.mark.nightly
-def test_hodographs_and_polygons_are_drawn_where_they_are_asked_for():
-    assert {"hodographs", "polygons"} <= names(study_of(FOUR_BAR, *ASKED))
-    assert not {"hodographs", "polygons"} & names(study_of(FOUR_BAR, *RATES))
-    with pytest.raises(mechdesign.StudyError, match="hodographs show velocities: give 'rates'"):
-        study_of(FOUR_BAR, "kinematics.pictures=[hodographs]")
-
-
-def test_the_tip_of_a_hodograph_is_the_velocity():
-    study = study_of(FOUR_BAR, *ASKED)
-    result = mechdesign.kinematics(study)
-    with style.context():
-        axes, _ = hodographs_figure(MotionView(study, result)).axes
-    curve = next(line for line in axes.lines if line.get_label() == "C")
-    np.testing.assert_array_equal(curve.get_xdata(), result.tables["motion"]["C.x_velocity"])
-    np.testing.assert_array_equal(curve.get_ydata(), result.tables["motion"]["C.y_velocity"])
+def test_polygons_are_drawn_where_they_are_asked_for():
+    assert "polygons" in names(study_of(FOUR_BAR, *ASKED))
+    assert "polygons" not in names(study_of(FOUR_BAR, *RATES))
+    with pytest.raises(mechdesign.StudyError, match="polygons show velocities: give 'rates'"):
+        study_of(FOUR_BAR, "kinematics.pictures=[polygons]")
 
 
 @pytest.mark.nightly

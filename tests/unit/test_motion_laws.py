@@ -444,5 +444,5 @@ def test_radians_in_place_of_degrees_are_doubted(tmp_path: Path) -> None:
 
 
 def test_pictures_of_velocities_take_the_rates_of_the_motion(tmp_path: Path) -> None:
-    motion = "motion: {theta: [{from: 40, to: 100, time: 0.3}]}, outputs: [P], pictures: [hodographs, polygons]"
+    motion = "motion: {theta: [{from: 40, to: 100, time: 0.3}]}, outputs: [P], pictures: [polygons]"
     assert asked(f"kinematics: {{{motion}}}", tmp_path).tables["motion"]["P.x_velocity"].any()

@@ -251,7 +251,7 @@ def texts(command, study, **options):
     return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
 
 
-METHODS = "[analytic, second_order, monte_carlo, form, importance_sampling, quasi_monte_carlo, auto]"
+METHODS = "[analytic, second_order, monte_carlo, form, importance_sampling, auto]"
 
 
 CASES = [

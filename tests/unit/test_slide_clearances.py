@@ -42,8 +42,8 @@ reliability:
   poses: [{crank: 40}, {crank: 200}]
   outputs: [T, slot.slide]
   rates: {crank: 3}
-  methods: [analytic, second_order, quasi_monte_carlo]
-  samples: 4096
+  methods: [analytic, second_order, monte_carlo]
+  samples: 200000
   sobol: 0
 """
 
@@ -83,6 +83,7 @@ def test_a_slider_shifts_and_tilts_as_its_ends_lie_in_the_guide(pin):
         assert rows(result.tables["reliability"], method="monte_carlo")["reliability"] == pytest.approx(kept, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_pin_in_a_slot_shifts_across_it_with_all_its_rates():
     study = mechdesign.load(text=QUICK_RETURN)
     result = mechdesign.reliability(study, seed=1)
@@ -95,7 +96,7 @@ def test_a_pin_in_a_slot_shifts_across_it_with_all_its_rates():
         slope = [(moved[1][name] - moved[0][name]) / 2e-4 for name in ("T.x", "T.y", "slot.slide")]
         assert found["sigma"] == pytest.approx(np.abs(slope) * np.sqrt(place), rel=1e-5), row
     first = rows(result.tables["moments"], method="analytic")
-    for method, accuracy in (("second_order", 1e-3), ("quasi_monte_carlo", 3e-3)):
+    for method, accuracy in (("second_order", 1e-3), ("monte_carlo", 3e-3)):
         assert rows(result.tables["moments"], method=method)["sigma"] == pytest.approx(first["sigma"], rel=accuracy)
     assert set(first["order"]) == {"position", "velocity", "acceleration"}
 
@@ -113,7 +114,7 @@ def test_every_method_agrees_on_a_slider_crank_with_slide_and_pin_clearances():
       clearances: {guide: {fit: 16 H7/g6, length: 40, distribution: uniform}, A: {fit: 20 H7/g6}}
       poses: [{crank: 60}]
       limits: {T.y: 0.03, T.x: 0.12}
-      methods: [analytic, second_order, monte_carlo, quasi_monte_carlo, form, importance_sampling]
+      methods: [analytic, second_order, monte_carlo, form, importance_sampling]
       samples: 50000
       sobol: 0
     """
@@ -144,7 +145,7 @@ def test_a_slot_and_a_pin_have_no_length_and_form_no_walls():
         mechdesign.load(text=QUICK_RETURN.replace("slot: {fit", "P: {length: 9, fit"))
     slot = QUICK_RETURN.replace("H8/f7", "H8/f7, pin: contact")
     for text in (GUIDED.replace("PIN", "contact"), slot):
-        with pytest.raises(StudyError, match="ask for monte_carlo or quasi_monte_carlo"):
+        with pytest.raises(StudyError, match="ask for monte_carlo or another pin model"):
             mechdesign.load(text=text.replace("second_order", "form"))
 
 

@@ -20,10 +20,7 @@ from mechdesign.study.text.fields import failure
 HELP_PAGE = "reference/study/kinematics"
 
 # Drawn where they are asked for.
-PICTURES = {
-    "hodographs": "velocities and accelerations of points over the motion, as the ways of their vectors' tips",
-    "polygons": "velocity and acceleration polygons of a few poses, or of the listed ones",
-}
+PICTURES = {"polygons": "velocity and acceleration polygons of a few poses, or of the listed ones"}
 
 
 def _every_pair(raw: Any) -> Any:
@@ -55,7 +52,7 @@ class KinematicsSection(MotionSection):
     counts. With more than one drive it depends on their rates. Example: [[rod, ground], [crank, rocker]]
     """
     pictures: tuple[Annotated[str, fields.choice(PICTURES, "picture")], ...] = ()
-    """Pictures beside those that are always drawn; both need rates. Example: [hodographs, polygons]"""
+    """Pictures beside those that are always drawn; they need rates. Example: [polygons]"""
     mechanical_advantage: dict[fields.CoordinateName, fields.CoordinateName] = Field(default_factory=dict)
     """Outputs, each with its input: the force (of an angle the moment) that the output gives over that put in, without
     friction; other drives are held. Example: {T.y: grip}
@@ -75,8 +72,7 @@ class KinematicsSection(MotionSection):
         self._check_advantage(checker)
         self._check_collisions(checker)
         if self.pictures and not self.rates and self.speed is None and self.motion is None:
-            shown = " and ".join(self.pictures)
-            message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
+            message = f"{self.pictures[0]} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
             checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))

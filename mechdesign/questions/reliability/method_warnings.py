@@ -75,7 +75,7 @@ def _cornered(task: Task) -> list[Caution]:
                 "undefined",
                 f"{task.question.channels[output].name} bends, jumps or ends within its errors at {where}{several}: "
                 "it has no derivative there by which analytic, second_order and the contributions could judge it; ask "
-                "for monte_carlo or quasi_monte_carlo",
+                "for monte_carlo",
                 pose=where,
             ))  # fmt: skip
     return cautions

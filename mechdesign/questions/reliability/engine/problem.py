@@ -74,16 +74,6 @@ def _gamma(mean: float, variance: float, share: float) -> float:
     return float(gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
-def replicated(means: Floats) -> tuple[float, float]:
-    """Student's interval of the mean of independent estimates."""
-    from mechdesign.numerics.statistics import student
-
-    count = len(means)
-    half = student(count - 1, CONFIDENCE) * float(np.std(means, ddof=1)) / float(np.sqrt(count))
-    mean = float(np.mean(means))
-    return max(mean - half, 0.0), min(mean + half, 1.0)
-
-
 # Step of a difference quotient of margins, in standard deviations: the third root of their rounding.
 _MARGIN_STEP = 1e-4
 # Points evaluated in one call, few enough that intermediate values stay in the processor's cache.

@@ -20,8 +20,8 @@ from mechdesign.work.chunks import map_chunks
 
 Value = TypeVar("Value")
 
-# Names of streams of random numbers: of searches for design points, and of quasi-Monte Carlo's scrambling.
-SEARCH, QUASI = 1, 2
+# Name of the stream of random numbers of searches for design points.
+SEARCH = 1
 
 
 def run(name: str, task: Task) -> MethodResult:

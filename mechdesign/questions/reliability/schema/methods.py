@@ -93,12 +93,6 @@ _METHODS = (
         4, "INK", "o", sampled=True, errors=True,
     ),
     Method(
-        "quasi_monte_carlo", "quasi Monte Carlo", "made mechanisms at scrambled Sobol points",
-        "As monte_carlo, and closer with as many samples where few sources make most of the error: they are spread "
-        "evenly, in 16 replicates.",
-        5, "FAINT", "^", sampled=True, errors=True,
-    ),
-    Method(
         "form", "FORM", "tangents of the limits at their design points",
         "A check where failures are rare, from some hundred solved mechanisms. It is exact for limits that are flat in "
         "normal variables; of a curved one it is off by a factor that grows as failures become rarer.",
@@ -108,14 +102,14 @@ _METHODS = (
         "importance_sampling", "importance sampling", "made mechanisms drawn about the design points",
         "Where failures are rare: it finds one in a billion from some ten thousand solved mechanisms, if the design "
         "points that it found are all that matter. It gives no moments.",
-        6, "PURPLE", "X", sampled=True, step=2,
+        5, "PURPLE", "X", sampled=True, step=2,
     ),
     Method(
         "auto", "auto", "the cheapest method that reaches the precision asked",
         "Where the probability of failure decides: it begins with plain samples and goes on to methods for rare "
         "failures where these are not precise enough. The column 'used' has the method that the value comes from; a "
         "warning tells where two disagree.",
-        7, "ORANGE", "*", sampled=True, errors=True, precise=True,
+        6, "ORANGE", "*", sampled=True, errors=True, precise=True,
     ),
 )  # fmt: skip
 METHODS = {method.name: method for method in _METHODS}

@@ -162,7 +162,7 @@ class ReliabilitySection(MotionSection):
             if at_walls and (METHODS[method].step or METHODS[method].precise):
                 message = (
                     f"the play of {at_walls[0]!r} is at one end or at the other, and {method} needs errors that change "
-                    "gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
+                    "gradually; ask for monte_carlo or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
         if self.shown is not None and not any(METHODS[method].sampled for method in self.methods):
