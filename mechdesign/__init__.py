@@ -69,9 +69,9 @@ __all__ = sorted((*_HOMES, "__version__"))
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from importlib.metadata import version
+        from mechdesign.versions import installed
 
-        return version("mechdesign")
+        return installed("mechdesign")
     from importlib import import_module
 
     from mechdesign.commands import QUESTIONS

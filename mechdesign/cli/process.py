@@ -25,6 +25,8 @@ def run(command: Callable[[], Any]) -> None:
     if not sys.warnoptions:
         # Libraries warn of what their callers do, with lines of their code; users get the warnings of their study.
         warnings.simplefilter("ignore")
+    # Plugins of pydantic, which it would look for in every package that is installed, concern no study.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     output = _open_streams()
     # What it says of its cache and its fonts concerns no study.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)

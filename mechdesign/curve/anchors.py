@@ -14,7 +14,7 @@ from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Floats, Ints, evenly
+from mechdesign.numerics.arrays import Floats, Ints, distinct, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -44,7 +44,7 @@ def steps_of(study: Study, plan: Plan, poses: Poses) -> tuple[Floats, Floats]:
     The steps are whole numbers of shape (lines, parts).
     """
     end, mechanism, lines = float(poses.end), study.mechanism, poses.count // poses.line
-    marks = np.unique(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
+    marks = distinct(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
     count = np.ones((lines, len(marks) - 1))
     (group,), units = poses.groups, units_of(study, plan.structure.given)
     for coordinate, column, unit in zip(plan.structure.given, group.columns(), units, strict=True):

@@ -17,7 +17,7 @@ from mechdesign.curve.motion import INSET
 from mechdesign.curve.pieces import MOST_HALVINGS, largest
 from mechdesign.curve.series import EXACT
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Floats, Ints, Lanes
+from mechdesign.numerics.arrays import Floats, Ints, Lanes, firsts
 
 # A quotient is infinite where its divisor is zero and its numerator is more than this part of its largest value.
 POLE = 1e-9
@@ -136,7 +136,7 @@ class Functions(Means):
             equal = np.maximum(twice.ravel(), np.where(np.isfinite(best), ROUNDED * np.abs(best), 0.0))
             tie = np.flatnonzero(value >= (best - equal)[lane])
             tie = tie[np.lexsort((place[tie], lane[tie]))]
-            lanes, first = np.unique(lane[tie], return_index=True)
+            lanes, first = firsts(lane[tie])
             chosen = tie[first]
             own, sign = rows[lanes // lines], sign[lanes // lines]
             table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], equal[lanes])

@@ -7,7 +7,7 @@ import numpy as np
 from mechdesign.curve.pieces import MOST_HALVINGS, between_marks
 from mechdesign.curve.series import Series
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, distinct
 
 # A function without a divisor is infinite if it still rises by more than this part of itself from node to node of a
 # piece that cannot be halved.
@@ -41,8 +41,8 @@ class Means(Series):
         row = self.names[name]
         size = np.maximum(self._scale[row], self._sizes[row])[self.pieces.line]
         large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * size) ** power
-        endless = np.unique(self.pieces.line[large & self._endless(values * pace * self.pieces.stretch)])
-        negative = np.unique(self.pieces.line[(values < 0).any(axis=1)])
+        endless = distinct(self.pieces.line[large & self._endless(values * pace * self.pieces.stretch)])
+        negative = distinct(self.pieces.line[(values < 0).any(axis=1)])
         mean[endless] = np.where(absolute | ~np.isin(endless, negative), np.inf, np.nan)
         return mean
 
@@ -68,7 +68,7 @@ class Means(Series):
         """Integrals of absolute values over each piece; `sizes` are those of pieces without a change of sign."""
         series = chebyshev.series(values)
         piece, x = chebyshev.zeros(series, chebyshev.turning_points(series))
-        of, low, high = between_marks(piece, x, np.unique(piece))
+        of, low, high = between_marks(piece, x, distinct(piece))
         flow = chebyshev.series(values * pace * self.pieces.stretch)[of]
         between = np.abs(chebyshev.primitive(flow, high) - chebyshev.primitive(flow, low))
         crossed = np.bincount(of, between, len(sizes))

@@ -24,7 +24,7 @@ from mechdesign.mechanism.core import ON_THE_CUT
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -275,10 +275,10 @@ class Curve:
 
         Angles of torsion springs have their turns from the sketch on.
         """
-        lines, first = np.unique(pieces.line, return_index=True)
+        lines, first = firsts(pieces.line)
         rows = np.ceil(pieces.begin)
         inside = np.flatnonzero(rows <= pieces.end)
-        some, which = np.unique(pieces.line[inside], return_index=True)
+        some, which = firsts(pieces.line[inside])
         first[np.searchsorted(lines, some)] = inside[which]
         place = np.minimum(rows[first], pieces.end[first])
         x = pieces.take(first).within(place)

@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.margins import Cause
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes, distinct
 
 # Largest number of halvings of a piece; a function that still has a corner or a jump in it stays as it is.
 MOST_HALVINGS = 40
@@ -258,7 +258,7 @@ class Search:
             end, piece = np.nonzero(bare)
             owner, marks = np.concatenate([owner, piece]), np.concatenate([marks, 2.0 * end - 1.0])
             dead = np.concatenate([dead, np.ones(len(piece), dtype=bool)])
-        cut = np.unique(owner)
+        cut = distinct(owner)
         of, low, high = between_marks(owner, marks, cut)
         keep = (chebyshev.value(coefficients[of], (low + high) / 2) >= 0) | (role == "across")
         of, low, high = of[keep], low[keep], high[keep]

@@ -9,7 +9,6 @@ import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +22,7 @@ from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.versions import installed
 
 HELP_PAGE = "howto/report"
 
@@ -146,9 +146,9 @@ def whole(directory: Path) -> dict[str, Any]:
 
 @cache
 def _versions() -> dict[str, dict[str, str]]:
-    libraries = {name: version(name) for name in _LIBRARIES}
+    libraries = {name: installed(name) for name in _LIBRARIES}
     return {
-        "tool": {"name": _TOOL, "version": version(_TOOL)},
+        "tool": {"name": _TOOL, "version": installed(_TOOL)},
         "libraries": {"python": platform.python_version(), **libraries},
     }
 

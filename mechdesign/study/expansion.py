@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description, Term
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Floats, Ints, distinct
 from mechdesign.study import point_paths
 from mechdesign.study.motion_program import number_of_instants, program
 from mechdesign.study.point_paths import PointPath, Polyline, table_of
@@ -186,7 +186,7 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
     values = {name: column.ravel() for name, column in rows.items()}
     poses = replace(
         Poses.single(values, (count,)), designs=numbers.count, paths=points,
-        corners=np.unique(np.concatenate(corners)), motion=count > 1,
+        corners=distinct(np.concatenate(corners)), motion=count > 1,
     )  # fmt: skip
     if len(with_length(points)) != 1:
         return poses

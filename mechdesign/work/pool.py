@@ -18,6 +18,7 @@ from operator import length_hint
 from typing import Any, Generic, TypeVar, cast
 
 from mechdesign.errors import MechdesignError
+from mechdesign.versions import installed
 from mechdesign.work import interrupts
 from mechdesign.work.threads import keep_freed_memory, one_thread
 
@@ -202,10 +203,8 @@ def _is_loss(error: BaseException | None) -> bool:
 @cache
 def _version() -> str:
     """Versions on which values depend besides the work itself."""
-    from importlib.metadata import version
-
     python = ".".join(platform.python_version_tuple()[:2])
-    return ", ".join([f"Python {python}", *(f"{name} {version(name)}" for name in ("mechdesign", "numpy", "scipy"))])
+    return ", ".join([f"Python {python}", *(f"{name} {installed(name)}" for name in ("mechdesign", "numpy", "scipy"))])
 
 
 @lru_cache(maxsize=4)

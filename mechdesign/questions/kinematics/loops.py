@@ -11,7 +11,7 @@ from mechdesign.curve.functions import Zeros
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.columns import LOOPS, TOGGLES
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -41,7 +41,7 @@ def measured(
     loops_of, missing = [loops] * poses.designs, np.ones(poses.designs, dtype=bool)
     for part in solved:
         valid = np.flatnonzero(part.configuration.valid)
-        designs, first = np.unique(part.rows[valid] // (poses.count // poses.designs), return_index=True)
+        designs, first = firsts(part.rows[valid] // (poses.count // poses.designs))
         new = missing[designs]
         one = part.configuration.take(valid[first[new]])
         lengths = zip(*(loop.measured(one, mechanism.size) for loop in loops), strict=True)

@@ -12,7 +12,7 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.numerics.arrays import Ints
+from mechdesign.numerics.arrays import Ints, distinct
 from mechdesign.questions.kinematics.along import Along
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.limits import Limit
@@ -125,7 +125,7 @@ def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
             k = int(np.diff(marks).argmax())
             marks.insert(k + 1, (marks[k] + marks[k + 1]) / 2)
             parts.append(marks[k + 1] % 1)
-    return np.asarray(valid[np.unique((np.array(parts) * (len(valid) - 1)).round().astype(int))])
+    return np.asarray(valid[distinct((np.array(parts) * (len(valid) - 1)).round().astype(int))])
 
 
 def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) -> list[Event]:

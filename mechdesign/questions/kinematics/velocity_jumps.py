@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import counted
 from mechdesign.mechanism.algebra import quiet
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, distinct
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.poses import SolvedPoses, pose_in_words
@@ -30,7 +30,7 @@ def velocity_jumps(question: MotionQuestion, bodies: Collection[str], design: in
     own = curve.pieces.line == design
     ends = curve.pieces.end[own] if curve.corners else np.empty(0)
     timed = question.section.speed is not None or poses.program is not None
-    places = np.unique(np.concatenate([ends, poses.corners if timed else ends]))
+    places = distinct(np.concatenate([ends, poses.corners if timed else ends]))
     places = places[(places > 0) & (places < poses.end)]
     sides = np.concatenate([places - BESIDE, places + BESIDE])
     there, configuration = curve.solve(np.full(len(sides), design), sides, judged=False)

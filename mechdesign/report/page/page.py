@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from importlib.resources import files
 from itertools import zip_longest
 from operator import itemgetter
@@ -41,6 +40,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import path_of
+from mechdesign.versions import installed
 
 # Pixels of the drawings in an index, twice their width on the page, and the number of their colours.
 _THUMBNAIL = (240, 180)
@@ -184,7 +184,7 @@ def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, 
 def index(entries: Sequence[Entry]) -> bytes:
     """The page of several studies, a row each: first those that will not do, then by their names."""
     entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
-    return _page("index.html.j2", entries=entries, version=version("mechdesign"))
+    return _page("index.html.j2", entries=entries, version=installed("mechdesign"))
 
 
 def _sketch(study: Study) -> str:
