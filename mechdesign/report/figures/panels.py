@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -16,6 +15,8 @@ from matplotlib.ticker import MaxNLocator
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
+from mechdesign.report.figures.layout import OVER, TURNS
+from mechdesign.report.figures.marks import Axis, Contours, Panel, Picture
 from mechdesign.study import Study
 from mechdesign.study.poses import TIME, Poses, Sector, Sectors, with_length
 
@@ -49,12 +50,6 @@ _LEGEND_LETTERS = 14.75  # an inch
 _LEGEND_ROW = 0.19  # inches
 _LEGEND_ROOM = 4 * _LEGEND_ROW  # by which a narrow page may grow for its title and its legend
 _ABSCISSA_TICK = 0.47  # inches from one to the next
-# Steps of ticks that are parts of a turn in degrees.
-TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
-
-
-# Axes with a label that begins so are over a sweep or a path, whose label follows.
-OVER = "over "
 
 
 class Along(NamedTuple):
@@ -64,6 +59,16 @@ class Along(NamedTuple):
     label: str
     name: str = ""
     unit: str = ""
+
+    @property
+    def axis(self) -> Axis:
+        """The axis of panels over it, from its first to its last value."""
+        return Axis(self.label, ends=(float(np.nanmin(self.values)), float(np.nanmax(self.values))), over=True)
+
+    @property
+    def wider(self) -> Axis:
+        """The axis with room for dots at its first and last value."""
+        return Axis(self.label, over=True, margin=0.02)
 
     def value(self, at: float) -> str:
         """One of its values with four digits and its unit."""
@@ -254,53 +259,32 @@ def plane(study: Study, poses: Poses) -> Plane | None:
     return Plane((names[0], names[1]), x, y, quantities == {"length"}, tuple(maps) or (("", whole),))
 
 
-def map_sheet(
-    study: Study, over: Plane, parts: list[tuple[str, Floats]], heading: str, note: str, *, logarithmic: bool = False
-) -> Figure:
-    """Maps side by side, or two by two, flat ones one below the other; each with its own bar of colours.
+def maps(
+    study: Study, over: Plane, parts: list[tuple[str, Floats]], title: str, note: str, *, logarithmic: bool = False
+) -> Picture:  # fmt: skip
+    """Maps side by side, flat ones one below the other; each with its own bar of colours.
 
     Of several held values a few, spread evenly; the colours of each part mean the same in all of its maps.
     """
-    most = max(1, MAX_PANELS // len(parts))
-    some = evenly(len(over.maps), most)
-    maps = [over.maps[k] for k in some]
-    panels = [(", ".join(filter(None, (held, name))), sectors, part)
-              for held, sectors in maps for part, (name, _) in enumerate(parts)]  # fmt: skip
-    spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
-    flat = over.equal and spans[1] < _FLAT * spans[0] and len(panels) < 3
-    columns = 1 if style.narrow() or flat else min(len(panels), 2)
-    lines = -(-len(panels) // columns)
-    wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
-    shape = wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide
-    tall = min(_MAX_MAP_HEIGHT, _MAX_SHEET_HEIGHT / min(lines, 2), shape)
-    tall = max(min(tall, (style.tallest() - _MAP_TOP - _MAP_BELOW) / lines - _MAP_BELOW - _MAP_GAP), 1.2)
-    # Of equal scales the height decides: the bar stands beside the map.
-    slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0
-    wide -= slack
-    figure, grid = style.page(
-        len(panels), columns, tall, left=_MAP_LEFT, right=_BAR + 0.1 + slack, top=_MAP_TOP, bottom=_MAP_BELOW,
-        across=_MAP_LEFT + _BAR, down=_MAP_BELOW + _MAP_GAP,
-    )  # fmt: skip
-    title(figure, heading, note, left=_MAP_LEFT)
-    patches = [patch.rays for _, sectors in maps for patch in sectors.patches]
+    shown = [over.maps[k] for k in evenly(len(over.maps), max(1, MAX_PANELS // len(parts)))]
+    patches = [patch.rays for _, sectors in shown for patch in sectors.patches]
     scales = [_levels(over, values, patches, logarithmic) for _, values in parts]
-    ends = [(float(np.nanmin(values)), float(np.nanmax(values))) for _, values in parts]
-    for axes, (words, sectors, part) in zip(grid, panels, strict=True):
-        bar = axes.inset_axes((1 + 0.12 / wide, 0, 0.14 / wide, 1))
-        _map(figure, axes, bar, over, sectors, parts[part][1], scales[part], logarithmic)
-        low, high = ends[part]
-        if style.constant(low, high):
-            words += f": {number(low)} everywhere"
-            bar.set_visible(False)
-        axes.set_title(words, loc="left", fontsize=9.5)
-        axes.set_xlabel(coordinate_label(study, over.names[0]))
-        axes.set_ylabel(coordinate_label(study, over.names[1]))
-        if len(maps) > 1 and over.equal:
-            # One part of the plane in all of them, the boundary's line with it.
-            edge = _EDGE_OF_MAP * max(spans)
-            axes.set_xlim(float(np.nanmin(over.x) - edge), float(np.nanmax(over.x) + edge))
-            axes.set_ylim(float(np.nanmin(over.y) - edge), float(np.nanmax(over.y) + edge))
-    return figure
+    (left, right), (low, high) = ((float(np.nanmin(ends)), float(np.nanmax(ends))) for ends in (over.x, over.y))
+    flat = over.equal and high - low < _FLAT * (right - left) and len(shown) * len(parts) < 3
+    # Of several one part of the plane in all of them, the boundary's line with it.
+    edge = _EDGE_OF_MAP * max(right - left, high - low)
+    one = len(shown) > 1 and over.equal
+    x, y = (Axis(coordinate_label(study, name), ends=(a - edge, b + edge) if one else (None, None))
+            for name, a, b in zip(over.names, (left, low), (right, high), strict=True))  # fmt: skip
+    panels = []
+    for held, sectors in shown:
+        for (name, values), levels in zip(parts, scales, strict=True):
+            ends = float(np.nanmin(values)), float(np.nanmax(values))
+            same = style.constant(*ends)
+            words = ", ".join(filter(None, (held, name))) + f": {number(ends[0])} everywhere" * same
+            mark = _contours(over, sectors, values, levels, logarithmic=logarithmic, everywhere=same)
+            panels.append(Panel([mark], x, y, words, equal=over.equal))
+    return Picture(title, panels, (note,), across=1 if flat else 2)
 
 
 def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: bool) -> Floats | None:
@@ -316,34 +300,25 @@ def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: 
     return style.levels(float(shown.min()), quantile(shown, sizes, 0.97), 9)
 
 
-def _map(
-    figure: Figure, axes: Axes, bar: Axes, over: Plane, sectors: Sectors, values: Floats, levels: Floats | None,
-    logarithmic: bool,
-) -> None:  # fmt: skip
-    axes.grid(visible=False)
-    axes.set_facecolor("#EEEEEE")
-    if over.equal:
-        axes.set_aspect("equal")
+def _contours(
+    over: Plane, sectors: Sectors, values: Floats, levels: Floats | None, *, logarithmic: bool, everywhere: bool
+) -> Contours:  # fmt: skip
+    """Values over the patches of a map, between levels."""
     if levels is None:
-        bar.set_visible(False)
-        return
+        return Contours([], None)
     if logarithmic:
         # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
         values = np.log10(np.maximum(values, 1e-3 * 10.0 ** levels[0]))
     finite = values[np.isfinite(values)]
-    norm = style.steps(levels, float(finite.min()), float(finite.max()))
     shown = [
         (patch.nodes.real, patch.nodes.imag,
          _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays]))
         for patch in sectors.patches
     ]  # fmt: skip
-    style.filled(axes, shown, norm, levels)
-    for curve in sectors.outline:
-        axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
-    style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
-    if logarithmic:
-        bar.set_yticks(levels, [_power(10.0**level) for level in levels])
-    bar.tick_params(labelsize=8)
+    words = [_power(10.0**level) for level in levels] if logarithmic else ()
+    return Contours(
+        shown, style.steps(levels, float(finite.min()), float(finite.max())), sectors.outline, words, everywhere
+    )
 
 
 def _between(patch: Sector, places: Complexes, values: Floats) -> np.ma.MaskedArray[Any, Any]:

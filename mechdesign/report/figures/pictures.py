@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Generic, TypeVar
 
-from matplotlib.figure import Figure
-
 from mechdesign.commands import QUESTIONS
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import Along, Plane, along, plane
-from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.rendering import Gallery, Made
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -52,11 +50,10 @@ class PosesView(View):
 
 
 V = TypeVar("V", bound=View)
-Drawn = Figure | Mapping[str, Figure] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Picture(Generic[V]):
+class NamedPicture(Generic[V]):
     """A picture of a question, or several that are drawn together.
 
     Parameters
@@ -74,24 +71,24 @@ class Picture(Generic[V]):
     names: tuple[str, ...]
     order: int
     view: type[V]
-    draw: Callable[[V], Drawn]
+    draw: Callable[[V], Made]
 
-    def __call__(self, view: V) -> Drawn:
+    def __call__(self, view: V) -> Made:
         """Draw it."""
         return self.draw(view)
 
 
-def picture(view: type[V], *names: str, order: int = 100) -> Callable[[Callable[[V], Drawn]], Picture[V]]:
+def picture(view: type[V], *names: str, order: int = 100) -> Callable[[Callable[[V], Made]], NamedPicture[V]]:
     """Declare that a function draws the picture of this name from a view; of several names, those that it returns."""
-    return lambda draw: Picture(names, order, view, draw)
+    return lambda draw: NamedPicture(names, order, view, draw)
 
 
-def pictures(command: str) -> list[Picture[View]]:
+def pictures(command: str) -> list[NamedPicture[View]]:
     """Pictures of a question, the most telling first: those that the modules of its folder of figures declare."""
     package = import_module(QUESTIONS[command].figures)
     listed = iter_modules(getattr(package, "__path__", ()))
     modules = [package, *(import_module(f"{package.__name__}.{module.name}") for module in listed)]
-    declared = (value for module in modules for value in vars(module).values() if isinstance(value, Picture))
+    declared = (value for module in modules for value in vars(module).values() if isinstance(value, NamedPicture))
     return sorted(dict.fromkeys(declared), key=lambda declared: (declared.order, declared.names))
 
 

@@ -12,12 +12,17 @@ from matplotlib.figure import Figure
 
 from mechdesign.errors import explain
 from mechdesign.report.figures import style
+from mechdesign.report.figures.layout import draw
+from mechdesign.report.figures.marks import Picture
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.pool import LostWorkerError
 
 # Draws one picture: the bytes of its files by their names.
 Drawing = Callable[[], dict[str, bytes]]
 Arguments = ParamSpec("Arguments")
+
+# What a function that is declared as a picture gives.
+Made = Figure | Picture | Mapping[str, Figure | Picture] | None
 
 # With fewer pictures, forking costs more time than it saves.
 FEWEST = 3
@@ -33,14 +38,15 @@ class Gallery(dict[str, Figure]):
     def add(
         self,
         name: str,
-        make: Callable[Arguments, Figure | Mapping[str, Figure] | None],
+        make: Callable[Arguments, Made],
         *arguments: Arguments.args,
         **options: Arguments.kwargs,
     ) -> None:
-        """Add the figure that a function makes under this name, or several figures under their own names, or none."""
+        """Add what a function draws or declares under this name, or several pictures under their own names, or none."""
         try:
             made = make(*arguments, **options)
-            drawn = {name: made} if isinstance(made, Figure) else made or {}
+            shown = {name: made} if isinstance(made, (Figure, Picture)) else made or {}
+            drawn = {name: draw(own) if isinstance(own, Picture) else own for name, own in shown.items()}
             for figure in drawn.values():
                 style.name_powers(figure.axes)
         except Exception as error:

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from itertools import chain, pairwise, starmap
 from typing import Any, Literal, NamedTuple, cast
 
@@ -135,6 +136,11 @@ def width() -> float:
     return float(matplotlib.rcParams["figure.figsize"][0])
 
 
+def dots() -> float:
+    """Dots an inch of the layout."""
+    return float(matplotlib.rcParams["figure.dpi"])
+
+
 def tallest() -> float:
     """Greatest height of the page, inches of its layout."""
     return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
@@ -145,7 +151,7 @@ def narrow() -> bool:
     return width() < _NARROW
 
 
-class Picture(Figure):
+class NotebookFigure(Figure):
     """A figure that notebooks show as a PNG; plain Matplotlib figures are shown only if pyplot manages them."""
 
     def _repr_png_(self) -> bytes:
@@ -155,7 +161,7 @@ class Picture(Figure):
 
 def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
-    figure = Picture(figsize=(width(), height), layout=layout)
+    figure = NotebookFigure(figsize=(width(), height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -207,10 +213,12 @@ def folded(words: str, size: float, room: float) -> str:
     ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a word that fits no line is broken after
     its dots and underscores.
     """
-    font, lines = FontProperties(size=size), []
+    lines: list[str] = []
+    if max(map(len, words.split("\n"))) * size <= 72 * room:
+        return words  # no letter is wider than high
 
     def fits(line: str) -> bool:
-        return bool(text_to_path.get_text_width_height_descent(line, font, False)[0] <= 72 * room)
+        return _length(line, size) <= 72 * room
 
     def joined(equation: re.Match[str]) -> str:
         if fits(equation[0]):
@@ -230,6 +238,12 @@ def folded(words: str, size: float, room: float) -> str:
                     lines[-1] = longer
                 gap = ""
     return "\n".join(lines).replace(NO_BREAK, " ")
+
+
+@lru_cache(maxsize=1024)
+def _length(line: str, size: float) -> float:
+    """Points of a line of type of a size."""
+    return float(text_to_path.get_text_width_height_descent(line, FontProperties(size=size), False)[0])
 
 
 def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import Sampled, heading, look
-from mechdesign.report.figures.panels import title
+from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.shapes import lighter
 
@@ -30,81 +30,54 @@ _NET_CELLS = 165
 MAX_MARKS = 600
 # A limit farther out than this, in reaches of the errors, is named and not drawn.
 _FAR_FROM_ERRORS = 5.0
-# Inches.
-_LEFT = 0.88
-_LEGEND = 2.75
-_LEGEND_ROW = 0.19
-_TOP = 0.75
-_BELOW = 0.6
-_MIN_HEIGHT = 2.6
-_MAX_HEIGHT = 5.6
+_SLIVER = 0.6  # least height over width, and width over height, of axes of one scale
 _BEYOND = "#FBEDE4"  # where a limit is broken
 Ends = tuple[float, float]
 
 
 @picture(ErrorsView, "density_contours", order=80)
-def density_figure(view: ErrorsView) -> Figure | None:
+def density_picture(view: ErrorsView) -> Picture | None:
     """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
     sampled = view.sampled("density")
     if sampled is None:
         return None
     samples = sampled.samples
     assert samples.pair is not None
-    labels = [style.axis_label(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k])
-              for k in samples.pair]  # fmt: skip
     pair = list(samples.pair)
-    errors, units = samples.errors[pair], samples.units[pair]
+    errors, units, failed = samples.errors[pair], samples.units[pair], ~samples.kept
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
-    limits = _Limits.of(sampled, ellipses[-1])
-    alike = bool(units[0] == units[1])
-    failed = ~samples.kept
-    across, up, tall = _view([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
-    figure, (axes,) = style.page(1, 1, tall, left=_LEFT, right=_beside(), top=_TOP, bottom=_BELOW)
-    axes.set(xlim=across, ylim=up, xlabel=labels[0], ylabel=labels[1])
-    axes.locator_params(nbins=4 if style.narrow() else 7)
-    if alike:
-        axes.set_aspect("equal")
-    entries: dict[str, Any] = limits.draw(axes)
+    limits, alike = _Limits.of(sampled, ellipses[-1]), bool(units[0] == units[1])
+    ends = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
+    marks: list[PanelMark] = [Own(lambda axes: limits.draw(axes, *ends), label=limits.words)]
     region, method = smoothed(errors), look(sampled.method).words
     if region is not None:
         colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
         levels = [*region.levels[::-1], 1.01 * region.density.max()]
-        axes.contourf(region.x, region.y, region.density, levels, colors=colors[::-1], zorder=1.5)
-        entries |= {f"{method}: holds {_percent(share)}": Patch(color=color)
-                    for share, color in zip(SHARES, colors, strict=False)}  # fmt: skip
-    for share, dashes, ellipse in zip(SHARES, _DASHES, ellipses, strict=True):
-        (entries[f"first order: holds {_percent(share)}"],) = axes.plot(
-            *ellipse, color=style.INK, linestyle=dashes, linewidth=1.2, zorder=2.5
-        )
+        marks.append(Own(lambda axes: axes.contourf(
+            region.x, region.y, region.density, levels, colors=colors[::-1], zorder=1.5)))  # fmt: skip
+        marks += [Own(partial(_patch, color), label=f"{method}: holds {_percent(share)}")
+                  for share, color in zip(SHARES, colors, strict=False)]  # fmt: skip
+    marks += [Trace(*ellipse, label=f"first order: holds {_percent(share)}",
+                    look={"color": style.INK, "linestyle": dashes, "linewidth": 1.2, "zorder": 2.5})
+              for share, dashes, ellipse in zip(SHARES, _DASHES, ellipses, strict=True)]  # fmt: skip
     outside = ~failed if region is None else region.outside & ~failed
-    marks: dict[str, tuple[Floats, dict[str, Any]]] = {
+    shown: dict[str, tuple[Floats, dict[str, Any]]] = {
         "other samples" if region else "samples": (errors[:, outside], {"marker": ".", "ms": 3, "color": style.FAINT}),
         "samples that fail": (errors[:, failed], {"marker": "x", "ms": 4, "color": style.VERMILION, "zorder": 2.7}),
         "no error": (np.zeros((2, 1)), {"marker": "+", "ms": 11, "mew": 1.8, "color": style.INK, "zorder": 3}),
     }
-    for words, (places, mark) in marks.items():
-        if places.size:
-            (entries[words],) = axes.plot(*places[:, :MAX_MARKS], linestyle="none", **mark)
+    marks += [
+        Dots(*places[:, :MAX_MARKS], label=words, look=own) for words, (places, own) in shown.items() if places.size
+    ]
     count = f"{samples.errors.shape[1]:,} samples"
     if limits.words:
         count += f", {(number := int(failed.sum())):,} of them fail" + f" ({MAX_MARKS} marked)" * (number > MAX_MARKS)
     note = f"{method}: {count}" + (f", smoothed over {region.width:.2f} of their deviation" if region else "")
     note += "; " * bool(limits.far) + limits.far
-    title(figure, f"Two errors of made mechanisms {sampled.where}", note, left=_LEFT)
-    place: dict[str, Any]
-    if style.narrow():
-        style.grow(figure, below=_LEGEND_ROW * len(entries))
-        place = {"loc": "lower left", "bbox_to_anchor": (_LEFT / style.width(), 0.01)}
-    else:
-        right_of = 1 - (_LEGEND - 0.1) / style.width(), axes.get_position().y1
-        place = {"loc": "upper left", "bbox_to_anchor": right_of}
-    figure.legend(entries.values(), entries, borderaxespad=0.0, **place)
-    return figure
-
-
-def _beside() -> float:
-    """Inches at the right of the panel: on a wide page of the legend."""
-    return 0.15 if style.narrow() else _LEGEND
+    x, y = (Axis(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k], ends=end)
+            for k, end in zip(pair, ends, strict=True))  # fmt: skip
+    panel = Panel(marks, x, y, equal=alike, legend="beside")
+    return Picture(f"Two errors of made mechanisms {sampled.where}", [panel], (note,))
 
 
 def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
@@ -190,40 +163,42 @@ class _Limits(NamedTuple):
         return cls(None, (bands[0], bands[1]), near, "limits" if limits else "",
                    f"limits outside: {', '.join(far)}" if far else "")  # fmt: skip
 
-    def draw(self, axes: Axes) -> dict[str, Patch]:
-        """Draw the limit as a line, and tint what lies beyond it; returns it by its words."""
+    def draw(self, axes: Axes, across: Ends, up: Ends) -> Patch | None:
+        """Draw the limit as a line, and tint what lies beyond it; returns it."""
         if not self.near.any():
-            return {}
+            return None
         axes.set_facecolor(_BEYOND)
         # The sides of what is open, or far, lie outside the picture.
         (left, right), (low, high) = (
             np.clip(ends, 2 * span[0] - span[1], 2 * span[1] - span[0]).tolist()
-            for ends, span in zip(self.bands, (axes.get_xlim(), axes.get_ylim()), strict=True)
+            for ends, span in zip(self.bands, (across, up), strict=True)
         )
         looks: tuple[dict[str, Any], ...] = (
             {"facecolor": "white", "zorder": 0.4},
             {"fill": False, "edgecolor": style.VERMILION, "linewidth": 1.8, "zorder": 2.6},
         )
-        for drawn in looks:
-            inside = axes.add_patch(
-                Rectangle((left, low), right - left, high - low, **drawn)
-                if self.radius is None
-                else Circle((0.0, 0.0), self.radius, **drawn)
-            )
-        return {self.words: inside}
+        *_, line = (
+            axes.add_patch(Rectangle((left, low), right - left, high - low, **drawn)
+                           if self.radius is None else Circle((0.0, 0.0), self.radius, **drawn))
+            for drawn in looks
+        )  # fmt: skip
+        return line
 
 
-def _view(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends, float]:
-    """Ranges of the axes that show places of shape (2, n) and no error, and the height (inches) that suits them."""
+def _ends(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends]:
+    """Ranges of the axes that show places of shape (2, n) and no error; none of one scale is a sliver."""
     places = np.concatenate([np.zeros((2, 1)), *parts], axis=1)
     low, high = places.min(axis=1), places.max(axis=1)
     middle, span = (low + high) / 2, 1.08 * (high - low)
-    wide = style.width() - _LEFT - _beside()
-    tall = float(np.clip(wide * span[1] / span[0], _MIN_HEIGHT, _MAX_HEIGHT)) if alike else 0.9 * wide
     if alike:
-        span = max(span[0] / wide, span[1] / tall) * np.array([wide, tall])
-    (left, bottom), (right, top) = middle - span / 2, middle + span / 2
-    return (left, right), (bottom, top), tall
+        span = np.maximum(span, _SLIVER * span.max())
+    (left, bottom), (right, top) = (middle - span / 2).tolist(), (middle + span / 2).tolist()
+    return (left, right), (bottom, top)
+
+
+def _patch(color: Any, _: Axes) -> Patch:
+    """What a legend shows of a region."""
+    return Patch(color=color)
 
 
 def _percent(share: float) -> str:

@@ -1,0 +1,350 @@
+"""Draw a picture that is declared: columns, heights, room for what stands about each panel, one legend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis as Drawn
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from mechdesign.report.figures import style
+from mechdesign.report.figures.marks import Axis, Lines, Panel, Picture
+
+# Axes with a label that begins so are over a sweep or a path, whose label follows.
+OVER = "over "
+# Steps of ticks that are parts of a turn in degrees.
+TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
+_STEPS = (1, 2, 2.5, 5, 10)
+_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL = 11.0, 8.5, 9.5, 8.5, 10.0  # points
+# Inches: at the edges of a page, between what is separate, between a text and what it is of.
+_EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
+# Inches: the least width of panels of bars, of maps and of others, and the room beside them at first.
+_NARROWEST = {"bars": 1.9, "map": 3.3, "": 2.0}
+_BESIDE = 0.9
+# Inches: the height of a panel that stands alone, among few, among many below each other, and the least.
+_ALONE, _FEW, _MANY, _LOWEST = 2.6, 1.75, 1.3, 0.7
+_MOST_FEW = 4
+_HIGHEST_MAP, _HIGHEST_OF_TWO, _MAP = 5.2, 3.8, 0.8  # inches; height over width of a map whose axes are not equal
+_MARGIN = 0.08  # of the range, beyond curves from a given end
+_BAR, _ONE_OF_SEVERAL = 0.24, 0.16  # inches of a name with one bar, and of each of several
+_AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for which title and axis of a panel take room
+_UP, _ALONG, _DIGIT = 0.33, 0.47, 0.083  # inches from tick to tick, and of a digit
+_MOST_TICKS = 9
+_LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
+_LEGEND_DOT = 8.0  # points
+_NAMES = 0.4  # of the width, for names beside bars
+_BESIDE_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+_ABOVE_LEGEND: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
+_INSIDE_LEGEND: dict[str, Any] = {"frameon": True, "framealpha": 0.85, "edgecolor": "none"}
+
+
+@dataclass(eq=False)
+class _Cell:
+    """A panel in its place, and whether numbers and name stand at its axes; what stands about it, in inches."""
+
+    panel: Panel
+    axes: Axes
+    row: int
+    column: int
+    span: int
+    outer_x: bool
+    outer_y: bool
+    left: float = 0.0
+    right: float = 0.0
+    below: float = 0.0
+    above: float = 0.0
+    tall: float = 0.0
+
+    @property
+    def drawn_axes(self) -> Iterator[tuple[Drawn, Axis, bool]]:
+        """Both axes as drawn and as declared, and whether numbers and name stand at them."""
+        yield self.axes.xaxis, self.panel.x, self.outer_x
+        yield self.axes.yaxis, self.panel.y, self.outer_y
+
+
+def draw(picture: Picture) -> Figure:
+    """The figure of a picture; use inside `style.context`.
+
+    As many panels stand side by side as the width holds by the least width of their kind. The height of the page is the
+    sum of the panels' own: bars by their number, equal axes by their spans, others by how many stand in a column. What
+    stands about a panel is measured once and gets its room.
+    """
+    columns = _columns(picture)
+    rows = -(-len(picture.panels) // columns)
+    figure = style.new_figure(2.0 * rows, layout=None)
+    cells, entries = [*_cells(figure, picture, columns)], dict[str, Any]()
+    for cell in cells:
+        _fill(cell, entries, alone=len(cells) == 1)
+    for cell in cells:
+        _end(cell)
+    legend = _legend(figure, entries) if entries else None
+    wide = style.width() / columns - _BESIDE
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    for cell in cells:
+        cell.tall = _height(cell, wide, rows)
+        _size(cell, wide)
+    style.name_powers([cell.axes for cell in cells])
+    for cell in cells:
+        _measure(cell, renderer)
+    left, right = ([max(getattr(cell, side) for cell in cells if cell.column == column) for column in range(columns)]
+                   for side in ("left", "right"))  # fmt: skip
+    wide = (style.width() - sum(left) - sum(right) - _GAP * (columns - 1) - 0.5 * _EDGE) / columns
+    for cell in cells:
+        cell.tall = _height(cell, wide, rows)
+        _name(cell, cell.span * wide)
+    heading, top = _heading(picture)
+    bottom = legend.get_window_extent(renderer).height / figure.dpi + _GAP if legend is not None else _EDGE
+    sides = ("below", "tall", "above")
+    below, tall, above = ([max(getattr(cell, side) for cell in cells if cell.row == row) for row in range(rows)]
+                          for side in sides)  # fmt: skip
+    around = top + bottom + sum(below) + sum(above) + _GAP * (rows - 1)
+    lower = min(1.0, (style.tallest() - around) / sum(tall))
+    tall = [max(lower * own, _LOWEST) for own in tall]
+    height = around + sum(tall)
+    figure.set_figheight(height)
+    for cell in cells:
+        x = sum(left[: cell.column + 1]) + sum(right[: cell.column]) + cell.column * (wide + _GAP)
+        own = wide if cell.span == 1 else style.width() - x - right[-1] - 0.5 * _EDGE
+        y = height - top - sum(above[: cell.row + 1]) - sum(below[: cell.row]) - cell.row * _GAP - sum(tall[: cell.row])
+        cell.tall = max(lower * cell.tall, _LOWEST) if cell.panel.bars else tall[cell.row]
+        left_below = x / style.width(), (y - cell.tall) / height
+        cell.axes.set_position((*left_below, own / style.width(), cell.tall / height))
+        _place(cell, own, left[cell.column])
+    for words, size, down in heading:
+        figure.text(_EDGE / style.width(), 1 - down / height, words, va="top", fontsize=size)
+    return figure
+
+
+def _columns(picture: Picture) -> int:
+    """Panels side by side."""
+    first = next(panel for panel in picture.panels if panel is not None)
+    names = first.y.words if first.kind == "bars" else ()
+    return max(1, min(picture.across, len(picture.panels), fitting_panels(first.kind, names)))
+
+
+def fitting_panels(kind: str = "", names: Sequence[str] = ()) -> int:
+    """Panels of a kind that the width holds side by side, of bars beside their names."""
+    letters = max(map(len, names), default=0)
+    return max(1, int((style.width() - min(_NAMES * style.width(), _DIGIT * letters)) / _NARROWEST[kind]))
+
+
+def fitting_names(rows: int, bars: int) -> float:
+    """Names with so many bars each that rows of panels have room for on one page."""
+    return (style.tallest() - _AROUND_BARS) / rows / bar_height(bars) - _ABOUT_BARS
+
+
+def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
+    """The panels in rows, with the axes that they share."""
+    by_x, by_y = dict[int, Axes](), dict[int, Axes]()
+    everywhere, grid = picture.share != "grid", picture.share == "grid"
+    for k, panel in enumerate(picture.panels):
+        if panel is None:
+            continue
+        row, column = divmod(k, columns)
+        same_x, same_y = ("x" in picture.share or grid), ("y" in picture.share or grid)
+        axes = figure.add_axes(
+            (0.1, 0.1, 0.5, 0.5), label=f"panel {k}", sharex=by_x.get(0 if everywhere else column) if same_x else None,
+            sharey=by_y.get(0 if everywhere else row) if same_y else None,
+        )  # fmt: skip
+        by_x.setdefault(0 if everywhere else column, axes)
+        by_y.setdefault(0 if everywhere else row, axes)
+        outer_x = not same_x or not any(picture.panels[k + columns :: columns])
+        outer_y = not same_y or not any(picture.panels[row * columns : k])
+        # One that is left over is as wide as the page, unless it shares its axis or is a map.
+        alone = k + 1 == len(picture.panels) and not (column or same_x or panel.kind == "map" or panel.equal)
+        yield _Cell(panel, axes, row, column, columns if alone else 1, outer_x, outer_y)
+
+
+def _fill(cell: _Cell, entries: dict[str, Any], *, alone: bool) -> None:
+    """Draw the marks of a panel on its scales, and note what a legend names."""
+    axes, panel = cell.axes, cell.panel
+    for name, declared in (("x", panel.x), ("y", panel.y)):
+        if declared.scale == "log":
+            getattr(axes, f"set_{name}scale")("log")
+        if declared.margin is not None:
+            axes.margins(**dict[str, Any]({name: declared.margin}))
+    # A narrow page has no room beside a panel that stands alone: it has the legend of the page.
+    own = dict[str, Any]() if panel.legend and not (alone and style.narrow() and panel.legend == "beside") else entries
+    for mark in panel.marks:
+        handle = mark.draw(axes)
+        if handle is not None and mark.label:
+            # A straight line is no curve, also not among those that `lost_curves` of the tests looks at.
+            handle.set_label("" if isinstance(mark, Lines) else mark.label)
+            own.setdefault(mark.label, handle)
+    if own and own is not entries:
+        outside = _ABOVE_LEGEND | {"ncols": fitting([*own])} if style.narrow() else _BESIDE_LEGEND
+        place = outside if panel.legend == "beside" else _INSIDE_LEGEND | {"loc": panel.legend}
+        heading: dict[str, Any] = {"title": panel.heading or None, "title_fontsize": 9, "alignment": "left"}
+        _enlarge_dots(axes.legend(own.values(), own.keys(), **place, **heading))
+
+
+def _end(cell: _Cell) -> None:
+    """The ends of the axes of a panel, once all is drawn that shares them."""
+    axes, panel = cell.axes, cell.panel
+    if panel.bars or panel.y.words:
+        axes.grid(visible=False, axis="y")
+        axes.tick_params(axis="y", length=0)
+    axes.set_xlim(*panel.x.ends)
+    axes.set_ylim(*((len(panel.bars[0].values) - 0.42, -0.58) if panel.bars else panel.y.ends))
+    low, high = panel.y.ends
+    if low is not None and high is None and panel.y.scale == "linear":
+        # The data's own margin is small where these lie far from the end that is given.
+        reach = float(axes.dataLim.y1) - low
+        axes.set_ylim(top=max(axes.get_ylim()[1], low + (1 + _MARGIN) * reach))
+    if panel.equal:
+        axes.set_aspect("equal", anchor="NW")
+    if panel.x.over:
+        axes.set_label(f"{OVER}{panel.x.label}")
+
+
+def _height(cell: _Cell, wide: float, rows: int) -> float:
+    """Inches of a panel of a width."""
+    panel, axes, highest = cell.panel, cell.axes, _HIGHEST_MAP if rows == 1 else _HIGHEST_OF_TWO
+    if panel.bars:
+        lines = 1 + max((name.count("\n") for name in _folded_names(panel.y.words)), default=0)
+        return (0.15 + len(panel.bars[0].values)) * bar_height(panel.bars[0].count, lines)
+    if panel.equal:
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        return min(highest, wide * abs((high - low) / (right - left)))
+    if panel.kind == "map":
+        return min(highest, _MAP * wide)
+    return panel.size * (_ALONE if rows == 1 else _FEW if rows <= _MOST_FEW else _MANY)
+
+
+def bar_height(count: int, lines: int = 1) -> float:
+    """Inches of a name with so many bars."""
+    return max(_BAR, _ONE_OF_SEVERAL * count + 0.04, style.line(_LABEL) * lines)
+
+
+def _size(cell: _Cell, wide: float) -> None:
+    """A panel in about its size, its ticks, and the names of its axes."""
+    figure = cell.axes.get_figure(root=True)
+    assert figure is not None
+    cell.axes.set_position((0.2, 0.2, wide / style.width(), cell.tall / figure.get_figheight()))
+    for axis, declared, outer in cell.drawn_axes:
+        # What axes share is set at one of them.
+        if outer:
+            _tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
+        axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer)
+        axis.set_label_text(declared.label if outer else "")
+        axis.offsetText.set_visible(outer)
+
+
+def _tick(axis: Drawn, declared: Axis, inches: float) -> None:
+    """Ticks along so many inches of an axis."""
+    upright = axis is axis.axes.yaxis
+    if declared.words or len(declared.ticks):
+        places = declared.ticks if len(declared.ticks) else range(len(declared.words))
+        words = _folded_names(declared.words) if upright else [
+            style.folded(word, 8.0, inches / len(declared.words) - _PAD) for word in declared.words]  # fmt: skip
+        axis.set_ticks([*places], labels=words or None)
+        if words and not upright:
+            axis.set_tick_params(labelsize=8.0)
+    elif declared.scale == "linear":
+        low, high = axis.get_view_interval()
+        turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > 150
+        most = max(1, min(_MOST_TICKS, int(inches / (_UP if upright else _ALONG))))
+        while most:
+            axis.set_major_locator(MaxNLocator(most, steps=TURNS if turning else _STEPS, min_n_ticks=1))
+            places = [place for place in axis.get_majorticklocs().tolist() if min(low, high) <= place <= max(low, high)]
+            numbers = axis.get_major_formatter().format_ticks(places)
+            need = _DIGIT * (max(map(len, numbers), default=0) + 0.7) * abs(high - low) / inches
+            every = [step for step in (1, 2) if len(places) <= step or places[step] - places[0] >= need]
+            if upright or every:
+                if not upright and every[0] > 1 and len(places) > 2:
+                    axis.set_major_locator(FixedLocator(places[::2]))
+                break
+            most -= 1
+
+
+def _folded_names(names: Sequence[str]) -> list[str]:
+    return [style.folded(name, _LABEL, _NAMES * style.width()) for name in names]
+
+
+def _measure(cell: _Cell, renderer: Any) -> None:
+    """Inches that numbers, legends and bars of colours take about a panel, and the name of its upright axis."""
+    axes = cell.axes
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_visible(False)
+    tight = axes.get_tightbbox(renderer)
+    assert tight is not None
+    box, dots = axes.bbox, style.dots()
+    cell.left, cell.right = (max(0.0, side) / dots for side in (box.x0 - tight.x0, tight.x1 - box.x1))
+    cell.below, cell.above = (max(0.0, side) / dots for side in (box.y0 - tight.y0, tight.y1 - box.y1))
+    label = axes.yaxis.label
+    label.set_text(style.folded(label.get_text(), _LABEL, cell.tall))
+    cell.left += _lines(label.get_text(), _LABEL) + 2 * _PAD
+
+
+def _name(cell: _Cell, wide: float) -> None:
+    """The title of a panel and the name of its lower axis, in lines of its width, for which there is room."""
+    axes, panel, label = cell.axes, cell.panel, cell.axes.xaxis.label
+    label.set_text(style.folded(label.get_text(), _LABEL, wide))
+    cell.below += _lines(label.get_text(), _LABEL)
+    # Both in one line if that holds them.
+    together = style.folded(f"{panel.title}   {panel.aside}", _HEADING, wide)
+    words = [panel.title] if "\n" not in together else [panel.title, panel.aside]
+    title = style.folded("\n".join(filter(None, words)), _HEADING, wide)
+    look: dict[str, Any] = {"pad": 72 * (cell.above + _PAD)}
+    axes.set_title(title, loc="left", fontsize=_HEADING, **look)
+    if panel.aside and len(words) == 1:
+        axes.set_title(panel.aside, loc="right", fontsize=_ASIDE, color=style.VERMILION, **look)
+    if title or panel.aside:
+        cell.above += _lines(title or panel.aside, _HEADING)
+
+
+def _place(cell: _Cell, wide: float, left: float) -> None:
+    """Ticks that suit the final size of a panel, and the names of its axes at the edges of its room."""
+    axes = cell.axes
+    for axis, declared, outer in cell.drawn_axes:
+        if outer and not (declared.words or len(declared.ticks)):
+            _tick(axis, declared, wide if axis is axes.xaxis else cell.tall)
+        axis.label.set_visible(True)
+    axes.apply_aspect()
+    width, height = axes.bbox.width / style.dots(), axes.bbox.height / style.dots()
+    axes.yaxis.set_label_coords((_PAD - left) / width, 0.5)
+    axes.yaxis.label.set_verticalalignment("top")
+    axes.xaxis.set_label_coords(0.5, -cell.below / height)
+    axes.xaxis.label.set_verticalalignment("bottom")
+
+
+def _lines(text: str, size: float) -> float:
+    """Inches of a text's lines with what keeps it apart."""
+    return style.line(size) * (1 + text.count("\n")) + _PAD if text else 0.0
+
+
+def _heading(picture: Picture) -> tuple[list[tuple[str, float, float]], float]:
+    """Title and notes in lines of the page with their sizes and places from the top, and inches of them all."""
+    lines, down = [], _EDGE
+    for words, size in ((picture.title, _TITLE), *((note, _NOTE) for note in picture.notes)):
+        if words:
+            lines.append((style.folded(words, size, style.width() - 2 * _EDGE), size, down))
+            down += _lines(lines[-1][0], size)
+    return lines, down + _PAD
+
+
+def _legend(figure: Figure, entries: Mapping[str, Any]) -> Legend:
+    """One legend at the bottom of a page, in as many columns as the width holds."""
+    labels = [style.folded(label, 9.0, style.width() - _LEGEND_SYMBOL) for label in entries]
+    return _enlarge_dots(figure.legend([*entries.values()], labels, loc="lower center", ncols=fitting(labels),
+                                       borderaxespad=0.2))  # fmt: skip
+
+
+def fitting(labels: Sequence[str]) -> int:
+    """Columns of a legend that a page holds."""
+    letters = int(_LEGEND_LETTERS * style.width())
+    return max(1, min(len(labels), letters // (8 + max(map(len, "\n".join(labels).split("\n"))))))
+
+
+def _enlarge_dots(legend: Legend) -> Legend:
+    """Dots of a legend as large as can be seen: one alone is lost where thousands are drawn."""
+    for handle in legend.legend_handles:
+        if isinstance(handle, Line2D) and handle.get_marker() == ".":
+            handle.set(markersize=_LEGEND_DOT, alpha=1.0)
+    return legend
