@@ -15,10 +15,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from mechdesign.results import Result
+from typing import Any
 
 HELP_PAGE = "reference/commands"
 
@@ -182,8 +179,9 @@ class AssemblyError(MechdesignError):
 
     exit_code = 3
 
-    def __init__(self, message: str, result: Result | None = None) -> None:
-        self.result = result  #: of an optimisation without a feasible design: the design closest to feasible
+    def __init__(self, message: str, result: Any = None) -> None:
+        #: Of an optimisation without a feasible design the `Result` of the one closest to feasible.
+        self.result = result
         super().__init__(message)
 
 
@@ -199,7 +197,8 @@ class Interrupted(KeyboardInterrupt):
 
     exit_code = 130
 
-    def __init__(self, result: Result) -> None:
+    def __init__(self, result: Any) -> None:
+        #: The `Result` of what was finished.
         self.result = result
         super().__init__(result.interrupted)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,6 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column as Column
+from mechdesign.columns import ColumnKind as ColumnKind
+from mechdesign.columns import filled
 from mechdesign.statistics import Follow
 
 if TYPE_CHECKING:
@@ -19,74 +21,8 @@ if TYPE_CHECKING:
 
 # What a number says that nothing is known of between the poses.
 POSES_ONLY = "of the asked poses only"
-# Meaning of a column of what varies over the cases of a sweep.
-VARIED = "varied"
-# Meaning of a column of a result that a sweep was asked for.
-CHOSEN = "chosen result"
 # Number of columns that a table's repr names.
 MAX_SHOWN = 8
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Column:
-    """One column of a table.
-
-    >>> import numpy as np
-    >>> from mechdesign.results import Column
-    >>> Column("P.x", np.array([1.5, 2.5]), "mm", "coordinate of a point")
-    <Column P.x in mm: 2 values>
-    """
-
-    name: str  #: header in the CSV file, fixed by the study format
-    values: NDArray[Any]  #: floats, integers, booleans (written as 1 and 0) or strings, one a row
-    unit: str = ""  #: as the study declares it; empty for pure numbers and text
-    meaning: str = ""  #: one line for the manifest
-    kind: ColumnKind | None = None  #: what it is; of columns that the reference does not have, None
-
-    def __repr__(self) -> str:
-        unit = f" in {self.unit}" if self.unit else ""
-        return f"<Column {self.name}{unit}: {len(self.values)} values>"
-
-    @property
-    def numeric(self) -> bool:
-        """Whether it holds numbers or booleans rather than words."""
-        return self.values.dtype.kind in "fiub"
-
-
-# A place in a declared text at which a name of the study stands.
-PLACE = re.compile(r"<([^>]*)>")
-
-
-def _filled(text: str, words: Mapping[str, str]) -> str:
-    return PLACE.sub(lambda place: words[place[1]], text) if "<" in text else text
-
-
-@dataclass(frozen=True)
-class ColumnKind:
-    """What a column is, for the columns of answers and for the reference.
-
-    ``<places>`` in its name and its meaning stand for names of a study.
-
-    >>> import numpy as np
-    >>> from mechdesign.results import ColumnKind
-    >>> VELOCITY = ColumnKind("<output>_velocity", "velocity of <output>", "as the output, per time")
-    >>> VELOCITY.column(np.array([1.5, 2.5]), "mm/s", output="P.x")
-    <Column P.x_velocity in mm/s: 2 values>
-    """
-
-    name: str  #: header; several, separated by ``, ``, where columns differ in their names alone
-    meaning: str  #: one line
-    unit: str = ""  #: kind of quantity, several with ``or``, or, after ``as``, what has its unit; empty: none
-    formula: str = ""
-
-    @property
-    def names(self) -> list[str]:
-        """The headers."""
-        return self.name.split(", ")
-
-    def column(self, values: ArrayLike, unit: str = "", name: str = "", /, **words: str) -> Column:
-        """A column of this kind, with the words that stand at its places; `name` is one of several names."""
-        return Column(_filled(name or self.name, words), np.asarray(values), unit, _filled(self.meaning, words), self)
 
 
 @dataclass(frozen=True)
@@ -127,7 +63,7 @@ class TableKind:
 
     def table(self, columns: Iterable[Column], /, **words: str) -> Table:
         """The table of some columns, with the words that stand at the places of its meaning."""
-        return Table(self.name, tuple(columns), _filled(self.meaning, words))
+        return Table(self.name, tuple(columns), filled(self.meaning, words))
 
 
 @dataclass(frozen=True)
@@ -303,9 +239,10 @@ class Table:
         return f"<Table {self.name}: {len(self)} rows of {shown}>"
 
     def _repr_html_(self) -> str:
-        from mechdesign.table_html import table_html
+        from mechdesign.table_html import ROWS, table_html
 
-        return table_html(self)
+        shown = self.take(np.arange(min(ROWS, len(self))))
+        return table_html(self.name, self.meaning, self.seen.columns, shown.columns, len(self) - len(shown))
 
 
 class LongTable(Table):

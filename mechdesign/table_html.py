@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
-import numpy as np
-
+from mechdesign.columns import Column
 from mechdesign.errors import counted, cut, printable
 from mechdesign.table_text import readable
 
-if TYPE_CHECKING:
-    from mechdesign.results import Column, Table
-
-_ROWS = 24
+ROWS = 24  # at most
 
 
-def table_html(table: Table) -> str:
-    """The first rows of a table, all its columns, and how many rows are left; colours are the notebook's own."""
-    shown = table.take(np.arange(min(_ROWS, len(table))))
-    numeric = [column.numeric for column in shown.columns]
-    head = _row("th", map(_head, shown.columns), numeric)
-    texts = zip(*readable(table, shown), strict=True)
+def table_html(name: str, meaning: str, columns: Sequence[Column], shown: Sequence[Column], more: int) -> str:
+    """The first rows of a table, all its columns, and that so many rows are left; colours are the notebook's own."""
+    numeric = [column.numeric for column in shown]
+    head = _row("th", map(_head, shown), numeric)
+    texts = zip(*readable(columns, shown), strict=True)
     rows = "".join(_row("td", map(_text, row), numeric) for row in texts)
-    title = f"{_text(table.name)}: {_text(table.meaning)}" if table.meaning else _text(table.name)
-    more = len(table) - len(shown)
+    title = f"{_text(name)}: {_text(meaning)}" if meaning else _text(name)
     left = f"<div>and {counted(more, 'more row')}</div>" if more else ""
     return (
         '<div style="overflow-x: auto"><table style="margin-left: 0">'

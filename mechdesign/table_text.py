@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.columns import Column
 from mechdesign.errors import printable
-
-if TYPE_CHECKING:
-    from mechdesign.results import Column, Table
 
 _READ = 6  # significant digits of the numbers that a person reads
 # Of the largest number with the same unit: what is smaller is rounding error.
@@ -30,20 +28,22 @@ def texts(values: NDArray[Any], digits: int) -> list[str]:
     return [printable(str(value)) for value in values.tolist()]
 
 
-def readable(table: Table, shown: Table) -> list[list[str]]:
-    """Cells of some rows and columns of a table as a person reads them, column by column.
+def readable(columns: Iterable[Column], shown: Iterable[Column]) -> list[list[str]]:
+    """Cells of columns as a person reads them, column by column.
 
     Numbers have six digits. Where a column has a unit, a number that is rounding error beside the largest of that unit
     in the table is 0.
 
     Parameters
     ----------
-    shown : Table
-        Those of its rows and columns.
+    columns : iterable of Column
+        All columns of the table, with the rows of which numbers are seen.
+    shown : iterable of Column
+        Those of them, with those of their rows, that are read.
     """
-    largest = _largest(table.seen.columns)
+    largest = _largest(columns)
     cells = []
-    for column in shown.columns:
+    for column in shown:
         values = column.values
         if values.dtype.kind == "f" and column.unit:
             values = np.where(np.abs(values) <= _ROUNDING * largest[column.unit], 0.0, values)

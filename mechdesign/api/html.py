@@ -148,4 +148,4 @@ def _beginning(table: Table) -> _Beginning:
     if more := [column.name for column in table.columns if column not in columns]:
         left.append(f"{counted(len(more), 'more column')} ({', '.join(more)})")
     heads = [(column.name, printed(column.unit), column.meaning, column.numeric) for column in columns]
-    return _Beginning(heads, [*zip(*readable(table, shown), strict=True)], left)
+    return _Beginning(heads, [*zip(*readable(table.seen.columns, shown.columns), strict=True)], left)

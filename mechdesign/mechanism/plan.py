@@ -19,7 +19,7 @@ from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
 from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
 from mechdesign.mechanism.structure import Group, Structure
-from mechdesign.mechanism.way import flat, way_to
+from mechdesign.mechanism.way import Way, flat
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.threads import keep_freed_memory
@@ -237,7 +237,8 @@ class Plan:
         turns: Floats = np.empty((0, *shape))
         if self.continued:
             begin = self.start(start)
-            guess, reached, turns = way_to(self, values, dims, shape, begin)
+            way = Way(self.structure, self.core, self.angles, self.pacing, self.run, self.modes_at)
+            guess, reached, turns = way.to(values, dims, shape, begin)
         vectors = vectors or self.core.geometry.vectors(dims)
         state = self.run(values, vectors, guess, self.modes_at(values), turns=turns)
         if self.iterative and reached is not None:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.columns import CHOSEN, VARIED
 from mechdesign.errors import counted
-from mechdesign.results import CHOSEN, VARIED, Table
+from mechdesign.results import Table
 from mechdesign.study.text.document import in_yaml
 
 RANK, FRONT = "rank", "front"

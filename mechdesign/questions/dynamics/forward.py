@@ -18,9 +18,10 @@ from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
-from mechdesign.questions.dynamics.motion_in_time import STANDSTILL, Course, Integration
+from mechdesign.questions.dynamics.motion_in_time import Course, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
 from mechdesign.questions.dynamics.schema import DynamicsSection
+from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Mark

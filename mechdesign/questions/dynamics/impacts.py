@@ -14,10 +14,9 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.corners import Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING
-from mechdesign.questions.dynamics.reasons import EndOfRun
+from mechdesign.questions.dynamics.state_in_time import EndOfRun, MotionInTime
 
 if TYPE_CHECKING:
-    from mechdesign.questions.dynamics.motion_in_time import Integration
     from mechdesign.questions.dynamics.watches import Watch
 
 # A velocity below this part of the usual one is rest at a limit, and that of a contact at rest.
@@ -26,7 +25,7 @@ REST, STILL = 1e-6, 1e-8
 SAME = 1e-9
 
 
-def bounced(motion: Integration, stop: Watch) -> Floats:
+def bounced(motion: MotionInTime, stop: Watch) -> Floats:
     """The state behind a limit; the same where the motion ends there.
 
     An impulse along the limit's coordinate g changes velocities by -(1 + e) M^-1 g (g v) / (g M^-1 g).
@@ -57,7 +56,7 @@ def bounced(motion: Integration, stop: Watch) -> Floats:
     return np.concatenate([exact, velocity, works[:1] + lost, works[1:]])
 
 
-def rested(motion: Integration, contact: int) -> Floats:
+def rested(motion: MotionInTime, contact: int) -> Floats:
     """The state at which a contact, and perhaps others with it, comes to rest."""
     equations, positions, still = motion.equations, motion.positions, STILL * motion.pace
     x, velocity, works = motion.parts_of(motion.state)
@@ -82,7 +81,7 @@ def rested(motion: Integration, contact: int) -> Floats:
     return np.concatenate([exact, velocity, works])
 
 
-def turned(motion: Integration, sides: Sides, turning: Sequence[Threshold]) -> Floats:
+def turned(motion: MotionInTime, sides: Sides, turning: Sequence[Threshold]) -> Floats:
     """The state behind corners of what acts, from which on it is on other sides.
 
     Where the law of a coupling has a corner, the mass matrix M of the independent velocities v jumps, and they with it.
@@ -117,7 +116,7 @@ def turned(motion: Integration, sides: Sides, turning: Sequence[Threshold]) -> F
     return np.concatenate([exact, whole, works])
 
 
-def _chart(motion: Integration, sides: Sides) -> Chart:
+def _chart(motion: MotionInTime, sides: Sides) -> Chart:
     """The chart of the same positions on other sides of corners."""
     chart = motion.equations.atlas.chart(motion.equations.branch.chart.rows, sides)
     if chart is None:
@@ -126,7 +125,7 @@ def _chart(motion: Integration, sides: Sides) -> Chart:
     return chart
 
 
-def _to_common_chart(motion: Integration, sides: Sides) -> None:
+def _to_common_chart(motion: MotionInTime, sides: Sides) -> None:
     """Go to the chart that is regular on both sides of a corner, the present one if it is."""
     equations = motion.equations
     x, branch = motion.parts_of(motion.state)[0][:, None], equations.branch

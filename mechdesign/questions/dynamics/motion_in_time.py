@@ -31,7 +31,8 @@ from mechdesign.questions.dynamics.corners import Corners, Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING, Branch, EquationsOfMotion, Rates
 from mechdesign.questions.dynamics.impacts import bounced, rested, turned
 from mechdesign.questions.dynamics.instants import Instants
-from mechdesign.questions.dynamics.reasons import EndOfRun, cannot_go_on
+from mechdesign.questions.dynamics.reasons import cannot_go_on
+from mechdesign.questions.dynamics.state_in_time import EndOfRun, Event, MotionInTime
 from mechdesign.questions.dynamics.watches import Watch, Watches
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
@@ -43,7 +44,6 @@ MAX_BOUNCES = 1000
 FASTER = 3.0
 # A velocity below this part of the usual one is that of a contact at rest; and what it drifts by while it rests.
 STILL, DRIFT = 1e-8, 1e-9
-STANDSTILL = "standstill"
 # What acts is that of its side this near to a corner, as a part of the duration.
 BESIDE = 1e-13
 # The first step behind a corner: as a part of the way to the next one, and of the step before.
@@ -58,14 +58,6 @@ NEAR_POLE = 1e-6
 LEAST_STEPS, SHORTER = 64, 0.25
 # Parts of the duration in which progress is told.
 PARTS = 1000
-
-
-class Event(NamedTuple):
-    """A crossing, a limit that is reached, or a standstill, at a time."""
-
-    name: str
-    time: float
-    rises: bool
 
 
 class Stretch(NamedTuple):
@@ -109,28 +101,15 @@ class SpentError(Exception):
     """The time of the processor is used up."""
 
 
-class Integration:
+class Integration(MotionInTime):
     """One motion from its start to its end."""
 
     def __init__(self, equations: EquationsOfMotion) -> None:
-        self.equations, self.positions = equations, equations.positions
-        self.section, self.mechanism = equations.section, equations.study.mechanism
-        self.end = float(self.section.duration)
-        self.count = len(self.positions.scales)
-        x, velocity = equations.start
-        equations.check_inertia()
+        super().__init__(equations)
         self.corners = Corners(equations.study, equations.question.section.loads, self.section)
         self.watches = Watches(equations, self.corners, self.sliding)
-        works = 2 if equations.contacts else 1
-        self.time, self.state = 0.0, np.concatenate([x, velocity, np.zeros(works)])
-        equations.branch = equations.branch._replace(signs=np.sign(self.sliding(velocity)))
-        self.scales = self._scales(x, velocity, works)
-        self.events: list[Event] = []
         begin = self.state
         self.stretches = [self._stretch(lambda times: np.repeat(begin[:, None], len(times), axis=1), 0.0)]
-        self.ending: EndOfRun | None = None
-        #: Laws of couplings with a corner at which velocities jumped, in words, and when.
-        self.jumps: list[tuple[str, float]] = []
         self._turning: list[Threshold] = []
         self._turned, self._pole = "", 0.0
         self.steps, self._bounces, self._stuck = 0, 0, 0
@@ -152,28 +131,6 @@ class Integration:
         assert chart is not None
         self.equations.branch = branch._replace(sides=sides, chart=chart)
 
-    def sliding(self, velocity: Floats) -> Floats:
-        """How fast the members of contacts move against each other, in radians or sizes of the mechanism."""
-        positions = self.positions
-        speeds = [
-            positions.between(contact.on, contact.by, velocity) if contact.slide is None
-            else velocity[len(positions.rows) + contact.slide] / positions.size
-            for contact in self.equations.contacts
-        ]  # fmt: skip
-        return np.array(speeds).reshape(len(speeds), *velocity.shape[1:])
-
-    def _scales(self, x: Floats, velocity: Floats, works: int) -> Floats:
-        """Sizes of positions, velocities and work, of which errors are parts."""
-        rates = self.equations.rates(np.zeros(1), x[:, None], velocity[:, None])
-        fast = np.max(np.abs(velocity) / self.positions.scales)
-        gain = np.sqrt(np.max(np.abs(rates.acceleration[:, 0]) / self.positions.scales))
-        pace = max(fast, gain) if np.isfinite(gain) and max(fast, gain) > 0 else 1.0 / self.end
-        matrix, _ = self.equations.matrix(0.0, x)
-        rows = self.positions.scales[self.equations.branch.chart.rows]
-        self.pace = pace
-        energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
-        return np.concatenate([self.positions.scales, self.positions.scales * pace, np.full(works, energy)])
-
     def _function(self, at: float, state: Any) -> Any:
         """Derivative of the state: positions, velocities, work."""
         # A look at the wall's clock costs less than one at the processor's, which is never ahead.
@@ -182,15 +139,6 @@ class Integration:
         x, velocity, _ = self.parts_of(state[:, None])
         rates = self.equations.rates(np.array([at]), x, velocity)
         return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
-
-    def parts_of(self, states: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions, velocities and works."""
-        return states[: self.count], states[self.count : 2 * self.count], states[2 * self.count :]
-
-    def instants(self, times: Floats, states: Floats) -> Instants:
-        """The motion at some instants."""
-        x, velocity, _ = self.parts_of(states)
-        return Instants(self.equations, times, x, velocity)
 
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
@@ -224,7 +172,7 @@ class Integration:
                 self.ending = EndOfRun("spent", f"{MAX_STEPS} steps are not enough, the motion got to {{time}}")
                 return
             if not np.isfinite(solver.f).all() or solver.step() is not None:
-                self.ending = cannot_go_on(self)
+                self.ending = cannot_go_on(self, self.corners)
                 break
             states = solver.dense_output()
             stop, self.time = self._looked(states, begun, solver.t)
@@ -330,10 +278,6 @@ class Integration:
             self.state = bounced(self, stop)
             if self._bounces > MAX_BOUNCES and self.ending is None:
                 self.ending = EndOfRun("spent", f"{MAX_BOUNCES} bounces are not enough, the motion got to {{time}}")
-
-    def stands_still(self) -> None:
-        """Note that friction holds the whole mechanism from now on."""
-        self.events.append(Event(STANDSTILL, self.time, rises=False))
 
     def _kept(self) -> Sides:
         """Sides on which efforts, loads and couplings are, by the programs of the corners' arguments."""

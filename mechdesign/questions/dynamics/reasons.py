@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
-
 import numpy as np
 
 from mechdesign.mechanism.outputs import first
+from mechdesign.questions.dynamics.corners import Corners
 from mechdesign.questions.dynamics.instants import Instants
-
-if TYPE_CHECKING:
-    from mechdesign.questions.dynamics.motion_in_time import Integration
+from mechdesign.questions.dynamics.state_in_time import EndOfRun, MotionInTime
 
 # How far beyond its last instant a motion is looked at, as a part of the duration: with its last velocities.
 BEYOND = 1e-6
 
 
-class EndOfRun(NamedTuple):
-    """Why a motion ends before its time.
-
-    A ``limit`` of the study, and a ``rest`` at it, belong to the motion, and so does friction that ``jams`` it: it is
-    whole. Where something has ``no value``, or where steps or time are ``spent``, the rest of it is missing.
-
-    Attributes
-    ----------
-    words : str
-        In words, with ``{time}`` in place of the time.
-    place : str
-        Where a whole motion ends, in words.
-    """
-
-    kind: Literal["limit", "rest", "jams", "no value", "spent"]
-    words: str
-    place: str = ""
-
-
-def cannot_go_on(motion: Integration) -> EndOfRun:
+def cannot_go_on(motion: MotionInTime, corners: Corners) -> EndOfRun:
     """Why the equations give no motion at the last instant of a motion, or just beyond."""
     equations = motion.equations
     x, velocity, _ = motion.parts_of(motion.state[:, None])
@@ -58,7 +36,7 @@ def cannot_go_on(motion: Integration) -> EndOfRun:
             ahead[part.name] = ahead[part.name] + step / unit * first(configuration, part, moves)
         if not np.isfinite(function.expression.evaluate(ahead)).all():
             return EndOfRun("no value", f"coupling {coupling.name} has no value from {{time}} on")
-    for acting in motion.corners.acting:
+    for acting in corners.acting:
         if acting.coordinate is None:
             now, later = (bool(np.isfinite(acting.value(acting.expression, part)).all()) for part in (here, beyond))
             if not later:

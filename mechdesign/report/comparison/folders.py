@@ -10,13 +10,14 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from mechdesign.columns import VARIED
 from mechdesign.commands import COMMANDS, QUESTIONS, SWEEP
 from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.report.tables import from_csv
-from mechdesign.results import VARIED, Table
+from mechdesign.results import Table
 from mechdesign.rows import UnknownColumnError, in_unit
 from mechdesign.study.text.document import leaves, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown

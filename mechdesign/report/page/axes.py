@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures.framing import PLANE
-from mechdesign.report.figures.panels import OVER
+from mechdesign.report.figures.layout import OVER
 
 POINTS = 72.0  # an inch
 

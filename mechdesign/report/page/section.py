@@ -109,7 +109,7 @@ def _cases(table: Table) -> dict[str, Any]:
 
 def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool = False) -> dict[str, Any]:
     """Some rows of a table; `which`, in words. All rows and those of an open table can be sorted."""
-    texts = readable(table, some)
+    texts = readable(table.seen.columns, some.columns)
     return {
         "name": table.name,
         "meaning": table.meaning,

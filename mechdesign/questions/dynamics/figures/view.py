@@ -9,8 +9,8 @@ import numpy as np
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.rounding import STILL
 from mechdesign.questions.dynamics.analysis import DrawnForces
-from mechdesign.questions.dynamics.motion_in_time import STANDSTILL
 from mechdesign.questions.dynamics.question import ForceQuestion
+from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
 from mechdesign.report.figures.pictures import PosesView
