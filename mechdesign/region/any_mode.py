@@ -63,11 +63,6 @@ class AnyMode(Field):
         """The field of each mode."""
         return self.modes
 
-    @property
-    def accuracy(self) -> float:  # type: ignore[override]
-        """Accuracy of the ray angles at which the region's bounding margins change (radians)."""
-        return self.modes[0].accuracy
-
     @cached_property
     def labels(self) -> tuple[tuple[str, str], ...]:
         """Kind and cause of the margins."""
@@ -117,15 +112,13 @@ class AnyMode(Field):
 
 @dataclass(frozen=True, eq=False)
 class AnyModeDesigns(Designs):
-    """Rays through a region of `AnyMode`; those of each mode are traced as `of_mode`."""
-
-    of_mode: type[Designs] = Designs
+    """Rays through a region of `AnyMode`."""
 
     @cached_property
     def members(self) -> tuple[Designs, ...]:
         """The designs in each mode."""
         common = self.places, self.count, self.about, self.scan, self.effort, self.centres
-        return tuple(self.of_mode(field, *common) for field in self.field.members)
+        return tuple(Designs(field, *common) for field in self.field.members)
 
     @property
     def in_any_assembly(self) -> Designs:

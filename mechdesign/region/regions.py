@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism.derivatives import mixes
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.workspace.schema import Over, WorkspaceSection
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import HELD, LENGTH, Field
 from mechdesign.study import Study
@@ -90,11 +90,6 @@ def regions(study: Study) -> list[Region]:
             f"the mobility is {mechanism.mobility}: beside {section.point}.x and {section.point}.y "
             f"{mechanism.mobility - 2 or 'no'} coordinates are held, not {len(section.at)}",
         )  # fmt: skip
-    held = [values for values in section.at.values() if not isinstance(values, Over)]
-    if len(held) < len(section.at):
-        raise problem(
-            study, "at", "over a range of a coordinate only the command 'workspace' is answered; give single values"
-        )
     try:
         plan = mechanism.plan((*outputs, *section.at))
     except MechanismError as error:
@@ -116,7 +111,7 @@ def regions(study: Study) -> list[Region]:
             whole(replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True)))),
             dict(zip(section.at, values, strict=True)), about, scan, section.scan.rays, factors,
         )
-        for values in itertools.product(*held)
+        for values in itertools.product(*section.at.values())
     ]  # fmt: skip
 
 

@@ -55,28 +55,16 @@ mechanism:
 kinematics: {instant_centres: [[ground, rod]], mechanical_advantage: {rocker.angle: crank}}
 workspace: {point: B}
 """
-ARM = """
-units: {length: dimensionless}
-mechanism:
-  links: {ground: {O: [0, 0]}, upper: [O, E, 1.5], lower: [E, W, 1], hand: [W, P, 0.3]}
-  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
-  limits: [{drive: q1, min: 0, max: 120}, {drive: q2, min: -150, max: -20}]
-  sketch: {E: [0, 1.5], W: [1, 1.5], P: [1.3, 1.5]}
-workspace:
-  {point: P, at: {hand.angle: {from: 0, to: 20}}, scan: {about: [0.5, 1.5], from: 0, to: 5, rays: 5},
-   characteristic_length: 1}
-"""
 PLATFORM = ROOT / "configs" / "planar_3rpr.yaml"
 
 
 @cache
 def asked() -> tuple[tuple[str, Result, Any], ...]:
-    """Answers to what no shipped study asks: pieces, paths of points, ranges, modes, eigen-stiffnesses, ..."""
+    """Answers to what no shipped study asks: pieces, paths of points, modes, eigen-stiffnesses, ..."""
     bar, four = study_of(FIVE_BAR), study_of(FOUR_BAR)
     front = study_of(FIVE_BAR, "optimize.method=pareto", "optimize.evaluations=60",
                      "optimize.variables.a={from: 0.25, to: 0.27}")  # fmt: skip
     held = study_of(FIVE_BAR, "optimize.subject_to=[{contains: {circle: 0.001, center: free}}]")
-    ranged = study_of(ARM)
     cases = study_of(FOUR_BAR, "matrix.vary={mechanism.links.rod.length: [85, 90]}",
                      "matrix.best={maximize: kinematics.B.x.max}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
@@ -144,7 +132,6 @@ dynamics: {gravity: [0, -9.81 m/s^2], rates: {arm: 10}, flywheel: {fluctuation: 
         ("cases", mechdesign.sweep(cases), cases),
         ("labels", mechdesign.sweep(labelled), labelled),
         ("slopes", mechdesign.sensitivities(slopes), slopes),
-        ("range", mechdesign.workspace(ranged), ranged),
         ("graded", mechdesign.reliability(graded), graded),
         ("eigen", mechdesign.stiffness(stiff), stiff),
         ("nearest", without_feasible(hopeless), hopeless),

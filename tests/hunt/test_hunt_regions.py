@@ -22,7 +22,7 @@ Flags = np.ndarray
 # Which places are reached with the platform at an angle (radians), and the sign of the determinant there.
 Solve = Callable[[Complex, float], tuple[Flags, np.ndarray]]
 Seeds = Callable[[int], Iterator[int]]
-CELLS, LAYERS = 700, 41
+CELLS = 700
 # Which legs have the other elbow than in the sketch.
 BOTH = np.array([(1, -1), (-1, 1), (-1, -1)])
 # A raster counts cells on the boundary wrongly by at most this share of their area.
@@ -462,40 +462,6 @@ workspace: {{point: P, indices: []}}
             assert abs(got - area) <= 2 * doubt, (seed, text, effort, got, area, doubt)
 
 
-def reached(robot: Robot, degrees: float, same: bool) -> Flags:
-    """Cells that are reached at one of many angles at least."""
-    angles = np.radians(np.linspace(-degrees, degrees, LAYERS)).tolist()
-    return np.any([raster(robot, CELLS // 2, angle, same)[0] for angle in angles], axis=0)
-
-
-def over(robot: Robot, degrees: float, same: bool) -> tuple[float, float] | None:
-    """Area of the region over a range of the platform's angle about the drawn one, by single angles."""
-    return of_sketch(robot, reached(robot, degrees, same), same)
-
-
-def of_sketch(robot: Robot, good: Flags, same: bool) -> tuple[float, float] | None:
-    """Area of cells that are reached, or of the piece of them that holds the sketch's place; None where in doubt."""
-    side = 2 * robot.half / (CELLS // 2)
-    if not same:
-        return area_of(good, side)
-    area, doubt = area_of(holding(good, robot, side), side)
-    grown, _ = area_of(holding(ndimage.binary_dilation(good), robot, side) & good, side)
-    return (area, doubt) if abs(grown - area) <= doubt else None
-
-
-@pytest.mark.parametrize("same", [False, True], ids=["any", "same"])
-def test_platforms_over_a_range_of_orientations(seeds: Seeds, same: bool) -> None:
-    for seed in seeds(1):
-        robot = platform(np.random.default_rng(seed))
-        wanted = robot and over(robot, 12, same)
-        if robot is None or wanted is None:
-            continue
-        changes = (f"workspace.assembly={'same' if same else 'any'}", "workspace.at.platform.angle={from: -12, to: 12}")
-        found = asked(robot, *changes).main["area"][0]
-        # Between the angles there is a little more.
-        assert abs(found - wanted[0]) <= 1.5 * wanted[1], (found, wanted)
-
-
 DIVIDED = """
 units: {length: m}
 mechanism:
@@ -513,11 +479,11 @@ mechanism:
     - {drive: l3, min: 0.3, max: 1.6}
     - {measure: aside, min: 0.04}
   sketch: {P: [0.4, 1], B1: [0.2, 1], B2: [0.6, 1], B3: [0.65, 1.15]}
-workspace: {point: P, at: {platform.angle: {from: -12, to: 12}}, assembly: same}
+workspace: {point: P, at: {platform.angle: 5}, assembly: same, characteristic_length: 1}
 """
 
 
-def test_over_a_range_only_the_sketchs_piece_counts() -> None:
+def test_at_a_held_angle_only_the_sketchs_piece_counts() -> None:
     """A platform on three strokes that may not pass a strip in the middle."""
     bases, corners = np.array([-0.6, 0.6, 0.3 - 0.2j]), np.array([-0.2, 0.2, 0.25 + 0.15j])
     low, high = np.array([0.4, 0.4, 0.3]), np.array([1.4, 1.4, 1.6])
@@ -531,9 +497,8 @@ def test_over_a_range_only_the_sketchs_piece_counts() -> None:
         return good & (z.real**2 > 0.04), determinant(bars, list(arms))
 
     robot = Robot(DIVIDED, solve, 0.4 + 1j, 2.0)
-    good = reached(robot, 12, same=True)
-    one, every = of_sketch(robot, good, same=True), area_of(good, 4.0 / (CELLS // 2))
-    assert one is not None
+    good, side = raster(robot, CELLS, np.radians(5), True)
+    one, every = area_of(holding(good, robot, side), side), area_of(good, side)
     assert one[0] < 0.9 * every[0]
     result = asked(robot)
     pieces = result.tables["pieces"]

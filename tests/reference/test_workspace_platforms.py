@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers import turning
 from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.questions.workspace import ranged
+from mechdesign.errors import AssemblyError
 
 FIVE_BAR = """
 units: {length: m}
@@ -140,39 +138,6 @@ def test_the_arcs_against_counted_points() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(("every", "inside"), [(False, turning.reached), (True, turning.always)])
-@pytest.mark.parametrize(("study", "held", "bounds"), [
-    (RPR, "[0, 15, -30]", (0.3, 0.75)),
-    (RRR, "[0, 20, -30]", (CRANK - ROD, CRANK + ROD)),
-])  # fmt: skip
-def test_over_a_range_of_orientations(study: str, held: str, bounds, every: bool, inside) -> None:
-    """Reachable and total orientation workspace (Merlet, Gosselin and Mouly): by Green's theorem along their arcs."""
-    at = f"{{from: -10, to: 25, all: {str(every).lower()}}}"
-    found = mechdesign.workspace(study_of(study.replace(held, at))).main
-    reach = [(complex(base), complex(corner), *bounds) for base, corner in zip(BASES, CORNERS, strict=True)]
-    span = np.radians([-10, 25])
-    exact = turning.area(lambda z: inside(z, reach, *span), reach, *span)
-    assert abs(found["area"][0] - exact) <= found["area_error"][0] + 1e-8 * exact
-    assert found["area_error"][0] <= 1e-6 * exact
-
-
-def test_the_turning_legs_against_counted_orientations() -> None:
-    """What the last test compares with, by many orientations of random points."""
-    z = np.random.default_rng(1).uniform(0, 1, (4000, 2)) @ np.array([1, 1j])
-    reach = [(complex(base), complex(corner), 0.3, 0.75) for base, corner in zip(BASES, CORNERS, strict=True)]
-    span = np.radians([-10, 25])
-    held = np.array([
-        np.all([(low <= np.abs(z - b + c * np.exp(1j * phi))) & (np.abs(z - b + c * np.exp(1j * phi)) <= high)
-                for b, c, low, high in reach], axis=0) for phi in np.linspace(*span, 701)
-    ])  # fmt: skip
-    # Between the orientations that are counted there may be one more, or one that is missed.
-    assert (turning.reached(z, reach, *span) >= held.any(axis=0)).all()
-    assert (turning.always(z, reach, *span) <= held.all(axis=0)).all()
-    assert np.mean(turning.reached(z, reach, *span) != held.any(axis=0)) < 2e-3
-    assert np.mean(turning.always(z, reach, *span) != held.all(axis=0)) < 2e-3
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize("measures", ["{}", "{turn: platform.angle*1}"])
 def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> None:
     """Whether the inverse problem has a closed form or, for a measure that is an expression, has none."""
@@ -187,70 +152,3 @@ def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> N
     assert f"{name} = 175" in warning
     with pytest.raises(AssemblyError, match="reaches nothing"):
         mechdesign.workspace(study_of(RPR, changes[0], f"workspace.at={{{name}: [175]}}"))
-
-
-def aligned(z: np.ndarray, phi: float, cranked: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Whether the legs reach at one orientation, and the determinant of the lines along legs (or rods), written out.
-
-    It is zero where the three lines meet in one point or are parallel: C. M. Gosselin and J. Angeles, Singularity
-    analysis of closed-loop kinematic chains, IEEE Trans. Robotics and Automation 6 (1990).
-    """
-    turn, good, rows = np.exp(1j * phi), np.ones(z.shape, dtype=bool), []
-    elbows = (0.36 - 0.05j, 0.9 + 0.38j, 0.3 + 0.7j)
-    for base, corner, elbow in zip(BASES, CORNERS, elbows, strict=True):
-        line = z + turn * corner - base
-        size = np.abs(line)
-        good &= (size >= CRANK - ROD) & (size <= CRANK + ROD) if cranked else (size >= 0.3) & (size <= 0.75)
-        if cranked:
-            drawn = 0.5 + 0.34j + corner - base
-            side = np.sign(np.imag(np.conj(drawn) * (elbow - base)))
-            cosine = np.clip((size**2 + CRANK**2 - ROD**2) / (2 * CRANK * size), -1, 1)
-            line = line - CRANK * line / size * np.exp(1j * side * np.arccos(cosine))
-        rows.append((line.real, line.imag, np.imag(np.conj(turn * corner) * line)))
-    return good, np.linalg.det(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("every", [False, True])
-@pytest.mark.parametrize(("study", "held", "cranked", "drawn", "span"), [
-    (RPR, "[0, 15, -30]", False, 0.52 + 0.34j, (-20, -5)),
-    (RRR, "[0, 20, -30]", True, 0.5 + 0.34j, (-10, 25)),
-])  # fmt: skip
-def test_over_a_range_the_assembly_of_the_sketch(
-    study: str, held: str, cranked: bool, drawn: complex, span: tuple[float, float], every: bool
-) -> None:
-    """The determinant keeps its sign of the sketch, in a sector: by counted orientations of random points."""
-    at = f"{{from: {span[0]}, to: {span[1]}, all: {str(every).lower()}}}"
-    section = study.replace(held, at).replace("assembly: any", "assembly: same, scan: {from: 0, to: 45}")
-    (area,), (error,) = (mechdesign.workspace(study_of(section)).main[name] for name in ("area", "area_error"))
-    z = np.random.default_rng(4).uniform((0, -0.2), (1, 0.9), (40_000, 2)) @ np.array([1, 1j])
-    z = z[((z - drawn).imag > 0) & ((z - drawn).real > (z - drawn).imag)]
-    sign = np.sign(aligned(np.array([drawn]), 0.0, cranked)[1])
-    held_there = np.full(z.shape, every)
-    for phi in np.radians(np.linspace(*span, 241)):
-        good, determinant = aligned(z, phi, cranked)
-        good &= determinant * sign > 0
-        held_there = held_there & good if every else held_there | good
-    share, sector = held_there.mean(), 0.5 * (1 - drawn.real) ** 2
-    # Four standard deviations; between the orientations that are counted there is a little more (or less).
-    doubt = 4 * sector * np.sqrt(share * (1 - share) / len(z)) + 1e-3 * area
-    assert error <= 2e-6 * area
-    assert area > 0
-    assert abs(area - sector * share) <= doubt + error
-
-
-@pytest.mark.nightly
-def test_a_range_is_sampled_closely_enough_for_what_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Twice as many samples of the range give the same area; with half as many a stretch was missed, 2e-4 of it."""
-    sector = RPR.replace("[0, 15, -30]", "{from: -10, to: 25}").replace("assembly: any", "assembly: same")
-    study = study_of(sector, "workspace.scan={from: 0, to: 45}")
-    area = mechdesign.workspace(study).main["area"][0]
-    monkeypatch.setattr(ranged, "SAMPLES", 2 * ranged.SAMPLES - 1)
-    assert mechdesign.workspace(study).main["area"][0] == pytest.approx(area, rel=1e-6)
-
-
-def test_over_a_range_without_a_closed_form_is_told() -> None:
-    """A measure that is an expression is held by iteration, which cuts across a range do not know."""
-    changes = ["mechanism.measures={turn: platform.angle*1}", "workspace.at={turn: {from: -10, to: 25}}"]
-    with pytest.raises(StudyError, match="closed form"):
-        mechdesign.workspace(study_of(RPR, *changes))

@@ -201,32 +201,6 @@ def test_poses_of_other_questions_keep_the_elbow_of_the_sketch() -> None:
     assert poses["q2"].max() == pytest.approx(70, abs=0.1)
 
 
-@pytest.mark.nightly
-def test_every_orientation_of_a_hand_in_one_mode() -> None:
-    """Where the hand turns from -20 to 30 deg with the same elbow, and where some of these is reached with either."""
-    text = """
-mechanism:
-  links: {ground: {O: [0, 0]}, upper: [O, A, 100], lower: [A, B, 70], hand: [B, P, 30]}
-  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
-  limits: [{drive: q1, min: 10, max: 60}, {drive: q2, min: -60, max: 70}]
-  sketch: {A: [80, 60], B: [100, 127], P: [130, 127]}
-workspace: {point: P, assembly: any, at: {hand.angle: {from: -20, to: 30, all: true}}}
-"""
-    x = np.linspace(-60, 210, 1100)
-    z = x + 1j * x[:, None]
-    reached = np.ones((2, *z.shape), dtype=bool)
-    for angle in np.radians(np.linspace(-20, 30, 101)):
-        wrist = z - 30 * np.exp(1j * angle)
-        with np.errstate(invalid="ignore"):
-            bend = np.arccos((np.abs(wrist) ** 2 - 100**2 - 70**2) / (2 * 100 * 70))
-        for row, side in enumerate((1, -1)):
-            q2 = np.degrees(side * bend)
-            q1 = np.degrees(np.angle(wrist) - np.angle(100 + 70 * np.exp(1j * side * bend)))
-            reached[row] &= (q1 >= 10) & (q1 <= 60) & (q2 >= -60) & (q2 <= 70)
-    found = mechdesign.workspace(study_of(text)).main["area"][0]
-    assert found == pytest.approx(reached.any(axis=0).sum() * (x[1] - x[0]) ** 2, rel=3e-3)
-
-
 @pytest.mark.slow
 def test_a_point_on_one_path_has_those_of_both_sides_of_the_rocker() -> None:
     """A point on the line of the coupler: with the rocker on the other side its path is the mirror image."""

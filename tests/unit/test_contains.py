@@ -266,17 +266,3 @@ def test_held_values_that_leave_nothing_are_named() -> None:
     result = mechdesign.optimize(study_of(RRR, "optimize.variables.crank={from: 90, to: 160, step: 70}",
                                           "workspace.at.platform.angle=[0, 60]", "optimize.subject_to=[]"))  # fmt: skip
     assert result.tables["designs"]["reason"][0] == "nothing of the workspace can be reached at platform.angle = 60"
-
-
-@pytest.mark.nightly
-def test_designs_over_a_range_of_a_held_coordinate() -> None:
-    over = "workspace.at.platform.angle={from: -10, to: 10, all: true}"
-    designs = mechdesign.optimize(study_of(RRR, over, "optimize.variables.crank.step=20")).tables["designs"]
-    region = mechdesign.workspace(study_of(RRR, over, "mechanism.parameters.crank=150")).tables["indices"]
-    assert designs["area"][0] == pytest.approx(region["area"][0], rel=1e-4)
-    ends = [scales(RRR, Shape(120, 120, True, 0j), f"workspace.at.platform.angle={angle}")[0] for angle in (-10, 10)]
-    single = scales(RRR, Shape(120, 120, True, 0j), over)
-    # The corners of the platform are farthest from the motors at the ends of the range.
-    assert single == pytest.approx([min(ends)], rel=1e-6)
-    with pytest.raises(StudyError, match="GII has no value: over a range of"):
-        mechdesign.optimize(study_of(RRR, over, "optimize.maximize=[GII]"))

@@ -1,4 +1,4 @@
-"""Any region: holes, several pieces, crescents, tangent rays, and regions over a range of orientations."""
+"""Any region: holes, several pieces, crescents, and tangent rays."""
 
 from __future__ import annotations
 
@@ -180,31 +180,6 @@ def test_a_band_of_a_measure_leaves_pieces() -> None:
     good = (one > 1) & (one < 3) & (two > 1) & (two < 3) & (product > 0.1) & (product < 0.8)
     guess, doubt = by_chance(good, 36)
     assert abs(found - guess) < doubt + error
-
-
-def reached(z: np.ndarray, degrees: float) -> np.ndarray:
-    """Whether the platform's strokes reach places at an orientation."""
-    turn = np.exp(1j * np.radians(degrees))
-    lengths = np.abs(z[:, None] + turn * np.array([-0.2, 0.2, 0.25 + 0.15j]) - np.array([-0.6, 0.6, 0.3 - 0.2j]))
-    return np.asarray(((lengths >= [0.4, 0.4, 0.3]) & (lengths <= [1.4, 1.4, 1.6])).all(axis=1))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("every", [False, True])
-def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
-    """Where some orientation is reached, and where every one is."""
-    at = f"{{platform.angle: {{from: -10, to: 10, all: {str(every).lower()}}}}}"
-    section = f"workspace={{point: P, at: {at}, assembly: any}}"
-    result = mechdesign.workspace(mechdesign.load(PLATFORM, [STROKES, section]))
-    z = uniform(2)
-    parts = np.array([reached(z, angle) for angle in np.linspace(-10, 10, 81)])
-    guess, doubt = by_chance(parts.all(axis=0) if every else parts.any(axis=0), 16)
-    # Between the samples' orientations there is a little more (or less).
-    assert abs(result.main["area"][0] - guess) < doubt + result.main["area_error"][0] + 1e-3
-    edge = result.tables["boundary"]
-    assert set(edge["kind"]) == {"limit"}
-    assert {name.split()[0] for name in edge["at"]} <= {"l1", "l2", "l3"}
-    assert (np.abs(edge["platform.angle"]) <= 10).all()
 
 
 @pytest.mark.nightly

@@ -16,7 +16,6 @@ import mechdesign
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.boundary import inscribed_figure
 from mechdesign.questions.workspace.figures.index_maps import index_columns
-from mechdesign.questions.workspace.figures.ranged import loops
 from mechdesign.questions.workspace.figures.regions import fate, regions
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
@@ -222,35 +221,6 @@ workspace: {point: B}
     places = np.concatenate(segments.get_segments())
     assert np.hypot(places[:, 0] - 100, places[:, 1]) == pytest.approx(np.full(len(places), 60.0))
     assert axes.get_aspect() == 1
-
-
-def test_curves_are_joined_to_loops_in_any_order_and_direction() -> None:
-    turn = np.exp(1j * np.linspace(0, 2 * np.pi, 41))
-    hole = 5 + 0.2 * turn
-    joined = loops([turn[:11], turn[20:31], hole, turn[10:21][::-1], turn[30:]])
-    assert sorted(len(loop) for loop in joined) == [42, 45]
-    # Twice the area that each encloses, by the shoelace formula.
-    twice = [abs(np.sum(np.imag(np.conj(loop[:-1]) * loop[1:]))) for loop in joined]
-    polygon = 40 * np.sin(2 * np.pi / 40)
-    assert sorted(twice) == pytest.approx([0.04 * polygon, polygon])
-
-
-def test_the_region_over_a_range_is_coloured_by_the_value_that_ends_it() -> None:
-    """A hand that may turn either way: the farthest reach is with the arm and the hand stretched."""
-    study = study_of(ARM, "workspace.at={hand.angle: {from: -90, to: 90}}")
-    turn = np.linspace(0, 2 * np.pi, 61)
-    columns = (
-        Column("x", 80 * np.cos(turn), "mm"), Column("y", 80 * np.sin(turn), "mm"),
-        Column("kind", np.full(61, "singularity")), Column("hand.angle", np.clip(np.degrees(turn), -90, 90), "deg"),
-        Column("at", np.full(61, "upper-lower stretched")), Column("side", np.full(61, "outer")),
-        Column("curve", np.zeros(61, dtype=int)),
-    )  # fmt: skip
-    tables = {"indices": Table("indices", (Column("area", np.ones(1)),)), "boundary": Table("boundary", columns)}
-    with style.context():
-        drawn = figures(study, Result("workspace", tables))
-    assert set(drawn) == {"workspace", "range"}
-    assert drawn["range"].axes[1].get_ylabel() == "hand.angle [deg]"
-    assert [text.get_text() for text in drawn["workspace"].legends[0].get_texts()] == ["a leg is stretched"]
 
 
 POLAR = """

@@ -16,7 +16,6 @@ from mechdesign.questions.optimize.goals import Goal, conditions_of, goals_of, u
 from mechdesign.questions.optimize.variables import choice_problems
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared
-from mechdesign.questions.workspace.schema import Over
 from mechdesign.questions.workspace.tables import index_columns
 from mechdesign.results import Column, Result
 from mechdesign.rows import Chosen, UnknownColumnError
@@ -113,8 +112,7 @@ class DesignsQuestion:
         if len(self.regions) < 2:
             return meanings
         assert self.study.workspace is not None
-        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
-                for name, values in self.study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
+        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}" for name, values in self.study.workspace.at.items()]
         return {
             name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in meanings.items()
         }

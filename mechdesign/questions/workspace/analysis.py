@@ -9,8 +9,7 @@ from mechdesign.questions.workspace.ellipses import ellipses
 from mechdesign.questions.workspace.point_path import point_path
 from mechdesign.questions.workspace.question import questions
 from mechdesign.questions.workspace.reached import Reached, reach
-from mechdesign.questions.workspace.remarks import remarks, rough, unreachable
-from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.remarks import remarks, unreachable
 from mechdesign.questions.workspace.tables import tables
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -35,10 +34,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         raise unreachable(study, all_questions)
     warnings = [caution for row, region in enumerate(regions) for caution in remarks(study, region, row)]
     counts = {"regions": len(regions), "empty": len(regions) - len(full)}
-    ranged = next((name for name, values in section.at.items() if isinstance(values, Over)), "")
-    named = {table.name: table for table in tables(study, regions, ranged)}
-    if ranged:
-        return Result("workspace", named, (*warnings, *rough(ranged, regions)), counts)
+    named = {table.name: table for table in tables(study, regions)}
     first = full[0]
     assert first.boundary is not None
     along = poses_along(first.question.field, first.boundary)

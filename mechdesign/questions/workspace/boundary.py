@@ -10,7 +10,6 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.questions.workspace.ranged import Ranged
 from mechdesign.region.field import Field
 from mechdesign.region.patches import Patch
 
@@ -37,8 +36,8 @@ class Boundary:
         ``inner`` or ``outer``: which end of the ray's interval.
     curve, piece : ndarray of int
         Numbers of the curve and of the region's piece.
-    values : sequence of (Coordinate, ndarray)
-        The drives (radians or lengths); over a range of a held coordinate its value that decides.
+    drives : sequence of (Coordinate, ndarray)
+        Values of the drives (radians or lengths).
     """
 
     z: Complexes
@@ -48,7 +47,7 @@ class Boundary:
     side: np.ndarray
     curve: Ints
     piece: Ints
-    values: Sequence[tuple[Coordinate, Floats]]
+    drives: Sequence[tuple[Coordinate, Floats]]
 
 
 def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[str, str]]) -> Boundary:
@@ -64,25 +63,11 @@ def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[
     )
     about, turn = patches[0].about, np.exp(1j * theta)
     inwards, z = np.where(side == "inner", 1.0, -1.0), np.asarray(about + radius * turn)
-    if isinstance(field.members[0], Ranged):
-        values = [_deciding(field, z, margin)]
-    else:
-        within = np.asarray(about + radius * (1 + BESIDE * inwards) * turn)
-        values = _drives(field, field.on_boundary(z, margin), field.on_boundary(within, margin), inwards)
+    within = np.asarray(about + radius * (1 + BESIDE * inwards) * turn)
+    drives = _drives(field, field.on_boundary(z, margin), field.on_boundary(within, margin), inwards)
     kind, at = (np.array(words)[margin] for words in ([kind for kind, _ in field.labels], [at for _, at in reasons]))
     curve = np.repeat(np.arange(len(curves)), lengths)
-    return Boundary(z, theta, kind, at, side, curve, piece, values)
-
-
-def _deciding(field: Field, z: Complexes, margin: Ints) -> tuple[Coordinate, Floats]:
-    """The held coordinate of a range, and its value that decides at each point."""
-    values, count, which = np.empty(len(z)), len(field.members[0].labels), 0
-    for number, over in enumerate(field.members):
-        assert isinstance(over, Ranged)
-        own, which = np.flatnonzero(margin // count == number), over.which
-        row = np.array([over.extreme(label) for label in range(count)])[margin[own] % count]
-        values[own] = np.take_along_axis(over.deciding(z[own])[1], row[None], axis=0)[0]
-    return field.outputs[2 + which], values
+    return Boundary(z, theta, kind, at, side, curve, piece, drives)
 
 
 def _drives(

@@ -23,8 +23,6 @@ INDICES = TableKind.of("indices", "performance indices over the region",
     ("rectangle_x, rectangle_y", "centre of the largest axis-parallel rectangle inside the region", "length"),
     ("rectangle_width", "width of the largest axis-parallel rectangle inside the region", "length"),
     ("rectangle_height", "height of the largest axis-parallel rectangle inside the region", "length"))  # fmt: skip
-RANGE_INDICES = TableKind.of("indices", "the region over the range of <held>",
-    HELD, AREA, BOX_AREA, SUI, ("area_error", "estimated error of area", "area"))  # fmt: skip
 PATH_INDICES = TableKind.of("indices", "the path as a whole",
     ("from", "<drive> where the motion begins", "length or angle"), ("to", "<drive> where it ends", "length or angle"),
     ("from_at", "what ends the motion there"), ("to_at", "what ends the motion there"),
@@ -56,7 +54,6 @@ PIECES = TableKind.of("pieces", "pieces of the region that do not hang together"
 BOUNDARY = TableKind.of("boundary", "boundary of the region, curve by curve",
     HELD, PLACE, ("kind", "what ends the region: limit or singularity"),
     ("<drive>", "drive's value there", "length or angle"),
-    ("<coordinate>", "value of the range that decides there", "as the coordinate"),
     ("at", "which limit or singularity"), ("theta", "angle of the ray about the centre of the scan", "angle"),
     ("side", "which end of the ray's interval"), ("curve", "smooth part of the boundary"), PIECE)  # fmt: skip
 LOCAL = TableKind.of("local", "local indices on a grid that follows the boundary",

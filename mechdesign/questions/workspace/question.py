@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from mechdesign.errors import Problem, StudyError
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags
-from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.index import Prepared, prepare
 from mechdesign.questions.workspace.inscribed import INSCRIBED
-from mechdesign.questions.workspace.ranged import Every, Ranged, Some, SomeDesigns
-from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.questions.workspace.strips import Integrand
-from mechdesign.region.any_mode import AnyMode, AnyModeDesigns, in_any_assembly
-from mechdesign.region.field import Field, Places
+from mechdesign.region.any_mode import AnyMode, AnyModeDesigns
+from mechdesign.region.field import Places
 from mechdesign.region.rays import Designs, Effort
 from mechdesign.region.regions import Region, problem, regions
 from mechdesign.study import Study
@@ -29,8 +25,6 @@ from mechdesign.study.text.units import Amount
 TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
 COLUMNS = tuple(REGIONAL)
 MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
-# What is answered of a region over a range.
-OF_RANGE = ("SUI", "area", "box_area")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +51,10 @@ class Question(Region):
     columns: tuple[str, ...]
     shown: tuple[Prepared, ...]
 
-    @property
-    def ranged(self) -> bool:
-        """Whether it is of a range of a held coordinate."""
-        return isinstance(self.field.members[0], Ranged)
-
     def designs(self, places: Places, count: int, effort: Effort) -> Designs:
         """`count` designs, whose changed places are arrays of shape (count,), and how rays meet their regions."""
-        of_mode = SomeDesigns if isinstance(self.field.members[0], Some) else Designs
-        common = self.field, places, count, self.about, self.scan, effort
-        return AnyModeDesigns(*common, of_mode=of_mode) if isinstance(self.field, AnyMode) else of_mode(*common)
+        kind = AnyModeDesigns if isinstance(self.field, AnyMode) else Designs
+        return kind(self.field, places, count, self.about, self.scan, effort)
 
     @cached_property
     def statistics(self) -> dict[str, tuple[str, str]]:
@@ -117,7 +105,7 @@ def shared(study: Study, questions: Sequence[Question], moved: Collection[str]) 
     numbers = [part for key, part in parts_of(study.workspace, "workspace") if not key.startswith(of_field)]
     followed = {name for part in numbers if isinstance(part, Amount) and part.expression
                 for name in part.expression.names}  # fmt: skip
-    return not questions[0].ranged and followed.union(study.fixed).isdisjoint(moved)
+    return followed.union(study.fixed).isdisjoint(moved)
 
 
 def batched(column: str) -> bool:
@@ -127,14 +115,14 @@ def batched(column: str) -> bool:
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str] | None = None) -> list[Question]:
-    """One question a value of ``at``; over a range of one of them one for all its values.
+    """One question a value of ``at``.
 
     Parameters
     ----------
     tolerance : float
         Of the integrals where the study says none.
     columns : sequence of str, optional
-        Columns of the answer; left out, all of those indices that the study asks for, over a range `OF_RANGE`.
+        Columns of the answer; left out, all of those indices that the study asks for.
 
     Raises
     ------
@@ -142,9 +130,6 @@ def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str]
         If the section lacks what cannot be assumed.
     """
     section = study.workspace
-    over = {} if section is None else {name: values for name, values in section.at.items() if isinstance(values, Over)}
-    for name, values in over.items():
-        return list(_over_range(study, name, values, tolerance, OF_RANGE if columns is None else columns))
     if section is not None and columns is None:
         columns = columns_of(USUAL if section.indices is None else section.indices)
     all_regions = regions(study)
@@ -164,32 +149,3 @@ def questions(study: Study, tolerance: float = TOLERANCE, columns: Sequence[str]
                  nodes=integrate_by.nodes, indices=indices, columns=tuple(columns), shown=tuple(ready.values()))
         for region in all_regions
     ]  # fmt: skip
-
-
-def _over_range(
-    study: Study, name: str, over: Over, tolerance: float, columns: Sequence[str]
-) -> Iterator[Question]:  # fmt: skip
-    """One question a value of the other held coordinates."""
-    section = WorkspaceSection.of(study)
-    for column in columns:
-        if column not in OF_RANGE:
-            only = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
-            raise problem(study, "at", f"{column} has no value: {only}; ask for single values: at: {{{name}: [...]}}")
-    # Only the area is asked, in which angles and lengths do not mix.
-    update = {"at": {**section.at, name: (over.from_,)}, "indices": (),
-              "characteristic_length": section.characteristic_length or 1.0}  # fmt: skip
-    coordinate = study.mechanism.coordinate(name)
-    low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
-    single = study.with_sections(workspace=section.model_copy(update=update))
-    for question in questions(single, tolerance, columns):
-        base = question.field
-        if base.plan.iterative:
-            message = (
-                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
-                f"ask for single values: at: {{{name}: [...]}}"
-            )
-            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
-        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
-        field: Field = (Every if over.all else Some)(*common, list(section.at).index(name), low, high)
-        held = {k: v for k, v in question.held.items() if k != name}
-        yield replace(question, field=field if field.same_assembly else in_any_assembly(field), held=held)

@@ -12,15 +12,15 @@ from mechdesign.questions.workspace.answer import Evaluation, answer, area_in_an
 from mechdesign.questions.workspace.boundary import Boundary, boundary_of
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.nodes import Nodes, nodes_of
-from mechdesign.questions.workspace.question import OF_RANGE, Question
+from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.singularities import Locus, causes, loci
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.patches import Patch, patches_of_pieces
-from mechdesign.region.rays import SINGLE, Effort
+from mechdesign.region.rays import SINGLE
 from mechdesign.region.regions import RAYS
 
-# How finely a region over a range is looked for; its margins cost a hundred times as much.
-OVER_RANGE = Effort(48, 16, 96, 1.5)
+# What a region has whose every pose is singular.
+OF_AREA = ("SUI", "area", "box_area")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,33 +59,32 @@ class Reached:
 
 
 def reach(question: Question) -> Reached:
-    """Everything about one region; over a range of a held coordinate its area, its pieces and its boundary alone.
+    """Everything about one region.
 
     Raises
     ------
     AssemblyError
         If the region has no end.
     """
-    ranged = question.ranged
-    singular = not ranged and question.field.singular_everywhere
+    singular = question.field.singular_everywhere
     if singular:
         question = replace(question, field=in_any_assembly(question.field))
-        evaluation = answer(replace(question, indices=(), columns=OF_RANGE), {}, 1, SINGLE)
+        evaluation = answer(replace(question, indices=(), columns=OF_AREA), {}, 1, SINGLE)
         nothing = {name: np.full(1, np.nan) for name in question.columns}
         evaluation = replace(evaluation, values=nothing | evaluation.values, errors=nothing | evaluation.errors)
     else:
-        evaluation = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)
-    everywhere = 0.0 if ranged else area_in_any_assembly(question)
+        evaluation = answer(question, {}, 1, SINGLE)
+    everywhere = area_in_any_assembly(question)
     if not evaluation.panels.closes[0] or evaluation.pieces is None:
         return Reached(question, evaluation, singular, everywhere=everywhere)
     field, parts = question.field, list(evaluation.pieces.all())
     pieces = areas(question, evaluation, parts)
     patches = patches_of_pieces(evaluation.pieces.panels, parts, question.rays or RAYS)
     reasons = causes(field)
-    boundary = boundary_of(field, patches, reasons)
-    region = Reached(question, evaluation, singular, patches, pieces, everywhere, boundary=boundary)
-    if ranged:
-        return region
-    shapes = np.concatenate(list(inscribed(evaluation.panels).values()))
-    curves = loci(field, reasons, patches, singular=singular)
-    return replace(region, shapes=shapes, nodes=nodes_of(field, question.shown, patches), loci=curves)
+    return Reached(
+        question, evaluation, singular, patches, pieces, everywhere,
+        shapes=np.concatenate(list(inscribed(evaluation.panels).values())),
+        loci=loci(field, reasons, patches, singular=singular),
+        boundary=boundary_of(field, patches, reasons),
+        nodes=nodes_of(field, question.shown, patches),
+    )  # fmt: skip

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
-import numpy as np
-
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.questions.workspace.inscribed import crossed
-from mechdesign.questions.workspace.quadrature import FINEST_AREA
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.reached import Reached
-from mechdesign.questions.workspace.schema import Over, WorkspaceSection
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study import Study
 
 # An area is doubtful whose error is a larger part of it.
@@ -25,17 +22,16 @@ ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; re
 def remarks(study: Study, region: Reached, row: int) -> Iterator[Caution]:
     """Warnings about one region, which is a row of the indices."""
     question, there = region.question, region.question.where
-    ranged = question.ranged
     if region.singular:
         words = f"every pose{there} is a forward singularity: indices have no value"
         yield Caution("singular", words, "indices", row)
-    elif not ranged:
+    else:
         yield from _doubts(region)
     if len(region.areas) > 1 and question.field.same_assembly:
         yield _left_out(study, region)
     if region.beyond > max(region.areas, default=0.0):
         yield _in_other_assembly(study, region)
-    if region.patches and not ranged:
+    if region.patches:
         yield from _crossed(region, row)
 
 
@@ -56,33 +52,9 @@ def _crossed(region: Reached, row: int) -> Iterator[Caution]:
         )  # fmt: skip
 
 
-def rough(name: str, regions: Sequence[Reached]) -> Iterator[Caution]:
-    """A warning where areas over a range of a coordinate are not known closely."""
-    area, error = (
-        np.concatenate(column)
-        for column in zip(
-            *((region.answer.values["area"], region.answer.errors["area"]) for region in regions), strict=True
-        )
-    )
-    late = (area > 0) & (error > FINEST_AREA * area)
-    if late.any():
-        share = (error[late] / area[late]).max()
-        yield Caution(
-            "unconverged",
-            f"the area is known to {share:.1g} of itself only (area_error): over the range of {name} the boundary "
-            "is too rough for more",
-            "indices", int(late.argmax()),
-        )  # fmt: skip
-
-
 def unreachable(study: Study, questions: Sequence[Question]) -> AssemblyError:
     """The error where no region has a place."""
     section, question = WorkspaceSection.of(study), questions[0]
-    for name, over in section.at.items():
-        if isinstance(over, Over):
-            held = "".join(f", {key} = {value:g}" for key, value in question.held.items())
-            span = f"the range of {name} from {over.from_:g} to {over.to:g}{held}"
-            return AssemblyError(f"point {section.point} reaches nothing over {span}")
     field, about = question.field, question.about
     there = " at" * bool(question.held) + ";".join(other.where.removeprefix(" at") for other in questions)
     if field.rootless:

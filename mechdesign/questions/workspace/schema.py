@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
@@ -74,26 +74,6 @@ class Integrate(fields.Model):
         return self
 
 
-class Over(fields.Model):
-    """A range of a held coordinate: the places reached at some value of it, or at every one. It gives areas and
-    SUI only.
-    """
-
-    from_: fields.Number = Field(alias="from")
-    """Lowest value, in the coordinate's unit. Example: -20"""
-    to: fields.Number
-    """Highest value. Example: 20"""
-    all: bool = False
-    """Whether every value of the range must be reached, rather than some value."""
-
-
-def _form(raw: Any) -> str:
-    return "over" if isinstance(raw, dict | Over) else "values"
-
-
-At = Annotated[Annotated[Over, Tag("over")] | Annotated[fields.Numbers, Tag("values")], Discriminator(_form)]
-
-
 _Index = Annotated[str, fields.choice(INDEX_NAMES, "local index")]
 
 
@@ -103,10 +83,9 @@ class WorkspaceSection(Section):
     command: ClassVar[str] = "workspace"
     point: fields.EndName
     """Point whose region is asked for; the mechanism has two degrees of freedom or more. Example: C"""
-    at: dict[fields.CoordinateName, At] = Field(default_factory=dict)
-    """Coordinates that are held where the mobility is beyond two, as many as it is beyond: one value, a list (a region
-    each) or a range {from, to}. Example: {platform.angle: [0, 15]} Example: {platform.angle: {from: -20, to: 20, all:
-    true}}
+    at: dict[fields.CoordinateName, fields.Numbers] = Field(default_factory=dict)
+    """Coordinates that are held where the mobility is beyond two, as many as it is beyond: one value, or a list (a
+    region each). Example: {platform.angle: [0, 15]}
     """
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
@@ -126,14 +105,8 @@ class WorkspaceSection(Section):
         root: KeyPath = ("workspace",)
         checker.check_name(self.point, [*checker.mechanism.owners, *checker.mechanism.ends], "point", (*root, "point"))
         checker.coordinates(self.at, (*root, "at"))
-        ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
-        if len(ranges) > 1:
-            mistake = "only one held coordinate can range; give the others single values"
-            checker.report((*root, "at", ranges[1]), mistake, at_key=True)
         for name, values in self.at.items():
-            if isinstance(values, Over):
-                checker.range(values.from_, values.to, (*root, "at", name))
-            elif not values:
+            if not values:
                 checker.report((*root, "at", name), "an empty list of values; give one or more, such as [0, 15]")
         for index, name in enumerate(self.indices or ()):
             checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))

@@ -17,7 +17,6 @@ from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.zero_curves import joined, zero_curves
-from mechdesign.questions.workspace.ranged import Ranged
 from mechdesign.region.field import Field
 from mechdesign.region.patches import GRID, Patch
 
@@ -60,10 +59,6 @@ class Locus:
 
 def causes(field: Field) -> list[tuple[str, str]]:
     """What ends the region where each margin of a field is zero: ``limit``, ``forward`` or ``inverse``, and which."""
-    if isinstance(field, Ranged):
-        # Those inside the range, at its low end and at its high end; then pairs that leave no value between them.
-        single = causes(field.sliced)
-        return [*single * 3, *((kind, f"{one} and {other}") for kind, one in single for _, other in single)]
     if len(field.members) > 1:
         first = field.members[0]
         return causes(first)[: len(first.labels)] * len(field.members)

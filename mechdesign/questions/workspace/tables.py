@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.indices import index
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.columns import power_of_length
 from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.boundary import Boundary
@@ -19,36 +19,30 @@ from mechdesign.questions.workspace.columns import (
     INDICES,
     LOCAL,
     PIECES,
-    RANGE_INDICES,
     SINGULARITIES,
     TOTALS,
 )
 from mechdesign.questions.workspace.index import determinant_power
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.nodes import Nodes
-from mechdesign.questions.workspace.question import COLUMNS, OF_RANGE, Question, split
+from mechdesign.questions.workspace.question import COLUMNS, Question, split
 from mechdesign.questions.workspace.reached import Reached
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 
-def tables(study: Study, regions: Sequence[Reached], ranged: str) -> Iterator[Table]:
-    """The tables of regions, some of which have a place; `ranged` is the held coordinate over a range, if any."""
+def tables(study: Study, regions: Sequence[Reached]) -> Iterator[Table]:
+    """The tables of regions, some of which have a place."""
     held = _stacked([_held(study, region.question, 1) for region in regions])
-    if ranged:
-        indices = RANGE_INDICES.table([*held, *_range_indices(study, regions)], held=ranged)
-    else:
-        indices = INDICES.table([*held, *_indices(study, regions), *_inscribed(study, regions)])
+    indices = INDICES.table([*held, *_indices(study, regions), *_inscribed(study, regions)])
     yield indices
     if held:
         yield _totals(indices, [column.name for column in held])
     full = [region for region in regions if region.patches]
-    if not ranged:
-        yield LOCAL.table(_stacked([_local(study, r.question, r.nodes) for r in full if r.nodes is not None]))
-    boundaries = [_boundary(study, r.question, r.boundary, ranged) for r in full if r.boundary is not None]
+    yield LOCAL.table(_stacked([_local(study, r.question, r.nodes) for r in full if r.nodes is not None]))
+    boundaries = [_boundary(study, r.question, r.boundary) for r in full if r.boundary is not None]
     yield BOUNDARY.table(_stacked(boundaries))
-    if not ranged:
-        yield SINGULARITIES.table(_stacked([_singularities(study, region) for region in full]))
+    yield SINGULARITIES.table(_stacked([_singularities(study, region) for region in full]))
     pieces = PIECES.table(_stacked([_pieces(study, region) for region in regions]))
     if (pieces["piece"] > 1).any():
         yield pieces
@@ -107,13 +101,6 @@ def _indices(study: Study, regions: Sequence[Reached]) -> Iterator[Column]:
     yield from (error(name) for name in statistics if estimated or not name.endswith(("_mean", "_std")))
 
 
-def _range_indices(study: Study, regions: Sequence[Reached]) -> list[Column]:
-    """The area of each region over a range, and what follows from it."""
-    values = {name: np.concatenate([region.answer.values[name] for region in regions]) for name in OF_RANGE}
-    error = np.concatenate([region.answer.errors["area"] for region in regions])
-    return RANGE_INDICES.columns(study.units.labels, **values, area_error=error)
-
-
 def _inscribed(study: Study, regions: Sequence[Reached]) -> list[Column]:
     """The largest circle and rectangle inside each region."""
     shapes = np.transpose([region.shapes for region in regions])
@@ -163,18 +150,16 @@ def _local(study: Study, question: Question, nodes: Nodes) -> list[Column]:
     ]
 
 
-def _boundary(study: Study, question: Question, boundary: Boundary, ranged: str) -> list[Column]:
-    """Points of the boundary curve by curve, the drives or the value of the range, and what ends the region there."""
+def _boundary(study: Study, question: Question, boundary: Boundary) -> list[Column]:
+    """Points of the boundary curve by curve, the drives, and what ends the region there."""
     labels, label = study.units.labels, study.units.label
-    name, key = ("<coordinate>", "coordinate") if ranged else ("<drive>", "drive")
-    angles: dict[str, Floats] = {} if ranged else {"theta": boundary.theta / study.units.angle_factor}
     return [
         *_held(study, question, len(boundary.z)),
         *BOUNDARY.columns(labels, x=boundary.z.real, y=boundary.z.imag, kind=boundary.kind),
-        *(BOUNDARY[name].column(np.asarray(in_study_units(study, c, values)), label(c.quantity), **{key: c.name})
-          for c, values in boundary.values),
-        *BOUNDARY.columns(labels, at=boundary.at, **angles, side=boundary.side, curve=boundary.curve,
-                          piece=boundary.piece),
+        *(BOUNDARY["<drive>"].column(np.asarray(in_study_units(study, c, values)), label(c.quantity), drive=c.name)
+          for c, values in boundary.drives),
+        *BOUNDARY.columns(labels, at=boundary.at, theta=boundary.theta / study.units.angle_factor, side=boundary.side,
+                          curve=boundary.curve, piece=boundary.piece),
     ]  # fmt: skip
 
 

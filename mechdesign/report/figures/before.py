@@ -42,8 +42,8 @@ class Before(NamedTuple):
                 raise StudyError(f"{who}: only a sweep or a path is drawn over another; one of the studies lists poses")
             if now != then:
                 raise StudyError(f"{who}: it moves {then}, this study {now}; give both the same sweep or path")
-        elif _kind(result) != _kind(earlier):
-            raise StudyError(f"{who}: a path, a region and a region over a range are not drawn over each other")
+        elif ("path" in result.tables) != ("path" in earlier.tables):
+            raise StudyError(f"{who}: a path and a region are not drawn over each other")
         return cls(before, earlier.seen, _names(study, before))
 
 
@@ -53,11 +53,6 @@ def _runs_over(result: Result) -> str:
 
     poses = DrawnMotion.of(result).shown.poses
     return ", ".join(sorted(poses.values)) if poses.motion else ""
-
-
-def _kind(result: Result) -> str:
-    """The table that distinguishes a path, a region and a region over a range."""
-    return next((name for name in ("path", "local", "boundary") if name in result.tables), "")
 
 
 def _names(study: Study, before: Study) -> tuple[str, str]:

@@ -141,17 +141,7 @@ def fate(kind: str, at: str) -> str:
 
 def outline(axes: Axes, region: Region) -> set[str]:
     """Draw a region's boundary by what ends it, and faintly the pieces left out; returns the keys of `LOOKS` drawn."""
-    kinds = outline_of(axes, region.boundary)
-    if region.others is not None:
-        local, boundary = region.others
-        fill(axes, local, LEFT_OUT, zorder=0.9)
-        _draw(axes, boundary, list(curves(boundary)), color=style.FAINT, linewidth=0.8, zorder=2.8)
-        kinds.add("other")
-    return kinds
-
-
-def outline_of(axes: Axes, boundary: Table) -> set[str]:
-    """Draw the curves of a boundary, coloured by what ends the region there; returns the keys of `LOOKS` drawn."""
+    boundary = region.boundary
     ends: dict[str, list[Ints]] = {}
     for rows in curves(boundary):
         ends.setdefault(fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]])), []).append(rows)
@@ -162,7 +152,13 @@ def outline_of(axes: Axes, boundary: Table) -> set[str]:
         color, dashes, width, _ = LOOKS[end]
         _draw(axes, boundary, pieces, color=color, linestyle=dashes, linewidth=width, solid_capstyle="round",
               zorder=3.15)  # fmt: skip
-    return set(ends)
+    kinds = set(ends)
+    if region.others is not None:
+        local, boundary = region.others
+        fill(axes, local, LEFT_OUT, zorder=0.9)
+        _draw(axes, boundary, list(curves(boundary)), color=style.FAINT, linewidth=0.8, zorder=2.8)
+        kinds.add("other")
+    return kinds
 
 
 def _draw(axes: Axes, table: Table, pieces: Sequence[Ints], **look: Any) -> None:
