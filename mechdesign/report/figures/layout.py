@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis as Drawn
 from matplotlib.figure import Figure
@@ -24,13 +25,15 @@ _STEPS = (1, 2, 2.5, 5, 10)
 _TITLE, _NOTE, _HEADING, _ASIDE, _LABEL = 11.0, 8.5, 9.5, 8.5, 10.0  # points
 # Inches: at the edges of a page, between what is separate, between a text and what it is of.
 _EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
-# Inches: the least width of panels of bars, of maps and of others, and the room beside them at first.
-_NARROWEST = {"bars": 1.9, "map": 3.3, "": 2.0}
+# Inches: the least width of panels by their kind, and the room beside them at first.
+_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "": 2.0}
 _BESIDE = 0.9
 # Inches: the height of a panel that stands alone, among few, among many below each other, and the least.
 _ALONE, _FEW, _MANY, _LOWEST = 2.6, 1.75, 1.3, 0.7
 _MOST_FEW = 4
 _HIGHEST_MAP, _HIGHEST_OF_TWO, _MAP = 5.2, 3.8, 0.8  # inches; height over width of a map whose axes are not equal
+_STILL = 1e-6  # of its size, by which a curve changes that stands still
+_SLIVER = 0.45  # least height over width of axes of one scale
 _MARGIN = 0.08  # of the range, beyond curves from a given end
 _BAR, _ONE_OF_SEVERAL = 0.24, 0.16  # inches of a name with one bar, and of each of several
 _AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for which title and axis of a panel take room
@@ -101,7 +104,7 @@ def draw(picture: Picture) -> Figure:
     heading, top = _heading(picture)
     bottom = legend.get_window_extent(renderer).height / figure.dpi + _GAP if legend is not None else _EDGE
     sides = ("below", "tall", "above")
-    below, tall, above = ([max(getattr(cell, side) for cell in cells if cell.row == row) for row in range(rows)]
+    below, tall, above = ([max(getattr(cell, side) for cell in _row(cells, row, side)) for row in range(rows)]
                           for side in sides)  # fmt: skip
     around = top + bottom + sum(below) + sum(above) + _GAP * (rows - 1)
     lower = min(1.0, (style.tallest() - around) / sum(tall))
@@ -115,10 +118,16 @@ def draw(picture: Picture) -> Figure:
         cell.tall = max(lower * cell.tall, _LOWEST) if cell.panel.bars else tall[cell.row]
         left_below = x / style.width(), (y - cell.tall) / height
         cell.axes.set_position((*left_below, own / style.width(), cell.tall / height))
-        _place(cell, own, left[cell.column])
+        _place(cell, left[cell.column])
     for words, size, down in heading:
         figure.text(_EDGE / style.width(), 1 - down / height, words, va="top", fontsize=size)
     return figure
+
+
+def _row(cells: Sequence[_Cell], row: int, side: str) -> list[_Cell]:
+    """Panels of a row by which it has its height: beside axes of one scale others are as high as these."""
+    own = [cell for cell in cells if cell.row == row]
+    return [cell for cell in own if cell.panel.equal and side == "tall"] or own
 
 
 def _columns(picture: Picture) -> int:
@@ -199,13 +208,35 @@ def _end(cell: _Cell) -> None:
         axes.set_ylim(top=max(axes.get_ylim()[1], low + (1 + _MARGIN) * reach))
     if panel.equal:
         axes.set_aspect("equal", anchor="NW")
+        if panel.kind == "equal":
+            _widen(axes)
+    elif panel.y.ends == (None, None) and panel.y.scale == "linear" and not panel.bars:
+        _straighten(axes)
     if panel.x.over:
         axes.set_label(f"{OVER}{panel.x.label}")
 
 
+def _straighten(axes: Axes) -> None:
+    """What stands still is drawn straight, not by its rounding."""
+    low, high = axes.dataLim.intervaly
+    if np.isfinite(high - low) and high - low <= _STILL * max(abs(low), abs(high)):
+        about = max(0.1 * abs(low + high) / 2, 0.1)
+        axes.set_ylim((low + high) / 2 - about, (low + high) / 2 + about)
+
+
+def _widen(axes: Axes) -> None:
+    """Ends of axes of one scale with which a panel is neither a sliver nor higher than wide."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    tall = max(high - low, _SLIVER * (right - left))
+    more, above = max(0.0, tall - (right - left)) / 2, (tall - (high - low)) / 2
+    axes.set(xlim=(left - more, right + more), ylim=(low - above, high + above))
+
+
 def _height(cell: _Cell, wide: float, rows: int) -> float:
     """Inches of a panel of a width."""
-    panel, axes, highest = cell.panel, cell.axes, _HIGHEST_MAP if rows == 1 else _HIGHEST_OF_TWO
+    panel, axes, highest = cell.panel, cell.axes, _HIGHEST_OF_TWO
+    if panel.kind == "map" and rows == 1:
+        highest = _HIGHEST_MAP
     if panel.bars:
         lines = 1 + max((name.count("\n") for name in _folded_names(panel.y.words)), default=0)
         return (0.15 + len(panel.bars[0].values)) * bar_height(panel.bars[0].count, lines)
@@ -299,15 +330,15 @@ def _name(cell: _Cell, wide: float) -> None:
         cell.above += _lines(title or panel.aside, _HEADING)
 
 
-def _place(cell: _Cell, wide: float, left: float) -> None:
+def _place(cell: _Cell, left: float) -> None:
     """Ticks that suit the final size of a panel, and the names of its axes at the edges of its room."""
     axes = cell.axes
-    for axis, declared, outer in cell.drawn_axes:
-        if outer and not (declared.words or len(declared.ticks)):
-            _tick(axis, declared, wide if axis is axes.xaxis else cell.tall)
-        axis.label.set_visible(True)
     axes.apply_aspect()
     width, height = axes.bbox.width / style.dots(), axes.bbox.height / style.dots()
+    for axis, declared, outer in cell.drawn_axes:
+        if outer and not (declared.words or len(declared.ticks)):
+            _tick(axis, declared, width if axis is axes.xaxis else height)
+        axis.label.set_visible(True)
     axes.yaxis.set_label_coords((_PAD - left) / width, 0.5)
     axes.yaxis.label.set_verticalalignment("top")
     axes.xaxis.set_label_coords(0.5, -cell.below / height)

@@ -275,9 +275,11 @@ class Panel:
         return [mark for mark in self.marks if isinstance(mark, Bars)]
 
     @property
-    def kind(self) -> Literal["bars", "map", ""]:
+    def kind(self) -> Literal["bars", "map", "equal", ""]:
         """By which panels have room side by side."""
-        return "bars" if self.bars else "map" if any(isinstance(mark, Contours) for mark in self.marks) else ""
+        if any(isinstance(mark, Contours) for mark in self.marks):
+            return "map"
+        return "bars" if self.bars else "equal" if self.equal else ""
 
 
 @dataclass(frozen=True)

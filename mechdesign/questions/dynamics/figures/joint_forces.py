@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.report.figures.joints import MAX_JOINTS, Joint, joint_curves, joint_hodographs
+from mechdesign.report.figures.marks import Picture
 from mechdesign.report.figures.pictures import picture
 
 HEADING = "Forces in the joints"
 
 
 @picture(DynamicsView, "joint_forces", order=30)
-def joint_forces_figure(view: DynamicsView) -> Figure | None:
+def joint_forces_picture(view: DynamicsView) -> Picture | None:
     """Sizes of the joints' forces, and their moments, over a motion; None where no joint bears anything."""
     forces, moments = view.joints
     if view.swept is None or not forces:
@@ -24,7 +24,7 @@ def joint_forces_figure(view: DynamicsView) -> Figure | None:
 
 
 @picture(DynamicsView, "bearings", order=40)
-def bearings_figure(view: DynamicsView) -> Figure | None:
+def bearings_picture(view: DynamicsView) -> Picture | None:
     """The way of each joint's force in the axes of the frame, and beside it in those of the link that it acts on."""
     forces, _ = view.joints
     if view.swept is None or not forces:

@@ -30,7 +30,6 @@ _NET_CELLS = 165
 MAX_MARKS = 600
 # A limit farther out than this, in reaches of the errors, is named and not drawn.
 _FAR_FROM_ERRORS = 5.0
-_SLIVER = 0.6  # least height over width, and width over height, of axes of one scale
 _BEYOND = "#FBEDE4"  # where a limit is broken
 Ends = tuple[float, float]
 
@@ -47,7 +46,7 @@ def density_picture(view: ErrorsView) -> Picture | None:
     errors, units, failed = samples.errors[pair], samples.units[pair], ~samples.kept
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
     limits, alike = _Limits.of(sampled, ellipses[-1]), bool(units[0] == units[1])
-    ends = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
+    ends = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near])
     marks: list[PanelMark] = [Own(lambda axes: limits.draw(axes, *ends), label=limits.words)]
     region, method = smoothed(errors), look(sampled.method).words
     if region is not None:
@@ -185,13 +184,11 @@ class _Limits(NamedTuple):
         return line
 
 
-def _ends(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends]:
-    """Ranges of the axes that show places of shape (2, n) and no error; none of one scale is a sliver."""
+def _ends(parts: Sequence[Floats]) -> tuple[Ends, Ends]:
+    """Ranges of the axes that show places of shape (2, n) and no error."""
     places = np.concatenate([np.zeros((2, 1)), *parts], axis=1)
     low, high = places.min(axis=1), places.max(axis=1)
     middle, span = (low + high) / 2, 1.08 * (high - low)
-    if alike:
-        span = np.maximum(span, _SLIVER * span.max())
     (left, bottom), (right, top) = (middle - span / 2).tolist(), (middle + span / 2).tolist()
     return (left, right), (bottom, top)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from matplotlib.figure import Figure
-
 from mechdesign.expressions import Expression
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -19,6 +17,7 @@ from mechdesign.report.figures.joints import (
     loaded,
     peak,
 )
+from mechdesign.report.figures.marks import Picture
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -57,7 +56,7 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
 
 
 @picture(StiffnessView, "joint_forces", "force_hodographs", order=60)
-def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
+def joint_force_pictures(view: StiffnessView) -> dict[str, Picture] | None:
     """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
     study, over = view.study, view.swept
     section = StiffnessSection.of(study)
