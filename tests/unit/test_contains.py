@@ -17,6 +17,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
@@ -280,3 +281,10 @@ def test_designs_over_a_range_of_a_held_coordinate() -> None:
     assert single == pytest.approx([min(ends)], rel=1e-6)
     with pytest.raises(StudyError, match="GII has no value: over a range of"):
         mechdesign.optimize(study_of(RRR, over, "optimize.maximize=[GII]"))
+
+
+def test_a_place_on_the_border_crosses_nothing() -> None:
+    shapes = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 4.0, 0.5])
+    assert crossed(shapes, np.array([0.25j])) == ["circle"]
+    assert crossed(shapes, np.array([1j, 2 + 0.25j])) == []
+    assert crossed(np.full(7, np.nan), np.array([0j])) == []

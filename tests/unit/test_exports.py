@@ -52,7 +52,7 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 5}}, outputs: [T]}
 
 
 FILES = (
-    "curve.csv", "layers.csv", "mechanism.dxf", "mechanism.svg", "model.sdf", "model.xml", "motion.csv", "parts.dxf",
+    "curve.csv", "layers.csv", "mechanism.dxf", "mechanism.svg", "model.xml", "motion.csv", "parts.dxf",
     "parts.svg", "sheet.pdf", "study.json",
 )  # fmt: skip
 
