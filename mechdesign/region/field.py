@@ -149,10 +149,11 @@ class Field:
         return self.look(z, places, assembly)[0]
 
     def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
-        """Margins at points `z`, as `margins`, and the rotations of the links that turn, shape (links, *z.shape)."""
+        """Margins at points `z`, as `margins`, and the rotations of the links, shape (links, *z.shape)."""
         margins, configuration = self.look(z, places, assembly)
-        turning = [np.broadcast_to(rotation, z.shape) for rotation in configuration.rotations if np.ndim(rotation)]
-        return margins, np.array(turning, dtype=complex).reshape(len(turning), *z.shape)
+        # Those that do not turn too: Newton's method has them at each point on some calls and once on others.
+        rotations = [np.broadcast_to(rotation, z.shape) for rotation in configuration.rotations]
+        return margins, np.array(rotations, dtype=complex).reshape(len(rotations), *z.shape)
 
     def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
         """Margins at points `z`, as `margins`, and the configuration to which they belong."""

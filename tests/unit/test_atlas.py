@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.stiffness import FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.index import prepare
+from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH
 from mechdesign.study.designs import variant
@@ -138,3 +142,34 @@ def test_region_of_a_design_that_does_not_close_where_the_sketch_is_drawn() -> N
         areas.append(answer(question, {}, 1, BATCH).values["area"][0])
     assert areas[0] > 0.008
     assert areas[1] == pytest.approx(areas[0], rel=1e-4)
+
+
+@pytest.mark.nightly
+def test_a_map_over_the_workspace_counts_the_deflection() -> None:
+    """The indices of the workspace say what the question itself says at its nodes."""
+    text = (
+        FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "")
+        + """
+workspace: {point: P, scan: {about: [0, 0.45], rays: 12}}
+reliability:
+  dimensions: {load.fy: {sigma: 5}, b1.length: 1e-4}
+  poses: workspace
+  outputs: [P]
+  limits: {P.y: 2e-3}
+  load: [0, -20]
+  methods: analytic
+"""
+    )
+    study = study_of(text)
+    poses = study_poses(study, "reliability")
+    place = poses.values["P.x"] + 1j * poses.values["P.y"]
+    found = Local.at(questions(study)[0].field, place, {})
+    sigma, chance = (np.asarray(index.values(found)) for index in prepare(study, ["sigma_position", "reliability"]))
+    result = mechdesign.reliability(study)
+    moments = result.tables["moments"]
+    x, y = (moments["sigma"][moments.where(output=f"P.{axis}")] for axis in "xy")
+    assert sigma == pytest.approx(np.hypot(x, y), rel=1e-6)
+    told = result.tables["reliability"]
+    expected = told["reliability"][told["scope"] == "pose"]
+    assert chance == pytest.approx(expected, abs=1e-8)
+    assert expected.min() < 0.99

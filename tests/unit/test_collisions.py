@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.drawings import distance
 from scipy.optimize import minimize_scalar
-from scipy.spatial import ConvexHull
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.mechanism.plates import gap
-from tests.helpers.drawings import distance
 
 FOUR_BAR = """
 mechanism:
@@ -27,31 +24,6 @@ kinematics:
   sweep: {theta: {from: 90, to: 300, step: 30}}
   collisions: [[crank, rocker]]
 """
-
-
-def test_the_gap_is_the_distance_of_the_hull_of_differences_from_the_origin():
-    random = np.random.default_rng(3)
-    for k in range(200):
-        count, other = random.integers(1, 6, 2)
-        one = random.normal(size=count) + 1j * random.normal(size=count)
-        two = random.normal(size=other) + 1j * random.normal(size=other) + random.normal(scale=3)
-        value = float(gap(list(one), list(two)))
-        if value > 0:
-            assert value == pytest.approx(distance(list(one), list(two)), abs=1e-12), k
-        elif count > 2 or other > 2:
-            differences = (two[:, None] - one).ravel()
-            facets = ConvexHull(np.column_stack([differences.real, differences.imag])).equations
-            assert value == pytest.approx(facets[:, 2].max(), abs=1e-12), k
-
-
-def test_the_gap_of_points_and_bars_in_special_places():
-    assert float(gap([0j], [3 + 4j])) == 5
-    assert float(gap([1j], [1j])) == 0
-    assert float(gap([-1 + 0j, 1 + 0j], [2j, -1j])) == -1
-    assert float(gap([0j, 4 + 0j], [1 + 2j, 3 + 2j])) == 2
-    assert float(gap([0j, 4 + 0j], [5 + 0j, 7 + 0j])) == 1
-    lost = gap([np.array([0j, complex(np.nan, np.nan)])], [3 + 4j])
-    np.testing.assert_array_equal(lost, [5, np.nan])
 
 
 def clearance(theta, width=10.0):
@@ -123,16 +95,16 @@ def test_pins_meet_what_lies_between_the_links_that_they_join():
     ],
 )
 def test_wrong_pairs_are_refused(pairs, words):
-    with pytest.raises(StudyError, match=words):
+    with pytest.raises(mechdesign.StudyError, match=words):
         mechdesign.load(text=FOUR_BAR, overrides={"kinematics.collisions": pairs})
 
 
 def test_all_pairs_of_which_none_is_left_are_refused():
     arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, A, 9]}, drives: [arm], plates: {width: 2}, "
-    with pytest.raises(StudyError, match="nothing is left to compare"):
+    with pytest.raises(mechdesign.StudyError, match="nothing is left to compare"):
         mechdesign.load(text=arm + "sketch: {A: [9, 0]}}", overrides={"kinematics.collisions": True})
 
 
 def test_clearances_need_plates():
-    with pytest.raises(StudyError, match=r"give mechanism.plates, such as {width: 20}"):
+    with pytest.raises(mechdesign.StudyError, match=r"give mechanism.plates, such as {width: 20}"):
         mechdesign.load(text=FOUR_BAR.replace("  plates: {width: w, pin: 4}\n", ""))

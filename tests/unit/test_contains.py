@@ -17,6 +17,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
@@ -266,3 +267,10 @@ def test_held_values_that_leave_nothing_are_named() -> None:
     result = mechdesign.optimize(study_of(RRR, "optimize.variables.crank={from: 90, to: 160, step: 70}",
                                           "workspace.at.platform.angle=[0, 60]", "optimize.subject_to=[]"))  # fmt: skip
     assert result.tables["designs"]["reason"][0] == "nothing of the workspace can be reached at platform.angle = 60"
+
+
+def test_a_place_on_the_border_crosses_nothing() -> None:
+    shapes = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 4.0, 0.5])
+    assert crossed(shapes, np.array([0.25j])) == ["circle"]
+    assert crossed(shapes, np.array([1j, 2 + 0.25j])) == []
+    assert crossed(np.full(7, np.nan), np.array([0j])) == []

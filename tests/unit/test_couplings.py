@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
-from helpers.gallery import study_named
+from helpers.command_line import checked
 from helpers.studies import study_of
 from scipy.interpolate import CubicSpline
 
-from mechdesign.errors import StudyError
-from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.describe import describe
-from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.analysis import optimize
+import mechdesign
 
+GALLERY = Path(__file__).parents[2] / "configs" / "gallery"
 FIVE_BAR = """
 mechanism:
   links: {ground: {O: [0, 0], C: [100, 0]}, g1: [O, A, 30], g2: [C, D, 35], a: [A, B, 80], b: [D, B, 85]}
@@ -25,7 +23,7 @@ mechanism:
 """
 
 
-def five_bar(coupling: str) -> Mechanism:
+def five_bar(coupling: str) -> Any:
     return study_of(FIVE_BAR % coupling).mechanism
 
 
@@ -57,14 +55,14 @@ def five_bar(coupling: str) -> Mechanism:
     ],
 )
 def test_mistakes_are_named(coupling: str, message: str) -> None:
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         five_bar(coupling)
     assert message in str(caught.value)
 
 
 def test_a_drive_that_follows_by_a_coupling_is_named() -> None:
     with pytest.raises(
-        StudyError, match="one of 'g1' or 'g2': each of them follows from the others by coupling 'mesh'"
+        mechdesign.StudyError, match="one of 'g1' or 'g2': each of them follows from the others by coupling 'mesh'"
     ):
         study_of(FIVE_BAR.replace("[g1]", "[g1, g2]") % "{set: g2, of: g1, ratio: 2}")
 
@@ -89,18 +87,15 @@ def test_a_phase_that_is_left_out_is_that_of_the_sketch() -> None:
 def test_velocities_and_accelerations_are_differences(coupling: str) -> None:
     mechanism, at, h = five_bar(coupling), np.array([5.0, 25.0, 50.0]), 1e-2
     before, here, after = (mechanism.solve({"g1": at + step}) for step in (-h, 0, h))
-    assert here.configuration.valid.all()
-    linear = mechanism.linearize(here.configuration)
-    velocity = linear.velocity([1.0])
-    acceleration = linear.acceleration(velocity, [0.4])
+    moving = "rates: {g1: 1 rad/s}, accelerations: {g1: 0.4 rad/s^2}, outputs: [B, D.x]"
+    poses = [{"g1": float(angle)} for angle in at]
+    motion = mechdesign.kinematics(study_of(FIVE_BAR % coupling + f"kinematics: {{poses: {poses}, {moving}}}\n")).main
     turn = np.radians(h)
     for name in ("B.x", "B.y", "D.x"):
-        coordinate = mechanism.coordinate(name)
         slope = (after[name] - before[name]) / (2 * turn)
         bend = (after[name] - 2 * here[name] + before[name]) / turn**2
-        assert first(here.configuration, coordinate, velocity) == pytest.approx(slope, rel=1e-5, abs=1e-4)
-        found = second(here.configuration, coordinate, velocity, velocity, acceleration)
-        assert found == pytest.approx(bend + 0.4 * slope, rel=1e-4, abs=1e-3)
+        assert motion[f"{name}_velocity"] == pytest.approx(slope, rel=1e-5, abs=1e-4)
+        assert motion[f"{name}_acceleration"] == pytest.approx(bend + 0.4 * slope, rel=1e-4, abs=1e-3)
 
 
 BENT = """
@@ -123,33 +118,40 @@ mechanism:
 """
 
 
+# What reliability differentiates by, and where the study gives it.
+ENTRIES = {
+    "k": "parameters.k",
+    "lift": "parameters.lift",
+    "one.length": "links.one.2",
+    "ground.C.x": "links.ground.C.0",
+}
+NOMINAL = {"k": 2.0, "lift": 5.0, "one.length": 30.0, "ground.C.x": 100.0}
+
+
+@pytest.mark.slow
 def test_rates_by_dimensions_are_differences() -> None:
     """Derivatives of velocities and accelerations by parameters of couplings and by dimensions, whatever their form."""
-    mechanism = study_of(BENT).mechanism
-    places, h = ["measures:k", "measures:lift", "one.length", "ground.C.x"], 1e-5
-    coordinates = [mechanism.coordinate(name) for name in ("B.x", "guide.slide", "two.angle", "ratio")]
-
-    def rates(changed):
-        pose = mechanism.solve({"one": [10.0, 33.0]}, changed).configuration
-        linear = mechanism.linearize(pose)
-        velocity = linear.velocity([3.0])
-        acceleration = linear.acceleration(velocity, [1.5])
-        own = [(first(pose, c, velocity), second(pose, c, velocity, velocity, acceleration)) for c in coordinates]
-        return np.array([np.broadcast_to(value, (2,)) for pair in own for value in pair])
-
-    pose = mechanism.solve({"one": [10.0, 33.0]}).configuration
-    linear = mechanism.linearize(pose)
-    velocity, position = linear.velocity([3.0]), linear.sensitivity(places)
-    acceleration = linear.acceleration(velocity, [1.5])
-    velocity_z, acceleration_z = linear.rate_sensitivity(places, position, velocity, acceleration)
-    slopes = []
-    for c in coordinates:
-        slopes.append(second(pose, c, velocity, position, velocity_z))
-        slopes.append(acceleration_sensitivity(pose, c, velocity, acceleration, position, velocity_z, acceleration_z))
-    slopes = np.array([np.broadcast_to(slope, (len(places), 2)) for slope in slopes])
-    for k, place in enumerate(places):
-        ends = [rates({place: mechanism.nominal[place] + step}) for step in (h, -h)]
-        assert slopes[:, k] == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6, abs=1e-5)
+    outputs = ("B.x", "guide.slide", "two.angle", "ratio")
+    moving = "{poses: [{one: 10}, {one: 33}], rates: {one: 3 rad/s}, accelerations: {one: 1.5 rad/s^2}, outputs: [%s]"
+    text, moving = BENT, moving % ", ".join(outputs)
+    varied = "dimensions: {k: 0.01, lift: 0.01, one.length: 0.01, ground.C.x: 0.01}"
+    study = study_of(
+        f"{text}kinematics: {moving}}}\nreliability: {moving}, {varied}, methods: [analytic], sobol: 0}}\n"
+    )
+    table = mechdesign.reliability(study).tables["contributions"]
+    h = 1e-5
+    for name, entry in ENTRIES.items():
+        ends = [
+            mechdesign.kinematics(
+                study_of(f"{text}kinematics: {moving}}}\n", f"mechanism.{entry}={NOMINAL[name] + step!r}")
+            ).main
+            for step in (h, -h)
+        ]
+        for output in outputs:
+            for order in ("velocity", "acceleration"):
+                slope = (ends[0][f"{output}_{order}"] - ends[1][f"{output}_{order}"]) / (2 * h)
+                found = table["derivative"][table.where(source=name, output=output, order=order)]
+                assert found == pytest.approx(slope, rel=1e-6, abs=1e-3)
 
 
 RACKS = """
@@ -173,13 +175,7 @@ dynamics:
 @pytest.mark.slow
 def test_a_pinion_on_a_crosshead_rolls_between_two_racks() -> None:
     """The fixed rack below and the moving one above bear a half of the crosshead's force each."""
-    study = study_of(RACKS)
-    below, above = study.mechanism.meshes
-    assert (below.links, above.links) == (("ground", "pinion"), ("rack", "pinion"))
-    drawn = study.mechanism.sketch_configuration
-    assert [mesh.contact(drawn)[0] for mesh in (below, above)] == pytest.approx([-20j, 20j])
-    assert [mesh.radii(drawn)[1] for mesh in (below, above)] == pytest.approx([20, 20])
-    result = dynamics(study)
+    result = mechdesign.dynamics(study_of(RACKS))
     assert result.tables["dynamics"]["cross_effort"] == pytest.approx(20)
     forces = result.tables["joint_forces"]
     borne = {name: (x, y) for name, x, y in zip(forces["joint"], forces["fx"], forces["fy"], strict=True)}
@@ -190,30 +186,40 @@ def test_a_pinion_on_a_crosshead_rolls_between_two_racks() -> None:
 
 
 def test_a_rack_rolls_on_a_fixed_pinion_about_which_its_guide_turns() -> None:
-    (mesh,) = study_of("""
+    """The teeth of a pinion of 20 mm, on the frame, bear the load along the rack, and that times tan 20 deg across."""
+    result = mechdesign.dynamics(study_of("""
 mechanism:
   links: {ground: {O: [0, 0]}, arm: [O, A, 60], bar: {B: [0, 0]}}
   joints: {guide: {prismatic: [arm, bar], through: O, point: B}}
   drives: [arm]
   couplings: {roll: {set: guide, of: arm, ratio: 20*pi/180}}
   sketch: {A: [60, 0], B: [10, 0]}
-""").mechanism.meshes
-    assert (mesh.links, mesh.carrier) == (("bar", "ground"), "arm")
+dynamics: {poses: [{arm: 30}], loads: [{at: B, force: [7, 0], in: bar}]}
+"""))  # fmt: skip
+    assert result.main["arm_effort"] == pytest.approx(-7 * 20)
+    (teeth,) = (row for row in result.tables["joint_forces"] if row["joint"] == "roll")
+    assert {teeth["on"], teeth["by"]} == {"bar", "ground"}
+    assert teeth["magnitude"] == pytest.approx(7 / np.cos(np.radians(20)))
 
 
 def test_gears_on_a_crosshead_have_pitch_circles() -> None:
-    """The angle of a crosshead never changes, so that the wheels' angles in the world are those against it."""
-    study = study_of("""
+    """The angle of a crosshead never changes, so that the wheels' angles in the world are those against it.
+
+    30 mm apart, twice as fast: radii of 20 and 10 mm.
+    """
+    result = mechdesign.dynamics(study_of("""
 mechanism:
   links: {ground: {O: [0, 0]}, head: {H: [0, 0], K: [30, 0]}, one: [H, M, 5], two: [K, N, 5]}
   joints: {cross: {prismatic: [ground, head], through: O, point: H}}
   drives: [cross, one]
   couplings: {gears: {set: two, of: one, ratio: -2}}
   sketch: {H: [0, 0], K: [30, 0], M: [5, 0], N: [35, 0]}
-""")
-    (mesh,) = study.mechanism.meshes
-    assert mesh.carrier == "head"
-    assert mesh.radii(study.mechanism.sketch_configuration) == pytest.approx((10, 20))
+dynamics: {poses: [{cross: 0, one: 0}], loads: [{link: two, moment: 60}]}
+"""))  # fmt: skip
+    (teeth,) = (row for row in result.tables["joint_forces"] if row["joint"] == "gears")
+    assert (teeth["on"], teeth["fy"]) == ("two", pytest.approx(60 / 10))
+    assert teeth["magnitude"] == pytest.approx(6 / np.cos(np.radians(20)))
+    assert result.main["one_effort"] == pytest.approx(6 * 20)
 
 
 @pytest.mark.slow
@@ -223,9 +229,9 @@ def test_a_phase_that_is_left_out_follows_a_ratio_that_varies() -> None:
     study = study_of(
         text + "optimize: {variables: {mesh.ratio: {from: -1.5, to: -1, step: 0.5}}, minimize: kinematics.B.y.range}\n"
     )
-    found = optimize(study).tables["designs"]["kinematics.B.y.range"]
+    found = mechdesign.optimize(study).tables["designs"]["kinematics.B.y.range"]
     for ratio, range_of_design in zip(("-1.5", "-1"), found, strict=True):
-        extremes = kinematics(study_of(text.replace("-1.5", ratio))).tables["extremes"]
+        extremes = mechdesign.kinematics(study_of(text.replace("-1.5", ratio))).tables["extremes"]
         assert range_of_design == pytest.approx(extremes["range"][list(extremes["output"]).index("B.y")])
 
 
@@ -274,16 +280,13 @@ mechanism:
   drives: [cam]
   couplings: {{lift: {{set: valve, of: cam, table: {rows}}}}}
   sketch: {{N: [20, 0], F: [0, 12]}}
+kinematics: {{path: {{cam: [0, 17, 123, 359, 377, -10]}}, rates: {{cam: 1 rad/s}}, outputs: [F.y]}}
 """)
     spline = CubicSpline(np.radians(angles), lifts, bc_type="periodic")
     at = np.array([0.0, 17, 123, 359, 377, -10])
     pose = study.mechanism.solve({"cam": at})
     assert pose["F.y"] == pytest.approx(spline(np.radians(at % 360)), abs=1e-12)
-    linear = study.mechanism.linearize(pose.configuration)
-    velocity = linear.velocity([1.0])
-    bend = second(
-        pose.configuration, study.mechanism.coordinate("F.y"), velocity, velocity, linear.acceleration(velocity, [0.0])
-    )
+    bend = mechdesign.kinematics(study).main["F.y_acceleration"]
     assert bend == pytest.approx(spline(np.radians(at % 360), 2), rel=1e-3, abs=1e-3)
 
 
@@ -299,7 +302,7 @@ mechanism:
 )
 def test_poses_at_which_a_coupling_has_no_value_say_so(coupling: str, message: str) -> None:
     sweep = "kinematics: {sweep: {g1: {from: 0, to: 150, step: 50}}, outputs: [B]}"
-    result = kinematics(study_of(FIVE_BAR % f"{{set: g2, {coupling}}}" + sweep))
+    result = mechdesign.kinematics(study_of(FIVE_BAR % f"{{set: g2, {coupling}}}" + sweep))
     assert message in str(result.warnings[0])
 
 
@@ -315,7 +318,7 @@ dynamics:
   sweep: {pinion: {from: 0, to: 90, step: 30}}
   loads: [{link: wheel, moment: 1200}]
 """)
-    result = dynamics(study)
+    result = mechdesign.dynamics(study)
     assert result.main["pinion_effort"] == pytest.approx(np.full(4, 600))
     forces = result.tables["joint_forces"]
     on_wheel = forces["joint"] == "C"
@@ -342,7 +345,7 @@ def test_power_is_the_rate_of_energy(coupling: str) -> None:
     study = study_of(text + """
 dynamics: {gravity: [0, -9.81 m/s2], sweep: {g1: {from: 10, to: 50, step: 0.25}}, rates: {g1: 600}}
 """)  # fmt: skip
-    table = dynamics(study).main
+    table = mechdesign.dynamics(study).main
     assert table["valid"].all()
     energy = CubicSpline(table["g1"], table["kinetic_energy"] + table["potential_energy"])(table["g1"], 1) * 600
     inner = slice(8, -8)
@@ -351,14 +354,15 @@ dynamics: {gravity: [0, -9.81 m/s2], sweep: {g1: {from: 10, to: 50, step: 0.25}}
 
 
 def test_check_tells_couplings() -> None:
-    told = describe(study_named("planetary").mechanism)
-    assert "1. couplings sun_mesh, ring_mesh: arm.angle, planet.angle" in told
-    assert "coupling: ring_mesh (planet.angle = arm.angle - zr/zp*arm.angle)" in told
-    assert "coupling: mesh (g2.angle = mesh.ratio*g1 + mesh.phase)" in describe(five_bar("{set: g2, of: g1, ratio: 1}"))
+    lines = "\n".join(checked((GALLERY / "planetary.yaml").read_text(encoding="utf-8")))
+    assert "1. couplings sun_mesh, ring_mesh: arm.angle, planet.angle" in lines
+    assert "coupling: ring_mesh (planet.angle = arm.angle - zr/zp*arm.angle)" in lines
+    lines = "\n".join(checked(FIVE_BAR % "{set: g2, of: g1, ratio: 1}"))
+    assert "coupling: mesh (g2.angle = mesh.ratio*g1 + mesh.phase)" in lines
 
 
 def test_kinematics_has_what_follows() -> None:
     study = study_of(FIVE_BAR % "{set: g2, of: g1, ratio: -1, phase: 60}" + """
 kinematics: {sweep: {g1: {from: 0, to: 40, step: 10}}, outputs: [g2.angle]}
 """)  # fmt: skip
-    assert kinematics(study).main["g2.angle"] == pytest.approx(60 - np.arange(0, 41, 10))
+    assert mechdesign.kinematics(study).main["g2.angle"] == pytest.approx(60 - np.arange(0, 41, 10))

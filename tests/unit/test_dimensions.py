@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import numpy as np
 import pytest
 from helpers.pages import faults
 from helpers.studies import study_of
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.exporting.sheet import BLOCK, PAPERS, Sheet
+from mechdesign.exporting.view import View
 from mechdesign.report.figures import style
 from mechdesign.report.figures.dimensions import dimensions_figure, table_rows
 from mechdesign.report.figures.scene import pose
@@ -29,6 +32,17 @@ reliability:
   outputs: [C]
   poses: [{theta: 90}]
 stiffness: {at: C, sections: {bar: {E: 70 GPa, diameter: 8}}, elastic: {rocker: bar}, actuators: {theta: 1e6 N*mm/rad}}
+"""
+SHEET = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, 30]
+    rod: [A, B, 90]
+    block: {points: [B]}
+  joints: {guide: {prismatic: [ground, block], direction: 0}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [20, 22], B: [105, 0]}
 """
 
 
@@ -105,3 +119,24 @@ mechanism:
         titles = [dimensions_figure(study_of(text)).axes[0].get_title(loc="left") for text in (table, FOUR_BAR)]
     assert "not to scale" in titles[0]
     assert "not to scale" not in titles[1]
+
+
+@pytest.mark.slow
+def test_a_sheet_is_at_a_standard_scale():
+    for text, paper, scale, words in (
+        (SHEET, None, 1.0, "1 : 1"),
+        (SHEET, "A3", 1.0, "1 : 1"),
+        ("units: {length: m}\n" + SHEET, None, 1 / 1000, "1 : 1000"),
+        ("units: {length: cm}\n" + SHEET, None, 0.1, "1 : 10"),
+    ):
+        view = View(mechdesign.load(text=text), paper=paper)
+        scene = pose(view.mechanism, view.pose)
+        sheet = Sheet.of(view, scene, 40.0)
+        assert (sheet.scale, sheet.words) == (pytest.approx(scale), words)
+        with style.context():
+            figure = sheet.draw(view, scene, [])
+        axes = figure.axes[1]
+        wide, _ = PAPERS[sheet.paper]
+        drawn = axes.get_position().width * wide / np.ptp(axes.get_xlim())
+        assert drawn == pytest.approx(scale * view.millimetres)
+        assert sheet.region[1] >= 10 + (sum(BLOCK) if sheet.paper == "A4" else 0)

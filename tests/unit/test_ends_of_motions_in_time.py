@@ -8,8 +8,6 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.questions.dynamics import motion_in_time
-from mechdesign.report.requirements import Verdict
-from mechdesign.results import Result
 
 DOOR = """
 units: {length: m, angle: rad, force: N}
@@ -23,7 +21,9 @@ requirements: [{result: dynamics.forward.door_velocity, at_most: 100%s}]
 """
 
 
-def judged(forward: str = "", mechanism: str = "", sketch: str = "", unassembled: str = "") -> tuple[Result, Verdict]:
+def judged(
+    forward: str = "", mechanism: str = "", sketch: str = "", unassembled: str = ""
+) -> tuple[mechdesign.Answer, mechdesign.Verdict]:
     """The answer, and the verdict on the door's velocity."""
     study = study_of(DOOR % (mechanism, sketch, forward, unassembled))
     result = mechdesign.dynamics(study)
@@ -77,17 +77,20 @@ def test_a_motion_that_its_own_limit_ends_is_whole(forward: str, limit: str, unt
     assert result.warnings[0].kind == "incomplete"
 
 
-@pytest.mark.parametrize(("name", "value", "said"), [
-    ("MAX_STEPS", 3, "3 steps are not enough"), ("MAX_SECONDS", 0.0, "0 s of the processor are not enough"),
+@pytest.mark.parametrize(("name", "value", "said", "rows"), [
+    ("MAX_STEPS", 3, "3 steps are not enough", 11), ("MAX_SECONDS", 0.0, "0 s of the processor are not enough", 1),
 ])  # fmt: skip
 def test_a_motion_that_takes_too_long_is_not_met(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: float, said: str
+    monkeypatch: pytest.MonkeyPatch, name: str, value: float, said: str, rows: int
 ) -> None:
     monkeypatch.setattr(motion_in_time, name, value)
     result, verdict = judged(", efforts: {door: '20*sin(9*time)'}")
     assert said in str(result.warnings[0])
     assert not verdict.met
     assert said in verdict.note
+    times = result.main["time"]
+    np.testing.assert_allclose(times, np.linspace(0.0, times[-1], rows))
+    assert times[-1] < 1
 
 
 @pytest.mark.slow

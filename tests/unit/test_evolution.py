@@ -1,4 +1,4 @@
-"""Evolution towards a front: directions, who survives, children; and the hypervolume, against closed forms."""
+"""Evolution towards a front: directions, who survives, children; fronts by their definition; hypervolumes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mechdesign.numerics.evolution import MUTATION_INDEX, offspring, simplex, survivors
-from mechdesign.numerics.fronts import crowding, hypervolume
+from mechdesign.numerics.fronts import crowding, front, hypervolume
 
 
 @pytest.mark.parametrize(("goals", "divisions"), [(2, 1), (2, 9), (3, 12), (4, 6), (5, 4)])
@@ -86,3 +86,34 @@ def test_crowding_of_few_rows_and_of_equal_values():
     assert crowding(np.array([[1.0, 2.0]])).tolist() == [np.inf]
     values = np.array([[0.0, 1.0, 3.0], [1.0, 0.0, 3.0], [0.5, 0.5, 3.0], [0.25, 0.75, 3.0]])
     assert np.isinf(crowding(values)[:2]).all()
+
+
+def by_definition(values: np.ndarray) -> np.ndarray:
+    smaller = (values[:, None] <= values).all(axis=2) & (values[:, None] < values).any(axis=2)
+    return np.asarray(~smaller.any(axis=0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("goals", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("levels", [2, 5, 40, 0])
+def test_a_front_is_what_no_other_point_surpasses(goals, levels):
+    random = np.random.default_rng(17 * goals + levels)
+    for count in (1, 2, 40, 600):
+        values = random.integers(levels, size=(count, goals)) if levels else random.random((count, goals))
+        np.testing.assert_array_equal(front(values.astype(float)), by_definition(values))
+
+
+def test_no_points_have_no_front():
+    assert front(np.empty((0, 3))).shape == (0,)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("goals", [2, 3, 4])
+def test_points_of_a_sphere_are_all_on_the_front_and_nothing_outside_of_it_is(goals):
+    directions = np.abs(np.random.default_rng(3).standard_normal((20_000, goals))) + 1e-3
+    # The distance to the ideal point, 1 in each goal, is 1 on the sphere.
+    sphere = 1 - directions / np.linalg.norm(directions, axis=1)[:, None]
+    outside = sphere[::7] + 1e-9
+    found = front(np.concatenate([outside, sphere]))
+    assert not found[: len(outside)].any()
+    assert found[len(outside) :].all()

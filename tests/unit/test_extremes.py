@@ -10,12 +10,6 @@ from helpers.studies import study_of
 from scipy.optimize import minimize_scalar
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize import stacked
-from mechdesign.questions.poses import study_poses
-from mechdesign.results import Table
-from mechdesign.study.designs import Designs
 
 GALLERY = Path(__file__).parents[2] / "configs" / "gallery"
 SLIDER = """\
@@ -35,11 +29,11 @@ mechanism:
 
 
 def extremes(text: str, *changes: str) -> dict[str, dict[str, float]]:
-    table = kinematics(study_of(text, *changes)).tables["extremes"]
+    table = mechdesign.kinematics(study_of(text, *changes)).tables["extremes"]
     return by_name(table)
 
 
-def by_name(table: Table) -> dict[str, dict[str, float]]:
+def by_name(table: mechdesign.Table) -> dict[str, dict[str, float]]:
     names = [name for name in table.names if name not in ("output", "unit")]
     return {str(output): {name: float(table[name][k]) for name in names} for k, output in enumerate(table["output"])}
 
@@ -95,9 +89,9 @@ def test_a_rocker_between_its_limits(step: int) -> None:
 def test_extremes_do_not_depend_on_the_step(name: str, drive: str, steps: tuple[int, int]) -> None:
     fine, coarse = (
         by_name(
-            kinematics(mechdesign.load(GALLERY / f"{name}.yaml", [f"kinematics.sweep.{drive}.step={step}"])).tables[
-                "extremes"
-            ]
+            mechdesign.kinematics(
+                mechdesign.load(GALLERY / f"{name}.yaml", [f"kinematics.sweep.{drive}.step={step}"])
+            ).tables["extremes"]
         )
         for step in steps
     )
@@ -164,22 +158,23 @@ def test_an_advantage_is_infinite_at_a_dead_centre_and_an_effort_where_the_drive
 def test_designs_that_reach_a_limit_are_answered_with_the_others() -> None:
     text = ROCKER.replace("A: [60, 0], B: [94, 50]", "A: [52, 30], B: [100, 50]")
     text += "kinematics: {sweep: {crank: {from: 0, to: 60, step: 10}}, outputs: [B.x]}\n"
-    lengths = (70, 95)
-    study = study_of(text)
-    poses = study_poses(study, "kinematics", Designs(study, {"rod.length": np.array(lengths, dtype=float)}).numbers)
-    stack = stacked.tables(study, "kinematics", ["extremes", "loops"], poses)
-    assert stack.whole.tolist() == [True, False]
+    goals = ("max", "min")
+    asked = ", ".join(f"{{result: kinematics.B.x.{end}, unassembled: allowed}}" for end in goals)
+    lengths = (70, 80, 95)
+    variables = f"variables: {{rod.length: {{choices: {list(lengths)}}}}}"
+    designs = mechdesign.optimize(study_of(f"{text}optimize: {{{variables}, maximize: [{asked}]}}\n")).tables["designs"]
+    assert designs["rod.length"].tolist() == list(lengths)
     for k, length in enumerate(lengths):
         row = extremes(text, f"mechanism.links.rod.2={length}")["B.x"]
-        table = stack.result.tables["extremes"]
-        assert (table["min"][k], table["max"][k]) == pytest.approx((row["min"], row["max"]), rel=1e-9)
+        found = [designs[f"kinematics.B.x.{end}"][k] for end in goals]
+        assert found == pytest.approx([row[end] for end in goals], rel=1e-9)
 
 
 @pytest.mark.slow
 def test_an_open_sketch_is_told_under_follow_as_under_side() -> None:
     texts = []
     for branch in ("side", "follow"):
-        with pytest.raises(StudyError) as caught:
+        with pytest.raises(mechdesign.StudyError) as caught:
             study_of(
                 ROCKER.replace("[A, B, 70]", "[A, B, 20]").replace("[D, B, 50]", "[D, B, 5]"),
                 f"mechanism.branch={branch}",
@@ -190,6 +185,6 @@ def test_an_open_sketch_is_told_under_follow_as_under_side() -> None:
 
 
 def test_what_stands_still_through_change_points_has_no_range() -> None:
-    found = by_name(kinematics(mechdesign.load(GALLERY / "parallelogram.yaml")).tables["extremes"])
+    found = by_name(mechdesign.kinematics(mechdesign.load(GALLERY / "parallelogram.yaml")).tables["extremes"])
     assert found["rod.angle"]["range"] == 0
     assert found["M.x"]["range"] == pytest.approx(600, abs=1e-9)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from helpers.command_line import ask
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import MechdesignError
-from mechdesign.report.requirements import foresee
 
 BLOCK = """
 units: {length: m, force: N}
@@ -34,10 +35,10 @@ def test_a_number_of_a_motion_in_time_is_a_goal(goal: str, best: float) -> None:
     assert kept[kept.names[2]][0] == pytest.approx(best, rel=1e-9, abs=1e-12)
 
 
-def test_a_row_that_extremes_never_have_is_said_before_the_motion_is_computed() -> None:
+def test_a_row_that_extremes_never_have_is_said_before_the_motion_is_computed(tmp_path: Path) -> None:
     late = "{result: dynamics.forward.s_velocity, where: {time: {at_least: 1}}, at_most: 1}"
-    study = study_of(
-        BLOCK, f"requirements=[{{result: dynamics.extremes.peak, where: {{output: s}}, at_most: 1}}, {late}]"
-    )
-    with pytest.raises(MechdesignError, match="no row of extremes has output s; did you mean 's_effort' or 's_power'"):
-        foresee(study, ["dynamics"])
+    wrong = "{result: dynamics.extremes.peak, where: {output: s}, at_most: 1}"
+    done = ask("dynamics", "-", "--no-plots", "--out", tmp_path, study=BLOCK + f"requirements: [{wrong}, {late}]\n")
+    assert done.exit_code == 2
+    assert "no row of extremes has output s; did you mean 's_effort' or 's_power'" in done.stderr
+    assert not list(tmp_path.iterdir())

@@ -8,7 +8,6 @@ from helpers.studies import FIVE_BAR, study_of
 from scipy.optimize import brentq
 
 import mechdesign
-from mechdesign.questions.workspace.inscribed import crossed
 
 # The workspace of a point in the assembly of the sketch, without indices.
 PLAIN = "workspace={point: P, indices: []}"
@@ -136,13 +135,6 @@ def test_a_shape_that_a_singularity_crosses_is_told() -> None:
     assert "lower_1" in told
     same = mechdesign.workspace(study_of(CROSSED, "workspace.assembly=same"))
     assert not any("crossed" in str(warning) for warning in same.warnings)
-
-
-def test_a_place_on_the_border_crosses_nothing() -> None:
-    shapes = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 4.0, 0.5])
-    assert crossed(shapes, np.array([0.25j])) == ["circle"]
-    assert crossed(shapes, np.array([1j, 2 + 0.25j])) == []
-    assert crossed(np.full(7, np.nan), np.array([0j])) == []
 
 
 @pytest.mark.nightly

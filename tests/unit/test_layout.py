@@ -1,4 +1,4 @@
-"""Imports run one way: from what is general to what is asked, without circles; those inside functions count too."""
+"""Of the source: imports run one way, those inside functions too, without circles; kinds of warnings are declared."""
 
 import ast
 from functools import cache
@@ -6,6 +6,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import mechdesign
+from mechdesign.cautions import ALL, KINDS
 from mechdesign.commands import COMMANDS
 
 ROOT = Path(mechdesign.__file__).parent
@@ -108,3 +109,19 @@ def test_folders_import_what_is_below_them():
         if rank(other) > rank(name)
     ]
     assert not upwards
+
+
+def calls() -> list[ast.Call]:
+    """Every warning that the package makes."""
+    trees = (ast.parse(path.read_text(encoding="utf-8")) for path in ROOT.rglob("*.py"))
+    nodes = (node for tree in trees for node in ast.walk(tree))
+    return [node for node in nodes if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Caution"]
+
+
+def test_every_warning_is_of_a_declared_kind_and_every_kind_has_a_warning_and_a_page():
+    written = {node.args[0].value for node in calls() if node.args and isinstance(node.args[0], ast.Constant)}
+    assert written == KINDS.keys()
+    assert ALL not in KINDS
+    docs = Path(__file__).parents[2] / "docs"
+    made = "reference/study/index"
+    assert [kind for kind, each in KINDS.items() if each.page != made and not (docs / f"{each.page}.md").exists()] == []

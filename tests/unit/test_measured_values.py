@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.questions.reliability.study_sources import find_sources
 
 VALUES = np.round(100.02 + 0.05 * np.random.default_rng(5).standard_normal(30), 3)
 STUDY = """
@@ -34,10 +32,10 @@ def column(values: Sequence[object] | np.ndarray, name: str = "length") -> str:
     return f"part;{name};note\n" + "".join(f"L{k};{value};good\n" for k, value in enumerate(values))
 
 
-def load(folder: Path, *lines: str, more: str = "") -> mechdesign.Study:
+def load(folder: Path, *lines: str, more: str = "", overrides: Sequence[str] = ()) -> mechdesign.Study:
     file = folder / "study.yaml"
     file.write_text(STUDY + "".join(f"  {line}\n" for line in lines) + more)
-    return mechdesign.load(file)
+    return mechdesign.load(file, overrides)
 
 
 def test_measured_lengths_give_mean_and_deviation_of_the_output(tmp_path: Path) -> None:
@@ -53,22 +51,26 @@ def test_measured_lengths_give_mean_and_deviation_of_the_output(tmp_path: Path) 
 def test_deviations_say_so_and_angles_are_in_the_studys_unit(tmp_path: Path) -> None:
     write(tmp_path, "# of the drive\n" + "".join(f"{value}\n" for value in VALUES - 100.0))
     study = load(
-        tmp_path, "dimensions: {theta: {measured: levers.csv}, lever.length: {measured: levers.csv, nominal: 0}}"
-    )
-    length, theta = find_sources(study)[0].scalars
-    assert length.law.moments[0] == pytest.approx(VALUES.mean() - 100.0)
-    assert np.degrees(theta.law.moments[0]) == pytest.approx(VALUES.mean() - 100.0)
-    assert np.degrees(np.sqrt(theta.law.moments[1])) == pytest.approx(VALUES.std(ddof=1))
+        tmp_path, "dimensions: {theta: {measured: levers.csv}, lever.length: {measured: levers.csv, nominal: 0}}",
+        overrides=["mechanism.measures={far: {distance: [O, P]}}", "reliability.outputs=[lever.angle, far]",
+                   "reliability.limits={far: 1}", "reliability.methods=[analytic]"],
+    )  # fmt: skip
+    moments = mechdesign.reliability(study).tables["moments"]
+    assert moments["mean"] - [60, 100] == pytest.approx([VALUES.mean() - 100] * 2)
+    assert moments["sigma"] == pytest.approx([VALUES.std(ddof=1)] * 2)
 
 
 def test_measured_values_are_correlated_with_others(tmp_path: Path) -> None:
     write(tmp_path, column(VALUES))
     study = load(
         tmp_path, "dimensions: {lever.length: {measured: levers.csv, column: length}, theta: 0.1}",
-        "correlation: [[lever.length, theta, 0.6]]",
+        "correlation: [[lever.length, theta, 0.6]]", "samples: 100000",
     )  # fmt: skip
-    drawn = find_sources(study)[0].draw(np.random.default_rng(0), 100_000)
-    assert np.corrcoef(drawn)[0, 1] == pytest.approx(0.6, abs=0.01)
+    # P.x = l cos(theta): with small deviations the variance of a sum.
+    along, across = 0.5 * VALUES.std(ddof=1), -100 * np.sin(np.radians(60)) * np.radians(0.1 / 3)
+    moments = mechdesign.reliability(study).tables["moments"]
+    variance = moments["sigma"][moments.where(method="monte_carlo")] ** 2
+    assert (variance - along**2 - across**2) / (2 * along * across) == pytest.approx([0.6], abs=0.02)
 
 
 @pytest.mark.slow
@@ -93,7 +95,7 @@ def test_what_is_wrong_with_measured_values_is_said_at_once(
 ) -> None:
     if text is not None:
         write(tmp_path, text)
-    with pytest.raises(StudyError, match=f"study.yaml:11:.*{message}"):
+    with pytest.raises(mechdesign.StudyError, match=f"study.yaml:11:.*{message}"):
         load(tmp_path, f"dimensions: {{lever.length: {{measured: levers.csv{', ' * bool(asked)}{asked}}}}}")
 
 
@@ -105,7 +107,7 @@ optimize:
   variables: {lever.length: {from: 90, to: 110, number: 3}}
   minimize: [reliability.moments.sigma]
 """
-    with pytest.raises(StudyError, match=r"optimize changes 'lever.length': say by 'nominal'"):
+    with pytest.raises(mechdesign.StudyError, match=r"optimize changes 'lever.length': say by 'nominal'"):
         load(tmp_path, "dimensions: {lever.length: {measured: levers.csv, column: length}}", more=optimize)
     study = load(
         tmp_path, "dimensions: {lever.length: {measured: levers.csv, column: length, nominal: 100}}",
@@ -128,7 +130,7 @@ def test_allocated_tolerances_leave_measured_values_as_they_are(tmp_path: Path) 
     assert [table["given"][0], table["allocated"][0]] == pytest.approx([VALUES.std(ddof=1)] * 2)
     assert "measured: input_levers.csv" in result.files["allocated.yaml"].replace('"', "")
     assert result.files["input_levers.csv"] == column(VALUES)
-    with pytest.raises(StudyError, match="what is measured is held as it is"):
+    with pytest.raises(mechdesign.StudyError, match="what is measured is held as it is"):
         load(tmp_path, dimensions, "allocate: {reliability: 0.99, cost: {lever.length: 2}}")
 
 
@@ -139,7 +141,7 @@ def test_a_beta_law_needs_its_shape_and_its_tolerance() -> None:
         ("{sigma: 0.1, distribution: beta, shape: [2, 5]}", "lies between two ends: give 'tolerance'"),
         ("{tolerance: 0.1, distribution: beta, shape: [2, 0]}", "must be positive, not 0"),
     ):
-        with pytest.raises(StudyError, match=message):
+        with pytest.raises(mechdesign.StudyError, match=message):
             mechdesign.load(text=STUDY + f"  dimensions: {{lever.length: {given}}}\n")
 
 

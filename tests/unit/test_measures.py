@@ -6,16 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.analysis import optimize
-from mechdesign.questions.reliability.analysis import reliability
-from mechdesign.questions.stiffness.analysis import stiffness
-from mechdesign.questions.workspace.analysis import workspace
-from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.question import questions
-from mechdesign.region.rays import BATCH
-from mechdesign.report.requirements import requirements
+import mechdesign
 
 ARM = """
 mechanism:
@@ -51,7 +42,7 @@ mechanism:
 )
 def test_measures_are_given(poses: str, given: dict[str, list[float]]) -> None:
     outputs = "outputs: [P, far, bend, high, share, twice, t1]"
-    table = kinematics(study_of(ARM, f"kinematics={{{poses}, {outputs}}}")).tables["motion"]
+    table = mechdesign.kinematics(study_of(ARM, f"kinematics={{{poses}, {outputs}}}")).tables["motion"]
     assert table["valid"].all()
     for name, values in given.items():
         assert table[name] == pytest.approx(values, rel=1e-9)
@@ -64,7 +55,7 @@ def test_measures_are_given(poses: str, given: dict[str, list[float]]) -> None:
 def test_rates_of_chained_measures() -> None:
     kinematic = "kinematics={path: {share: [0.5], t1: 30}, rates: {share: 0.02, t1: 3}, outputs: [t2, share]}"
     study = study_of(ARM, kinematic)
-    table = kinematics(study).tables["motion"]
+    table = mechdesign.kinematics(study).tables["motion"]
     assert table["share_velocity"] == pytest.approx(0.02)
     h = 1e-4
     angles = [float(study.mechanism.solve({"share": 0.5 + 0.02 * t, "t1": 30 + 3 * t})["t2"]) for t in (-h, 0, h)]
@@ -81,19 +72,19 @@ def test_measures_are_limited_and_required() -> None:
         "kinematics.outputs=[mu, half, lower]",
         "mechanism.targets={lower: 20}",
     )
-    result = kinematics(study)
+    result = mechdesign.kinematics(study)
     table = result.tables["motion"]
     outside = (table["mu"] < 55) | (table["lower"] > 55)
     assert outside.any()
     assert np.array_equal(table["valid"], ~outside)
-    verdicts = requirements(study, result)
+    verdicts = mechdesign.requirements(study, result)
     assert verdicts[0].worst == np.min(table["half"])
     assert verdicts[1].worst == pytest.approx(np.max(table["lower"]) - 20)
 
 
 def test_angles_of_measures_are_continuous() -> None:
     text = FOUR_BAR.replace("measures: {", "measures: {to_crank: {angle: [rocker, crank]}, ")
-    table = kinematics(
+    table = mechdesign.kinematics(
         study_of(text, "kinematics={sweep: {theta: {from: 0, to: 720, step: 120}}, outputs: [to_crank]}")
     ).tables["motion"]
     assert table["to_crank"][-1] - table["to_crank"][0] == pytest.approx(720)
@@ -108,7 +99,7 @@ reliability:
   limits: {reach: 0.2, half: {max: 0.1}}
   methods: analytic
 """
-    result = reliability(study_of(FOUR_BAR + question))
+    result = mechdesign.reliability(study_of(FOUR_BAR + question))
     assert set(result.tables["moments"]["output"]) == {"half", "lower", "reach"}
     assert np.isfinite(result.tables["reliability"]["reliability"]).all()
 
@@ -118,7 +109,7 @@ def test_measures_place_what_is_stiff() -> None:
         ARM.replace("t2: {angle: fore}", "t2: {angle: fore, from: upper}")
         + "stiffness: {at: P, actuators: {t1: 1e5, t2: 1e5}, poses: [{twice: 90, t1: 30}, {bend: 45, t1: 30}]}"
     )
-    table = stiffness(study).tables["stiffness"]
+    table = mechdesign.stiffness(study).tables["stiffness"]
     assert np.isfinite(table["k_x"]).all()
     assert table["k_x"][0] == pytest.approx(table["k_x"][1], rel=1e-12)
 
@@ -135,7 +126,7 @@ mechanism:
 workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40}}
 """
     )
-    indices = workspace(study).tables["indices"]
+    indices = mechdesign.workspace(study).tables["indices"]
     # The wrist F on a circle of 12, P 3 from it.
     assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)
 
@@ -150,10 +141,10 @@ mechanism:
   sketch: {E: [8, 5], F: [13, 11], P: [16, 11]}
   measures: {reach: "hypot(F.x, F.y)"}
 workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {about: [0, 0], from: 20, to: 50}}
+optimize: {variables: {a.length: {choices: [10]}}, maximize: workspace.area}
 """)
-    (question,) = questions(study, 1e-4, ("area",))
     # The wrist F on a circle of 12, P 3 from it.
-    area = answer(question, {}, 1, BATCH).values["area"]
+    area = mechdesign.optimize(study).main["workspace.area"]
     assert area == pytest.approx(np.pi * (15**2 - 9**2) * 30 / 360, rel=1e-4)
 
 
@@ -169,13 +160,15 @@ mechanism:
 
 def test_measures_take_parameters() -> None:
     question = "kinematics={poses: [{theta: 40}, {reach: 80}], outputs: [B, reach, steep, size, theta]}"
-    table = kinematics(study_of(PARAMETRIC, question, "mechanism.parameters.r=25")).tables["motion"]
+    table = mechdesign.kinematics(study_of(PARAMETRIC, question, "mechanism.parameters.r=25")).tables["motion"]
     reach = np.hypot(table["B.x"], table["B.y"]) - 25
     assert table["reach"] == pytest.approx(reach, rel=1e-12)
     assert table["reach"][1] == pytest.approx(80)
     assert table["steep"] == pytest.approx(4 * reach + np.sin(np.radians(table["theta"])) / 50, rel=1e-12)
     assert table["size"] == pytest.approx([115, 115])
-    with pytest.raises(StudyError, match=r"measures\.reach: there is no coordinate or parameter 'doubel'; did"):
+    with pytest.raises(
+        mechdesign.StudyError, match=r"measures\.reach: there is no coordinate or parameter 'doubel'; did"
+    ):
         study_of(PARAMETRIC, "mechanism.measures.reach=B.x - doubel")
 
 
@@ -186,10 +179,10 @@ def test_measures_follow_the_parameters_of_designs() -> None:
         " maximize: [kinematics.steep], subject_to: [{result: kinematics.size, at_most: 125}]}"
     )
     question = "kinematics={poses: [{theta: 40}, {theta: 70}], outputs: [reach, steep, size]}"
-    designs = optimize(study_of(PARAMETRIC + section, question)).tables["designs"]
+    designs = mechdesign.optimize(study_of(PARAMETRIC + section, question)).tables["designs"]
     for row in designs:
         changes = [f"mechanism.parameters.{name}={row[name]}" for name in ("r", "k")]
-        steep = kinematics(study_of(PARAMETRIC, question, *changes)).tables["motion"]["steep"]
+        steep = mechdesign.kinematics(study_of(PARAMETRIC, question, *changes)).tables["motion"]["steep"]
         assert row["kinematics.steep"] == pytest.approx(min(steep), rel=1e-9)
         assert row["feasible"] == (row["r"] + 90 <= 125)
 
@@ -204,7 +197,7 @@ reliability:
   samples: 100000
 """
     methods = ("analytic", "second_order", "monte_carlo")
-    result = reliability(study_of(PARAMETRIC + section, f"reliability.methods=[{', '.join(methods)}]"))
+    result = mechdesign.reliability(study_of(PARAMETRIC + section, f"reliability.methods=[{', '.join(methods)}]"))
     assert not result.warnings
     contributions = result.tables["contributions"]
 

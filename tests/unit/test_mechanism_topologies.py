@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import MechanismError, StudyError
-from mechdesign.mechanism import Reason
-from mechdesign.questions.kinematics.analysis import kinematics
+import mechdesign
 
 INVERTED = """
 mechanism:
@@ -103,13 +101,14 @@ def test_a_link_that_only_its_slide_shows_lies_along_it() -> None:
 
 def test_wedges_slide_on_one_another_and_their_angles_must_close() -> None:
     assert study_of(WEDGE).mechanism.solve({"floor": 2})["B.y"] == pytest.approx(-2 * np.tan(np.pi / 6))
-    with pytest.raises(StudyError, match="'a' and 'b' are 10 apart"):
+    with pytest.raises(mechdesign.StudyError, match="'a' and 'b' are 10 apart"):
         study_of(WEDGE.replace("-90", "-80"))
 
 
 def test_a_slide_of_length_zero_is_a_pose_like_any_other() -> None:
     mechanism = study_of(UNDRAWN.replace("drives: [arm]", "drives: [g]")).mechanism
-    assert mechanism.forward.solve([0.0]).reason == Reason.NOT_CLOSED
+    with pytest.raises(mechdesign.AssemblyError, match="g = 0: cannot be assembled"):
+        mechanism.solve({"g": 0})
 
 
 def test_a_distance_that_is_given_is_not_negative() -> None:
@@ -119,7 +118,7 @@ def test_a_distance_that_is_given_is_not_negative() -> None:
 
 
 def test_unknown_pin_offsets_are_told() -> None:
-    with pytest.raises(MechanismError, match=r"nothing\.dx"):
+    with pytest.raises(mechdesign.MechanismError, match=r"nothing\.dx"):
         study_of(FOUR_BAR).mechanism.solve({"crank": 60}, {"nothing.dx": 1.0})
 
 
@@ -139,7 +138,7 @@ def test_acceleration_of_an_expression_does_not_depend_on_poses_that_fail() -> N
     text = FOUR_BAR.replace("crank: [O, A, 1]", "crank: [O, A, 3]") + (
         "kinematics: {sweep: {crank: {from: 60, to: %d, step: 20}}, rates: {crank: 1 rad/s}, outputs: [odd]}\n"
     )
-    some, more = (kinematics(study_of(text % to)).tables["motion"] for to in (120, 180))
+    some, more = (mechdesign.kinematics(study_of(text % to)).tables["motion"] for to in (120, 180))
     assert not more["valid"].all()
     assert np.isfinite(some["odd_acceleration"]).all()
     assert np.array_equal(more["odd_acceleration"][:4], some["odd_acceleration"])
@@ -153,12 +152,12 @@ def test_acceleration_of_an_expression_does_not_depend_on_poses_that_fail() -> N
     ],
 )
 def test_mistakes_of_the_whole_are_named(change: tuple[str, str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(FOUR_BAR.replace(*change))
 
 
 def test_a_line_through_a_legs_far_end_has_no_fixed_direction() -> None:
-    with pytest.raises(StudyError, match="'B' moves along leg 'leg'"):
+    with pytest.raises(mechdesign.StudyError, match="'B' moves along leg 'leg'"):
         study_of("""
 mechanism:
   links: {ground: {O: [0, 0]}, leg: {from: O, to: B, telescopic: true}, car: {C: [0, 0]}}
@@ -169,24 +168,28 @@ mechanism:
 
 
 def test_rates_are_those_of_drives() -> None:
-    with pytest.raises(StudyError, match=r"'B\.x' is not a drive"):
+    with pytest.raises(mechdesign.StudyError, match=r"'B\.x' is not a drive"):
         study_of(FOUR_BAR + "kinematics: {sweep: {crank: 60}, rates: {B.x: 1}}\n")
 
 
 @pytest.mark.slow
 def test_change_points_are_warned_about_between_poses_and_on_them() -> None:
     def between(text: str) -> list[str]:
-        return [warning for warning in map(str, kinematics(study_of(text)).warnings) if "change point at" in warning]
+        return [
+            warning
+            for warning in map(str, mechdesign.kinematics(study_of(text)).warnings)
+            if "change point at" in warning
+        ]
 
     assert len(between(PARALLELOGRAM)) == 1
     assert "crank = 180 deg (joints" in between(PARALLELOGRAM)[0]
     assert not between(PARALLELOGRAM.replace("[D, B, 1]", "[D, B, 1.1]").replace("rod: [A, B, 4]", "rod: [A, B, 3.95]"))
-    on = [*map(str, kinematics(study_of(PARALLELOGRAM, "kinematics.sweep.crank.step=10")).warnings)]
+    on = [*map(str, mechdesign.kinematics(study_of(PARALLELOGRAM, "kinematics.sweep.crank.step=10")).warnings)]
     assert any("mean nothing there; the first: crank = 180 deg" in warning for warning in on)
 
 
 def test_angles_are_continuous_both_ways_of_a_grid() -> None:
-    table = kinematics(
+    table = mechdesign.kinematics(
         study_of("""
 mechanism:
   links: {ground: {O: [0, 0]}, upper: [O, E, 10], forearm: [E, P, 8]}
