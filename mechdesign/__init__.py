@@ -37,18 +37,33 @@ if TYPE_CHECKING:
     from mechdesign.api.questions import stiffness as stiffness
     from mechdesign.api.questions import sweep as sweep
     from mechdesign.api.questions import workspace as workspace
+    from mechdesign.api.shown import Answer as Answer
+    from mechdesign.cautions import Caution as Caution
     from mechdesign.errors import AssemblyError as AssemblyError
+    from mechdesign.errors import MechanismError as MechanismError
     from mechdesign.errors import MechdesignError as MechdesignError
+    from mechdesign.errors import OutputError as OutputError
     from mechdesign.errors import StudyError as StudyError
     from mechdesign.importing.conversion import convert as convert
+    from mechdesign.report.requirements import Verdict as Verdict
     from mechdesign.report.requirements import requirements as requirements
+    from mechdesign.results import Column as Column
+    from mechdesign.results import Table as Table
+    from mechdesign.study import Study as Study
 
     __version__: str
 
 _HOMES = {
-    **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
+    "Answer": "mechdesign.api.shown",
+    "Caution": "mechdesign.cautions",
+    **dict.fromkeys(
+        ("AssemblyError", "MechanismError", "MechdesignError", "OutputError", "StudyError"),
+        "mechdesign.errors",
+    ),
     "convert": "mechdesign.importing.conversion",
-    "requirements": "mechdesign.report.requirements",
+    **dict.fromkeys(("Verdict", "requirements"), "mechdesign.report.requirements"),
+    **dict.fromkeys(("Column", "Table"), "mechdesign.results"),
+    "Study": "mechdesign.study",
     **dict.fromkeys(
         (
             "load",

@@ -156,7 +156,16 @@ class StudyError(MechdesignError):
 
 
 class MechanismError(MechdesignError):
-    """The mechanism's description contradicts itself (mobility, drives, sketch)."""
+    """The mechanism's description contradicts itself, or what is given does not determine a pose of it.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text="mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}")
+    >>> try:
+    ...     study.mechanism.solve({"P.x": 60, "P.y": 80})
+    ... except mechdesign.MechanismError as error:
+    ...     print(error)
+    a pose gives 1 coordinate (the mobility), not 2: P.x, P.y
+    """
 
     exit_code = 2
 
@@ -186,7 +195,16 @@ class AssemblyError(MechdesignError):
 
 
 class OutputError(MechdesignError):
-    """Results could not be written."""
+    """Results could not be written.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text="mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}")
+    >>> try:
+    ...     mechdesign.kinematics(study).save(mechdesign.__file__)
+    ... except mechdesign.OutputError as error:
+    ...     print(str(error).rpartition(": ")[2].rpartition("/")[2])
+    __init__.py is a file; choose another --out
+    """
 
 
 class Interrupted(KeyboardInterrupt):

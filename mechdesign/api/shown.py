@@ -64,7 +64,14 @@ class ShownStudy(Study):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(Result):
-    """The result of one command that knows its study."""
+    """The result of one command that knows its study.
+
+    >>> import mechdesign
+    >>> arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}"
+    >>> result = mechdesign.kinematics(mechdesign.load(text=arm))
+    >>> list(result.tables), result.main is result.tables["motion"], result.counts["poses"]
+    (['motion', 'extremes', 'limits'], True, 73)
+    """
 
     study: Study  #: with the seed that was computed with
     all_modes: bool = False  #: whether every assembly mode was asked

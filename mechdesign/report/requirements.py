@@ -32,7 +32,20 @@ _OUTSIDE = "no place of the motion"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on one requirement."""
+    """The verdict on one requirement.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 0}, {arm: 60}], outputs: [P]}
+    ... requirements: [{result: kinematics.P.y, at_most: 80}]
+    ... ''')
+    >>> (verdict,) = mechdesign.kinematics(study).verdicts
+    >>> print(verdict)
+    kinematics.P.y at most 80: NOT MET, worst 86.6025 at arm 60 (of the asked poses only)
+    >>> print(f"{verdict.margin:.4f} {verdict.unit}")
+    -6.6025 mm
+    """
 
     requirement: str  #: in words
     met: bool  #: whether the worst row meets it

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from mechdesign.study import Study
-from mechdesign.study.loading import load_bytes
+import mechdesign
 
 # A slider-crank in line, whose stroke is twice its crank `r`.
 IN_LINE = """
@@ -32,6 +29,6 @@ workspace: {point: P, assembly: any}
 """
 
 
-def study_of(text: str, *overrides: str) -> Study:
+def study_of(text: str, *overrides: str) -> mechdesign.Study:
     """Load a study from its text."""
-    return load_bytes(text.encode(), Path("study.yaml"), overrides)
+    return mechdesign.load(text=text, overrides=overrides)

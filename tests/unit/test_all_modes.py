@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics.analysis import kinematics
+import mechdesign
 
 FOUR_BAR = """
 mechanism:
@@ -41,7 +40,7 @@ mechanism:
 
 @pytest.mark.slow
 def test_both_modes_of_a_four_bar() -> None:
-    result = kinematics(study_of(FOUR_BAR), all_modes=True)
+    result = mechdesign.kinematics(study_of(FOUR_BAR), all_modes=True)
     motion, modes = result.tables["motion"], result.tables["modes"]
     assert modes.names == ("mode", *motion.names)
     assert result.counts["modes"] == 2
@@ -58,11 +57,11 @@ def test_both_modes_of_a_four_bar() -> None:
     a = 30 * np.exp(1j * np.radians(motion["theta"]))
     along = (100 - a) / abs(100 - a)
     assert mirrored == pytest.approx(a + along**2 * np.conj(drawn - a))
-    assert kinematics(study_of(FOUR_BAR)).tables.keys() == result.tables.keys() - {"modes"}
+    assert mechdesign.kinematics(study_of(FOUR_BAR)).tables.keys() == result.tables.keys() - {"modes"}
 
 
 def test_modes_that_fail_are_told_one_by_one() -> None:
-    result = kinematics(study_of(SIX_BAR), all_modes=True)
+    result = mechdesign.kinematics(study_of(SIX_BAR), all_modes=True)
     assert result.counts["modes"] == 4
     told = {w.split(":")[0]: w for w in map(str, result.warnings) if w.startswith("mode ")}
     modes = result.tables["modes"]
@@ -76,7 +75,7 @@ def test_modes_that_fail_are_told_one_by_one() -> None:
 
 
 def test_modes_of_the_inverse_problem_are_its_own() -> None:
-    result = kinematics(study_of(ARM, "kinematics={path: {P: [[3, 12], [5, 11]]}}"), all_modes=True)
+    result = mechdesign.kinematics(study_of(ARM, "kinematics={path: {P: [[3, 12], [5, 11]]}}"), all_modes=True)
     modes = result.tables["modes"]
     assert result.counts["modes"] == 2
     assert modes["P.x"] == pytest.approx([3, 5, 3, 5])
@@ -86,5 +85,5 @@ def test_modes_of_the_inverse_problem_are_its_own() -> None:
 
 def test_modes_of_different_sets_of_coordinates_are_an_error() -> None:
     study = study_of(ARM, "kinematics={poses: [{P.x: 3, P.y: 12}, {upper: 10, fore: 50}]}")
-    with pytest.raises(StudyError, match=r"kinematics\.poses: the poses give different coordinates"):
-        kinematics(study, all_modes=True)
+    with pytest.raises(mechdesign.StudyError, match=r"kinematics\.poses: the poses give different coordinates"):
+        mechdesign.kinematics(study, all_modes=True)

@@ -10,8 +10,6 @@ from helpers.studies import study_of
 from scipy.special import ndtri
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.results import Result
 
 # A slider on the x axis whose error is that of a, b and the travel: a - b + travel, and c, which changes nothing.
 CHAIN = """\
@@ -51,12 +49,12 @@ reliability:
 """
 
 
-def allocated(result: Result) -> dict[str, float]:
+def allocated(result: mechdesign.Answer) -> dict[str, float]:
     table = result.tables["allocation"]
     return dict(zip(table["source"].tolist(), table["allocated"].tolist(), strict=True))
 
 
-def ask(text: str, *overrides: str) -> Result:
+def ask(text: str, *overrides: str) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *overrides))
 
 
@@ -206,7 +204,7 @@ def test_the_advice_where_it_cannot_be_reached_works() -> None:
     )
     why = ask(text).failed
     assert "O (100%); name O in 'cost' to have it allocated too, with 'radial' in place of the fit of O" in why
-    with pytest.raises(StudyError, match="a fit is not allocated"):
+    with pytest.raises(mechdesign.StudyError, match="a fit is not allocated"):
         ask(text, "reliability.allocate={reliability: 0.99, cost: {O: 1}}")
     radial = "reliability.clearances={O: {radial: 0.02, link: lever}}"
     assert not ask(text, "reliability.allocate={reliability: 0.99, cost: {O: 1}}", radial).failed
@@ -405,7 +403,7 @@ def test_correlated_tolerances() -> None:
     ],
 )
 def test_what_cannot_be_asked(overrides: list[str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(CHAIN, *overrides)
 
 

@@ -10,8 +10,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.results import Result
 
 # Half a standard tolerance of IT5 to IT12, mm, of sizes above 30 to 50 mm, 50 to 80 mm and 80 to 120 mm.
 HALVES = {
@@ -53,11 +51,11 @@ reliability:
 """
 
 
-def ask(text: str, *overrides: str) -> Result:
+def ask(text: str, *overrides: str) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *overrides))
 
 
-def chosen(result: Result) -> dict[str, str]:
+def chosen(result: mechdesign.Answer) -> dict[str, str]:
     table = result.tables["allocation"]
     return dict(zip(table["source"].tolist(), table["grade"].tolist(), strict=True))
 
@@ -215,5 +213,5 @@ def test_what_the_finest_grades_do_not_reach_is_told() -> None:
      "a circle has no Cpk; limit T.x and T.y"),
 ])  # fmt: skip
 def test_what_cannot_be_asked(overrides: list[str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(PLANE, "reliability.limits={P.x: 0.08}", *overrides)

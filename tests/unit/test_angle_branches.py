@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.analysis import optimize
-from mechdesign.questions.reliability.analysis import reliability
-from mechdesign.questions.workspace.analysis import workspace
-from mechdesign.study.loading import load
+import mechdesign
 
 # A slider to the left of its crank: the rod points at 180 deg.
 LEFT = """
@@ -49,7 +45,7 @@ mechanism:
 
 def test_a_rod_that_points_to_the_left() -> None:
     text = LEFT + "  targets: {half: th/2}\nkinematics:\n" + SWEEP + "  outputs: [tilt, half, rod.angle, wave]\n"
-    tables = kinematics(study_of(text)).tables
+    tables = mechdesign.kinematics(study_of(text)).tables
     motion, extremes = tables["motion"], tables["extremes"]
     tilt = np.degrees(np.arcsin(np.sin(np.radians(motion["th"])) / 3))
     assert motion["tilt"] == pytest.approx(tilt, abs=1e-9)
@@ -66,7 +62,7 @@ def test_samples_about_the_cut_are_near_their_nominal_pose() -> None:
     text = LEFT.replace("O: [0, 0], G", "O: [0, 0.02], G")
     text += "reliability:\n  poses: [{th: 0}, {th: 180}]\n  dimensions: {ground.G.y: {sigma: 0.02}}\n"
     text += "  outputs: [tilt]\n  limits: {tilt: 0.9}\n  methods: [analytic, monte_carlo, form]\n  samples: 20000\n"
-    tables = reliability(study_of(text)).tables
+    tables = mechdesign.reliability(study_of(text)).tables
     drawn = np.random.default_rng(1).normal(0, 0.02, 100_000)
     sigma = np.degrees(np.arcsin((drawn - 0.02) / 60)).std()
     assert tables["moments"]["sigma"] == pytest.approx(sigma, rel=0.02)
@@ -77,7 +73,7 @@ def test_a_range_is_the_same_for_designs_together() -> None:
     text = LEFT.replace("rod: [A, B, 60]", "rod: [A, B, l]").replace("  links:", "  parameters: {l: 60}\n  links:", 1)
     text += "kinematics:\n" + SWEEP + "  outputs: [tilt]\n"
     text += "optimize:\n  variables: {l: {from: 50, to: 70, step: 10}}\n  minimize: [kinematics.extremes.range]\n"
-    designs = optimize(study_of(text)).tables["designs"]
+    designs = mechdesign.optimize(study_of(text)).tables["designs"]
     expected = 2 * np.degrees(np.arcsin(20 / designs["l"]))
     assert designs["kinematics.extremes.range"] == pytest.approx(expected)
 
@@ -86,8 +82,8 @@ def test_a_range_is_the_same_for_designs_together() -> None:
 @pytest.mark.parametrize("step", [5, 30, 100])
 def test_a_limit_of_a_measure_follows_the_motion(step: int) -> None:
     limited = FOUR_BAR.replace("kinematics:", "  limits: [{measure: m, min: -100, max: 900}]\nkinematics:")
-    free = kinematics(study_of(FOUR_BAR.replace("STEP", "1"))).tables["motion"]
-    tables = kinematics(study_of(limited.replace("STEP", str(step)))).tables
+    free = mechdesign.kinematics(study_of(FOUR_BAR.replace("STEP", "1"))).tables["motion"]
+    tables = mechdesign.kinematics(study_of(limited.replace("STEP", str(step)))).tables
     motion, limits = tables["motion"], tables["limits"]
     assert np.abs(np.diff(free["m"])).max() < 4
     assert motion["m"] == pytest.approx(np.interp(motion["theta"], free["theta"], free["m"]))
@@ -100,7 +96,7 @@ def test_a_limit_of_a_measure_follows_the_motion(step: int) -> None:
 @pytest.mark.parametrize(("low", "high"), [(0, 500), (0, 360), (-60, 60), (200, 260)])
 def test_a_drive_that_turns_on_counts_as_given(low: float, high: float) -> None:
     limited = FOUR_BAR.replace("kinematics:", f"  limits: [{{drive: theta, min: {low}, max: {high}}}]\nkinematics:")
-    tables = kinematics(study_of(limited.replace("STEP", "7"))).tables
+    tables = mechdesign.kinematics(study_of(limited.replace("STEP", "7"))).tables
     theta = tables["motion"]["theta"]
     assert (tables["motion"]["valid"] == (theta >= low) & (theta <= high)).all()
     assert tables["limits"]["theta"] == pytest.approx([low, high])
@@ -108,14 +104,14 @@ def test_a_drive_that_turns_on_counts_as_given(low: float, high: float) -> None:
 
 def test_listed_poses() -> None:
     text = ARM + "kinematics: {poses: [{a: 200, b: 30}, {P.x: -15, P.y: 2}], outputs: [upper.angle, both, a]}\n"
-    found = kinematics(study_of(text)).tables["motion"]
+    found = mechdesign.kinematics(study_of(text)).tables["motion"]
     # What is given keeps its turn, what is found is in (-180, 180].
     assert found["both"][0] == pytest.approx(230)
     assert found["upper.angle"][0] == pytest.approx(-160)
     assert abs(found["a"][1]) < 180
     # A drive that is found lies within its limits.
     limited = study_of(text.replace("kinematics:", "  limits: [{drive: a, min: 400, max: 600}]\nkinematics:"))
-    again = kinematics(limited).tables["motion"]
+    again = mechdesign.kinematics(limited).tables["motion"]
     assert again["valid"].tolist() == [False, True]
     assert 400 <= again["a"][1] <= 600
     assert np.cos(np.radians(again["a"][1] - found["a"][1])) == pytest.approx(1)
@@ -124,8 +120,8 @@ def test_listed_poses() -> None:
 
 @pytest.mark.nightly
 def test_drives_on_the_boundary_of_a_shipped_robot() -> None:
-    study = load(Path(__file__).parents[2] / "configs/gallery/scara.yaml")
-    boundary = workspace(study).tables["boundary"]
+    study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/scara.yaml")
+    boundary = mechdesign.workspace(study).tables["boundary"]
     assert np.abs(boundary["q1"]).max() == pytest.approx(125)
     assert boundary["q2"].min() == pytest.approx(15)
     assert boundary["q2"].max() == pytest.approx(140)

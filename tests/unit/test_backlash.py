@@ -5,7 +5,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 # Two cranks, of which gears turn the second (-2 times as fast, pitch radii 200/3 and 100/3), and a cam's valve.
 GEARED = """
@@ -68,14 +67,16 @@ def test_uniform_play_has_a_twelfth_of_the_squared_backlash(backlash: str, radia
 )
 def test_mistakes_are_named(clearances: str, message: str) -> None:
     text = GEARED.replace("{gears: {backlash: %s}, cam: {backlash: 0.02}}", f"{{{clearances}}}")
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         study_of(text)
     assert message in str(caught.value)
 
 
 def test_a_length_needs_a_pitch_circle() -> None:
     belt = GEARED.replace("phase: 15}", "phase: 15, wheels: belt}")
-    with pytest.raises(StudyError, match="is a length along a pitch circle, and that of 'gears' is not known"):
+    with pytest.raises(
+        mechdesign.StudyError, match="is a length along a pitch circle, and that of 'gears' is not known"
+    ):
         study_of(belt % "0.1 mm")
     assert sigmas(belt.replace("wheels: belt", "wheels: belt, radius: 10") % "0.1 mm")[
         "analytic", "two.angle"
@@ -116,7 +117,9 @@ reliability:
 
 
 def test_play_at_the_flanks_has_no_smooth_failure() -> None:
-    with pytest.raises(StudyError, match="the play of 'gears' is at one end or at the other, and form needs"):
+    with pytest.raises(
+        mechdesign.StudyError, match="the play of 'gears' is at one end or at the other, and form needs"
+    ):
         study_of((GEARED % "0.1, pin: contact").replace("monte_carlo]", "form]"))
 
 

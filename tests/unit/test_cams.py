@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.analysis import optimize
-from mechdesign.results import Table
-from mechdesign.study import Study
+import mechdesign
 
 SLIDING = """
 mechanism:
@@ -32,19 +26,19 @@ ROLLER = SLIDING % (HARMONIC % "roller: F, radius: r")
 TURN = np.radians(np.arange(361.0))
 
 
-def cam_of(study: Study) -> Table:
-    return kinematics(study).tables["cam"]
+def cam_of(study: mechdesign.Study) -> mechdesign.Table:
+    return mechdesign.kinematics(study).tables["cam"]
 
 
-def warnings_of(study: Study) -> list[str]:
-    return [str(warning) for warning in kinematics(study).warnings if warning.kind == "cam"]
+def warnings_of(study: mechdesign.Study) -> list[str]:
+    return [str(warning) for warning in mechdesign.kinematics(study).warnings if warning.kind == "cam"]
 
 
-def placed(table: Table) -> Complexes:
+def placed(table: mechdesign.Table) -> np.ndarray:
     return np.asarray(table["x"] + 1j * table["y"])
 
 
-def clearances(profile: Complexes, centers: Complexes) -> Floats:
+def clearances(profile: np.ndarray, centers: np.ndarray) -> np.ndarray:
     """Smallest distance of each place from the sides of a polygon."""
     begin, way = profile[:-1], np.diff(profile)
     part = np.clip(((centers[:, None] - begin) * np.conj(way)).real / np.abs(way) ** 2, 0, 1)
@@ -70,7 +64,7 @@ def clearances(profile: Complexes, centers: Complexes) -> Floats:
     ],
 )
 def test_mistakes_are_named(cam: str, message: str) -> None:
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         study_of(SLIDING % f"to: 40 + cam, cam: {cam}")
     assert message in str(caught.value)
 
@@ -80,7 +74,9 @@ def test_a_cam_that_two_drives_turn_has_no_profile() -> None:
     text = text.replace("disc: [O, N, 40]", "disc: [O, N, 40]\n    table: {G: [0, 0]}")
     text = text.replace("joints: {", "joints: {way: {prismatic: [ground, table], through: O, point: G}, ")
     text = text.replace("drives: {", "drives: {x: {slide: way}, ").replace("sketch: {", "sketch: {G: [0, 0], ")
-    with pytest.raises(StudyError, match="drive 'x' moves the follower against the cam too, not 'cam' alone"):
+    with pytest.raises(
+        mechdesign.StudyError, match="drive 'x' moves the follower against the cam too, not 'cam' alone"
+    ):
         study_of(text)
 
 
@@ -103,7 +99,7 @@ def test_a_roller_on_a_slide_has_the_pressure_angle_and_curvature_of_textbooks(o
 def test_a_harmonic_rise_is_steepest_where_its_sine_says() -> None:
     """A rise of 2 in from a prime circle of 2 in: tan(phi) = sin(t)/(3 - cos(t)), at most asin(1/3) at acos(1/3)."""
     text = ROLLER.replace("base + 10 - 10*cos(cam)", "3 - cos(cam)").replace("r: 8", "r: 0.375").replace("40]", "2]")
-    extremes = kinematics(study_of(text)).tables["extremes"]
+    extremes = mechdesign.kinematics(study_of(text)).tables["extremes"]
     row = extremes["output"].tolist().index("lift_pressure_angle")
     assert extremes["max"][row] == pytest.approx(np.degrees(np.arcsin(1 / 3)), rel=1e-10)
     assert extremes["max_at"][row] == pytest.approx(np.degrees(np.arccos(1 / 3)), rel=1e-6)
@@ -215,14 +211,14 @@ def test_what_is_wrong_with_a_cam_is_said() -> None:
 
 
 def test_a_follower_at_rest_is_no_dead_centre_but_a_piston_is() -> None:
-    assert not kinematics(study_of(ROLLER)).warnings
+    assert not mechdesign.kinematics(study_of(ROLLER)).warnings
     engine = (
         ROLLER.replace("T: [60, 0]}", "T: [60, 0]}\n    rod: [N, B, 120]\n    piston: {B: [0, 0]}")
         .replace("point: F}", "point: F}, guide: {prismatic: [ground, piston], through: O, point: B}")
         .replace("sketch: {", "sketch: {B: [160, 0], ")
         .replace("[F.y]", "[B.x]")
     )
-    (dead,) = kinematics(study_of(engine)).warnings
+    (dead,) = mechdesign.kinematics(study_of(engine)).warnings
     assert str(dead) == "3 poses are at a dead centre: B.x stands still there, and det_J is 0"
 
 
@@ -231,7 +227,7 @@ LOADED = ROLLER + "dynamics: {sweep: {cam: {from: 0, to: 350, step: 10}}, loads:
 
 def test_the_contact_force_bears_the_load_along_the_normal() -> None:
     """On a follower without friction N cos(phi) is the load, the guide bears N sin(phi), the shaft F s'."""
-    result = dynamics(study_of(LOADED))
+    result = mechdesign.dynamics(study_of(LOADED))
     joints, turn = result.tables["joint_forces"], np.radians(np.arange(0, 360, 10.0))
     slope, s = 10 * np.sin(turn), 40 - 10 * np.cos(turn)
     phi = np.arctan(slope / s)
@@ -251,7 +247,7 @@ def test_the_shaft_bears_the_moment_of_the_contact_force(follower: str) -> None:
     moving = "{sweep: {disc: {from: 0, to: 345, step: 15}}, rates: {disc: 300 rpm}, loads: [{at: H, force: [5, -40]}]}"
     study = study_of(text.replace("arm: {P: [0, 0]", "arm: {points: {P: [0, 0]").replace("30], m", "30]}, m")
                      + f"dynamics: {moving}\n")  # fmt: skip
-    result, table = dynamics(study), cam_of(study)
+    result, table = mechdesign.dynamics(study), cam_of(study)
     place = (placed(table) * np.exp(1j * np.radians(table["disc"])))[:-1:15]
     joints = result.tables["joint_forces"]
     on_arm = (joints["fx"] + 1j * joints["fy"])[joints["joint"] == "lift"]
@@ -262,22 +258,24 @@ def test_the_shaft_bears_the_moment_of_the_contact_force(follower: str) -> None:
 
 def test_a_follower_that_is_pulled_lifts_off() -> None:
     text = LOADED.replace("[0, -50]", "[0, 50]")
-    assert any("the follower lifts off at 36 of 36 poses" in str(w) for w in dynamics(study_of(text)).warnings)
+    assert any(
+        "the follower lifts off at 36 of 36 poses" in str(w) for w in mechdesign.dynamics(study_of(text)).warnings
+    )
     groove = text.replace("radius: r", "radius: r, side: groove")
     forward = "{forward: {duration: 0.01 s, rows: 3}, loads"
     moving = text.replace("{sweep: {cam: {from: 0, to: 350, step: 10}}, loads", forward)
     disc = "disc: {from: O, to: N, length: 40, mass: 1, center: [20, 0], inertia: 0}"
     moving = moving.replace("disc: [O, N, 40]", disc)
-    (caution,) = dynamics(study_of(moving)).warnings
+    (caution,) = mechdesign.dynamics(study_of(moving)).warnings
     assert "the follower lifts off at 3 of 3 poses" in str(caution)
-    assert not any(w.kind == "cam" for w in dynamics(study_of(groove)).warnings)
+    assert not any(w.kind == "cam" for w in mechdesign.dynamics(study_of(groove)).warnings)
 
 
 def test_a_design_may_be_chosen_by_its_pressure_angle() -> None:
     """The largest is asin(10/(base + 10)) of a harmonic law."""
     variables = "variables: {base: {from: 15, to: 55, number: 3}}"
     goal = f"optimize: {{{variables}, minimize: kinematics.lift_pressure_angle.peak}}\n"
-    designs = optimize(study_of(ROLLER + goal)).tables["designs"]
+    designs = mechdesign.optimize(study_of(ROLLER + goal)).tables["designs"]
     np.testing.assert_allclose(
         designs["kinematics.lift_pressure_angle.peak"], np.degrees(np.arcsin(10 / (designs["base"] + 10))), rtol=1e-9
     )

@@ -8,9 +8,6 @@ from helpers.studies import study_of
 from scipy.special import ndtr, ndtri
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.report.requirements import requirements
-from mechdesign.results import Table
 
 # P.x = l cos(theta), of a length with sigma 0.1.
 LEVER = """
@@ -28,7 +25,7 @@ reliability:
 COSINES = np.cos(np.radians([60.0, 60.05]))
 
 
-def capability(*overrides: str) -> Table:
+def capability(*overrides: str) -> mechdesign.Table:
     return mechdesign.reliability(study_of(LEVER, *overrides)).tables["capability"]
 
 
@@ -134,7 +131,7 @@ def test_each_of_several_limits_is_judged_by_itself_by_all_methods() -> None:
 def test_a_capability_can_be_required(at_least: float, met: bool) -> None:
     gate = f"requirements=[{{result: reliability.capability.P.x.cpk, at_least: {at_least}}}]"
     study = study_of(LEVER, gate, "reliability.poses=[{theta: 60}]")
-    (verdict,) = requirements(study, mechdesign.reliability(study))
+    (verdict,) = mechdesign.requirements(study, mechdesign.reliability(study))
     # The nearer limit is 0.1 away, and sigma is 0.05.
     assert (verdict.met, verdict.worst) == (met, pytest.approx(2 / 3))
 
@@ -175,7 +172,7 @@ def test_tolerances_are_allocated_to_limits_of_the_value() -> None:
     ],
 )
 def test_limits_that_make_no_sense_are_refused(limit: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(LEVER, f"reliability.limits={{P.x: {limit}}}")
 
 

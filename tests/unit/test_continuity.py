@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.kinematics.analysis import kinematics
+import mechdesign
 
 FOUR_BAR = """
 mechanism:
@@ -42,7 +42,7 @@ kinematics:
 
 
 def motion(text: str, *overrides: str) -> dict[str, np.ndarray]:
-    table = kinematics(study_of(text, *overrides)).tables["motion"]
+    table = mechdesign.kinematics(study_of(text, *overrides)).tables["motion"]
     return {name: table[name] for name in table.names}
 
 

@@ -7,10 +7,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.report.requirements import Verdict
-from mechdesign.results import Result
 
 FIVE_BAR = """\
 mechanism:
@@ -54,21 +50,21 @@ def four_bar(outputs: str = "[rocker.angle]", measures: str = "") -> str:
     return FOUR_BAR.replace("OUTPUTS", outputs).replace("MEASURES", measures)
 
 
-def row(result: Result, output: str) -> dict[str, float]:
+def row(result: mechdesign.Answer, output: str) -> dict[str, float]:
     table = result.tables["extremes"]
     (k,) = np.flatnonzero(table["output"] == output)
     return {name: table[name][k] for name in table.names if name not in ("output", "unit")}
 
 
-def judged(text: str, *requirements: str) -> list[Verdict]:
+def judged(text: str, *requirements: str) -> list[mechdesign.Verdict]:
     study = study_of(text + "requirements:\n" + "".join(f"  - {{{line}}}\n" for line in requirements))
-    return list(mechdesign.requirements(study, kinematics(study)))
+    return list(mechdesign.requirements(study, mechdesign.kinematics(study)))
 
 
 @pytest.mark.slow
 def test_a_circle_of_seven_poses_has_the_extremes_of_the_circle() -> None:
     text = FIVE_BAR + "kinematics: {path: {C: {circle: {center: [10, 150], radius: 35}, points: 7}}, outputs: [C]}\n"
-    result = kinematics(study_of(text))
+    result = mechdesign.kinematics(study_of(text))
     assert result.tables["motion"]["C.x"].min() > -22
     x, y = row(result, "C.x"), row(result, "C.y")
     assert (x["min"], x["max"], y["min"], y["max"]) == pytest.approx((-25, 45, 115, 185), rel=1e-13)
@@ -83,7 +79,7 @@ def test_a_circle_of_seven_poses_has_the_extremes_of_the_circle() -> None:
 def test_a_line_that_leaves_the_reach_between_its_poses_meets_nothing() -> None:
     # The arm reaches no nearer to its base than 100 - 80.
     text = ARM + "kinematics: {path: {P: {line: [[-100, 10], [100, 10]], points: 4}}, outputs: [P, E]}\n"
-    result = kinematics(study_of(text))
+    result = mechdesign.kinematics(study_of(text))
     assert result.tables["motion"]["valid"].all()
     assert result.tables["limits"]["P.x"] == pytest.approx([-np.sqrt(300), np.sqrt(300)])
     assert result.tables["limits"]["joint"].tolist() == ["O E P", "O E P"]
@@ -100,7 +96,9 @@ def test_a_polyline_has_its_extremes_in_its_sides_and_at_its_corners() -> None:
     # The side from (-90, 40) to (90, 40) passes (0, 40), the nearest to the base.
     path = "{through: [[-90, 40], [90, 40], [90, 100]]}"
     measures = "  measures: {reach: {distance: [O, P]}}\n"
-    result = kinematics(study_of(ARM + measures + f"kinematics: {{path: {{P: {path}}}, outputs: [reach]}}\n"))
+    result = mechdesign.kinematics(
+        study_of(ARM + measures + f"kinematics: {{path: {{P: {path}}}, outputs: [reach]}}\n")
+    )
     reach = row(result, "reach")
     assert (reach["min"], reach["max"]) == pytest.approx((40, np.hypot(90, 100)), rel=1e-12)
 
@@ -121,7 +119,7 @@ def test_a_design_that_does_not_assemble_in_between_is_not_the_best() -> None:
 def test_an_angle_of_an_expression_goes_on_without_a_jump() -> None:
     # D sees B, and so does the rocker; the angle passes half a turn in its mirror image.
     measures = '  measures: {behind: "atan2(-(B.y - D.y), D.x - B.x)", rest: "B.y - D.y"}\n'
-    result = kinematics(study_of(four_bar("[rocker.angle, behind]", measures)))
+    result = mechdesign.kinematics(study_of(four_bar("[rocker.angle, behind]", measures)))
     rocker, behind = row(result, "rocker.angle"), row(result, "behind")
     assert behind["range"] == pytest.approx(rocker["range"], rel=1e-10)
     table = result.tables["extremes"]
@@ -137,16 +135,16 @@ mechanism:
   measures: {mesh: crank2.angle + 2*crank.angle}
   sketch: {A: [50, 0], B: [240, 0]}
 """
-    both = kinematics(
+    both = mechdesign.kinematics(
         study_of(text.replace("DRIVE", "crank2") + "kinematics: {poses: [{crank: 210, crank2: -150}], outputs: [B]}\n")
     )
-    mesh = kinematics(
+    mesh = mechdesign.kinematics(
         study_of(text.replace("DRIVE", "crank2") + "kinematics: {poses: [{crank: 210, mesh: 270}], outputs: [B]}\n")
     )
     for name in ("B.x", "B.y"):
         assert mesh.tables["motion"][name] == pytest.approx(both.tables["motion"][name])
     sweep = "kinematics: {sweep: {crank: {from: 0, to: 360, step: 20}, mesh: 270}, outputs: [B, crank2.angle]}\n"
-    turn = kinematics(study_of(text.replace("DRIVE", "crank2") + sweep)).tables["motion"]
+    turn = mechdesign.kinematics(study_of(text.replace("DRIVE", "crank2") + sweep)).tables["motion"]
     assert turn["valid"].all()
     wanted = np.radians(270 - 2 * turn["crank"])
     assert turn["B.x"] == pytest.approx(200 + 40 * np.cos(wanted))
@@ -174,14 +172,14 @@ def test_a_verdict_on_a_motion_says_nothing_of_poses() -> None:
 def test_a_goal_of_magnitudes_does_not_take_the_least_signed() -> None:
     # The drive's moment is -10 N P.x: of the shortest crank the least in magnitude, of the longest the lowest.
     study = study_of(LOADED.replace("GOAL", "{result: kinematics.crank_effort, abs: true}"))
-    assert (kinematics(study).tables["motion"]["crank_effort"] < 0).all()
+    assert (mechdesign.kinematics(study).tables["motion"]["crank_effort"] < 0).all()
     signed = study_of(LOADED.replace("GOAL", "kinematics.crank_effort"))
     assert [mechdesign.optimize(each).tables["optimum"]["a"][0] for each in (study, signed)] == [10, 50]
 
 
 def test_numbers_without_poses_take_no_word_for_poses_that_are_missing() -> None:
     text = LOADED.replace("GOAL", "{result: a, unassembled: allowed}")
-    with pytest.raises(StudyError, match="'a' is of no poses that could be missing"):
+    with pytest.raises(mechdesign.StudyError, match="'a' is of no poses that could be missing"):
         study_of(text)
 
 
@@ -194,7 +192,7 @@ def test_designs_that_tie_are_no_optimum_without_a_word() -> None:
 
 def test_rates_at_a_corner_are_those_behind_it_and_a_warning_says_so() -> None:
     path = "{path: {P: {through: [[-90, 40], [0, 40], [90, 40], [90, 100]]}}, speed: 50, outputs: [P]}"
-    result = kinematics(study_of(ARM + f"kinematics: {path}\n"))
+    result = mechdesign.kinematics(study_of(ARM + f"kinematics: {path}\n"))
     motion = result.tables["motion"]
     assert motion["P.x_velocity"] == pytest.approx([50, 50, 0, 0], abs=1e-9)
     assert motion["P.y_velocity"] == pytest.approx([0, 0, 50, 50], abs=1e-9)
@@ -223,7 +221,7 @@ def circle_of_reach() -> np.ndarray:
 
 
 def test_a_circle_beyond_the_inner_reach_is_followed_to_its_dead_centres() -> None:
-    result = kinematics(study_of(REACH + f"kinematics: {SMALL_CIRCLE}\n"))
+    result = mechdesign.kinematics(study_of(REACH + f"kinematics: {SMALL_CIRCLE}\n"))
     joints = circle_of_reach()
     for output, values in (("J.x", joints.real), ("J.y", joints.imag)):
         extremes = row(result, output)
@@ -233,7 +231,7 @@ def test_a_circle_beyond_the_inner_reach_is_followed_to_its_dead_centres() -> No
 
 def test_a_limit_behind_a_dead_centre_ends_the_motion_there() -> None:
     limited = REACH + "  measures: {x: J.x}\n  limits: [{measure: x, max: 60}]\n"
-    result = kinematics(study_of(limited + f"kinematics: {SMALL_CIRCLE}\n"))
+    result = mechdesign.kinematics(study_of(limited + f"kinematics: {SMALL_CIRCLE}\n"))
     assert result.tables["limits"]["kind"].tolist() == ["dead centre", "limit"]
     assert row(result, "J.x")["max"] == pytest.approx(60, rel=1e-12)
 
@@ -267,7 +265,7 @@ kinematics: {sweep: {theta: {from: -100, to: 260, step: 20}}, outputs: [B.x]}
 """
     (verdict,) = judged(text, "result: kinematics.B.x, at_most: 130.001")
     assert verdict.met
-    assert not len(kinematics(study_of(text)).tables["limits"])
+    assert not len(mechdesign.kinematics(study_of(text)).tables["limits"])
 
 
 @pytest.mark.nightly
@@ -286,4 +284,4 @@ kinematics:
     ):
         assert not verdict.met
         assert verdict.worst == np.inf
-    assert not any("corners" in words for words in map(str, kinematics(study_of(text)).warnings))
+    assert not any("corners" in words for words in map(str, mechdesign.kinematics(study_of(text)).warnings))

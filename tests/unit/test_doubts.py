@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FOUR_BAR = """
@@ -125,13 +124,13 @@ def test_a_tolerance_that_is_larger_than_its_length(dimensions, keys):
 def test_a_drive_that_is_named_after_the_ground():
     ((key, _),) = doubts(("{theta: {angle: crank}}", "{Ground: {angle: crank}}"), ("{theta:", "{Ground:"))
     assert key == "mechanism.drives.Ground"
-    with pytest.raises(StudyError, match="the ground never moves"):
+    with pytest.raises(mechdesign.StudyError, match="the ground never moves"):
         doubts(("{theta: {angle: crank}}", "[ground]"))
 
 
 @pytest.mark.parametrize(("old", "new"), [("r: 0.1", "r: 1 %"), ("number: 7}", "number: 7%}"), ("r: 30", "r: 30%")])
 def test_per_cent_is_no_unit(old, new):
-    with pytest.raises(StudyError, match="is in per cent"):
+    with pytest.raises(mechdesign.StudyError, match="is in per cent"):
         doubts((old, new))
 
 
@@ -162,7 +161,7 @@ mechanism:
 def test_a_planet_that_needs_two_pitch_radii_is_refused_with_both() -> None:
     """The planet's radius is e zp/(zs + zp) at its sun and e zp/(zr - zp) at its ring, e the distance of the axes."""
     for sun, planet, ring in ((20, 30, 70), (24, 18, 50)):
-        with pytest.raises(StudyError) as refused:
+        with pytest.raises(mechdesign.StudyError) as refused:
             mechdesign.load(text=PLANETARY.format(sun=sun, planet=planet, ring=ring, wheels=""))
         apart = (sun + planet) / 2
         for number in (apart * planet / (sun + planet), apart * planet / (ring - planet), apart):

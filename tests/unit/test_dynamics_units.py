@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Table
+import mechdesign
 
 # A unit in SI, by what it measures.
 SI = {
@@ -87,7 +86,7 @@ dynamics:
     - {{between: [A, D], force: {told(7.0, "N", force=1)}}}
 """
 
-    def si(self, table: Table) -> dict[str, np.ndarray]:
+    def si(self, table: mechdesign.Table) -> dict[str, np.ndarray]:
         """The columns of a table in SI."""
         values = {}
         for column in table.columns:
@@ -103,8 +102,8 @@ dynamics:
 @pytest.mark.parametrize("names", SYSTEMS[1:], ids="-".join)
 def test_units_do_not_change_forces(names: tuple[str, ...], plain: bool) -> None:
     reference, system = System(*SYSTEMS[0]), System(*names)
-    expected = dynamics(study_of(reference.text(plain=True)))
-    result = dynamics(study_of(system.text(plain=plain)))
+    expected = mechdesign.dynamics(study_of(reference.text(plain=True)))
+    result = mechdesign.dynamics(study_of(system.text(plain=plain)))
     for name in ("dynamics", "joint_forces"):
         one, other = reference.si(expected.tables[name]), system.si(result.tables[name])
         assert one.keys() == other.keys()

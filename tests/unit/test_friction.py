@@ -6,7 +6,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 CRANK = """
 mechanism:
@@ -41,7 +40,7 @@ dynamics: {poses: [{crank: 40}], loads: [{at: Y, force: [-100, 0]}]}
     (YOKE, "{slot: {coefficient: 0.1, length: 5}}", "the pin in a slot bears no moment"),
 ])  # fmt: skip
 def test_a_mistake_is_said_with_its_cure(text: str, friction: str, message: str) -> None:
-    with pytest.raises(StudyError) as error:
+    with pytest.raises(mechdesign.StudyError) as error:
         study_of(text, f"mechanism.friction={friction}")
     assert message in str(error.value)
 
@@ -72,7 +71,7 @@ mechanism:
   friction: {face: {coefficient: 0.1, length: 5}}
 dynamics: {poses: [{push: 10}], loads: [{at: R, force: [0, -100]}]}
 """
-    with pytest.raises(StudyError) as error:
+    with pytest.raises(mechdesign.StudyError) as error:
         study_of(text)
     assert "equilibrium leaves open which moment 'face' bears" in str(error.value)
 

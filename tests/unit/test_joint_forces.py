@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result
+import mechdesign
 
 CLAMPS = {
     "first": "{fixed: [arm, middle], point: P, angle: 0}",
@@ -32,7 +31,7 @@ dynamics: {gravity: [0, -10], poses: [{arm: 0}], loads: [{at: P, force: [0, -5]}
 """
 
 
-def borne(result: Result, joint: str, on: str) -> list[float]:
+def borne(result: mechdesign.Answer, joint: str, on: str) -> list[float]:
     """What a joint does to a link: fx, fy and moment, at the first pose."""
     table = result.tables["joint_forces"]
     (row,) = [k for k in range(len(table)) if table["joint"][k] == joint and on in (table["on"][k], table["by"][k])]
@@ -42,7 +41,7 @@ def borne(result: Result, joint: str, on: str) -> list[float]:
 
 @pytest.mark.parametrize("order", list(itertools.permutations(CLAMPS)), ids="-".join)
 def test_each_clamp_in_a_row_bears_what_hangs_on_it(order: tuple[str, ...]) -> None:
-    result = dynamics(study_of(CLAMPED % ", ".join(f"{name}: {CLAMPS[name]}" for name in order)))
+    result = mechdesign.dynamics(study_of(CLAMPED % ", ".join(f"{name}: {CLAMPS[name]}" for name in order)))
     # tip's y axis points along -x at arm 0, and last along x.
     assert borne(result, "third", "last") == pytest.approx([0, 40, 3 * 40 - 7])
     assert borne(result, "second", "tip") == pytest.approx([0, 70, -30 + 113])
@@ -55,7 +54,7 @@ def test_a_clamp_is_seen_from_either_link() -> None:
     turned = dict(
         CLAMPS, first="{fixed: [middle, arm], point: P, angle: 0}", third="{fixed: [last, tip], point: P, angle: 90}"
     )
-    result = dynamics(study_of(CLAMPED % ", ".join(f"{name}: {text}" for name, text in turned.items())))
+    result = mechdesign.dynamics(study_of(CLAMPED % ", ".join(f"{name}: {text}" for name, text in turned.items())))
     assert borne(result, "third", "last") == pytest.approx([0, 40, 113])
     assert borne(result, "second", "tip") == pytest.approx([0, 70, 83])
     # The load on the pin acts on the first link that hangs on no other there, now on this.
@@ -80,7 +79,7 @@ dynamics: {poses: [{push: 1}], loads: [{at: D, force: [0, -60]}]}
 
 
 def test_moments_in_a_ring_of_slides_stay_open_and_forces_do_not() -> None:
-    result = dynamics(study_of(WEDGE))
+    result = mechdesign.dynamics(study_of(WEDGE))
     assert result.main["push_effort"] == pytest.approx([-60 * np.tan(np.radians(30))])
     for joint, on, force in (("face", "punch", (-60 * np.tan(np.radians(30)), 60)), ("guide", "punch", (34.641016, 0))):
         fx, fy, moment = borne(result, joint, on)
@@ -93,7 +92,7 @@ def test_moments_in_a_ring_of_slides_stay_open_and_forces_do_not() -> None:
 @pytest.mark.parametrize(("end", "on_rod"), [("B", 0.0), ("rod.B", 8.0), ("rocker.B", 0.0)])
 def test_a_load_at_a_pin_is_on_it_or_on_one_link(end: str, on_rod: float) -> None:
     """Whatever it acts on, the links without mass are bars: what the pin does to each makes up for the load."""
-    result = dynamics(
+    result = mechdesign.dynamics(
         study_of(f"""
 mechanism:
   links: {{ground: {{O: [0, 0], D: [40, 0]}}, crank: [O, A, 10], rod: [A, B, 30], rocker: [D, B, 25]}}

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import AssemblyError
-from mechdesign.questions.kinematics.analysis import kinematics
+import mechdesign
 
 SLIDER_CRANK = """
 mechanism:
@@ -44,7 +43,7 @@ kinematics:
 
 def test_slider_crank_agrees_with_its_textbook_solution() -> None:
     # r = 1, l = 3 at 15 deg and 1 rad/s.
-    table = kinematics(study_of(SLIDER_CRANK)).tables["motion"]
+    table = mechdesign.kinematics(study_of(SLIDER_CRANK)).tables["motion"]
     row = int(np.flatnonzero(table["theta"] == 15)[0])
     assert table["B.x"][row] == pytest.approx(3.954740, abs=5e-7)
     assert table["B.x_velocity"][row] == pytest.approx(-0.342464, abs=5e-7)
@@ -52,19 +51,19 @@ def test_slider_crank_agrees_with_its_textbook_solution() -> None:
 
 
 def test_effort_balances_the_load_by_virtual_work() -> None:
-    table = kinematics(study_of(SLIDER_CRANK)).tables["motion"]
+    table = mechdesign.kinematics(study_of(SLIDER_CRANK)).tables["motion"]
     # Power in equals power out: effort * 1 rad/s + force * velocity = 0.
     assert table["theta_effort"] == pytest.approx(7 * table["B.x_velocity"], abs=1e-12)
 
 
 def test_crank_angle_is_continuous_over_turns() -> None:
     study = study_of(SLIDER_CRANK, "kinematics.sweep.theta.to=1080", "kinematics.outputs=[crank.angle]")
-    table = kinematics(study).tables["motion"]
+    table = mechdesign.kinematics(study).tables["motion"]
     assert table["crank.angle"] == pytest.approx(table["theta"], abs=1e-9)
 
 
 def test_extremes_are_the_stroke() -> None:
-    table = kinematics(study_of(SLIDER_CRANK)).tables["extremes"]
+    table = mechdesign.kinematics(study_of(SLIDER_CRANK)).tables["extremes"]
     stroke = table["output"] == "B.x"
     assert table["range"][stroke] == pytest.approx(2)
     assert table["min_at"][stroke] == 180
@@ -83,7 +82,7 @@ mechanism:
 kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
 """
     )
-    result = kinematics(study)
+    result = mechdesign.kinematics(study)
     assert result.tables["motion"].names == ("theta", "B.x", "B.y", "conditioning", "valid")
     table = result.tables["extremes"]
     far, near = np.sqrt(160**2 - 20**2), np.sqrt(80**2 - 20**2)
@@ -103,7 +102,9 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
 @pytest.mark.parametrize("sweep", ["P.x: {from: -14, to: 14, step: STEP}", "t1: {from: 10, to: 80, step: STEP}"])
 def test_extremes_of_an_inverse_motion_lie_between_its_poses(sweep: str) -> None:
     coarse, fine = (
-        kinematics(study_of(ARM, f"kinematics={{sweep: {{{sweep.replace('STEP', step)}, P.y: 8}}, outputs: [E, P]}}"))
+        mechdesign.kinematics(
+            study_of(ARM, f"kinematics={{sweep: {{{sweep.replace('STEP', step)}, P.y: 8}}, outputs: [E, P]}}")
+        )
         for step in ("3.5", "0.002")
     )
     table, motion = coarse.tables["extremes"], coarse.tables["motion"]
@@ -114,7 +115,7 @@ def test_extremes_of_an_inverse_motion_lie_between_its_poses(sweep: str) -> None
 
 
 def test_limits_of_motion_are_found_to_the_last_digits() -> None:
-    result = kinematics(study_of(LINKAGE))
+    result = mechdesign.kinematics(study_of(LINKAGE))
     limits = result.tables["limits"]
     # The rocker's triangle is stretched where the distance of A and D is 6.5.
     exact = np.degrees(np.arccos((3**2 + 4**2 - 6.5**2) / (2 * 3 * 4)))
@@ -133,7 +134,7 @@ def test_stated_limits_end_the_motion_too() -> None:
     study = study_of(
         LINKAGE.replace("kinematics:", "  limits: [{angle: [ground, rocker], max: 100, min: 10}]\nkinematics:")
     )
-    limits = kinematics(study).tables["limits"]
+    limits = mechdesign.kinematics(study).tables["limits"]
     assert "limit" in list(limits["kind"])
     at = limits["q"][list(limits["kind"]).index("limit")]
     angle = study.mechanism.solve({"q": at})["rocker.angle"]
@@ -141,7 +142,7 @@ def test_stated_limits_end_the_motion_too() -> None:
 
 
 def test_jacobian_of_an_arm() -> None:
-    table = kinematics(study_of(ARM)).tables["motion"]
+    table = mechdesign.kinematics(study_of(ARM)).tables["motion"]
     t1, t2 = np.radians(table["t1"]), np.radians(table["t2"])
     assert table["det_J"] == pytest.approx(80 * np.sin(t2 - t1))
     columns = np.array([[-10 * np.sin(t1), -8 * np.sin(t2)], [10 * np.cos(t1), 8 * np.cos(t2)]])
@@ -152,27 +153,27 @@ def test_jacobian_of_an_arm() -> None:
 
 def test_a_jacobian_that_mixes_units_needs_a_length() -> None:
     mixed = ("kinematics.outputs=[P.x, forearm.angle]",)
-    result = kinematics(study_of(ARM, *mixed))
+    result = mechdesign.kinematics(study_of(ARM, *mixed))
     assert np.isnan(result.tables["motion"]["inverse_condition"]).all()
     assert any("characteristic_length" in warning for warning in map(str, result.warnings))
-    given = kinematics(study_of(ARM, *mixed, "kinematics.characteristic_length=9"))
+    given = mechdesign.kinematics(study_of(ARM, *mixed, "kinematics.characteristic_length=9"))
     assert np.isfinite(given.tables["motion"]["inverse_condition"]).all()
     assert not given.warnings
 
 
 def test_a_listed_pose_that_fails_is_named_after_the_others_are_solved() -> None:
-    result = kinematics(study_of(ARM, "kinematics.poses=[{t1: 30, t2: 60}, {P.x: 30, P.y: 12}]"))
+    result = mechdesign.kinematics(study_of(ARM, "kinematics.poses=[{t1: 30, t2: 60}, {P.x: 30, P.y: 12}]"))
     assert "P.x = 30" in result.failed
     assert list(result.tables["motion"]["valid"]) == [True, False]
-    with pytest.raises(AssemblyError, match="no pose is valid"):
-        kinematics(study_of(ARM, "kinematics.poses=[{P.x: 30, P.y: 12}]"))
+    with pytest.raises(mechdesign.AssemblyError, match="no pose is valid"):
+        mechdesign.kinematics(study_of(ARM, "kinematics.poses=[{P.x: 30, P.y: 12}]"))
 
 
 def test_the_pose_that_was_asked_for_stands_in_its_row() -> None:
     study = study_of(
         ARM, "kinematics.poses=[{P.x: 30, P.y: 12}, {P.x: 3, P.y: 12}]", "kinematics.outputs=[forearm.angle]"
     )
-    table = kinematics(study).tables["motion"]
+    table = mechdesign.kinematics(study).tables["motion"]
     assert table["P.x"].tolist() == [30, 3]
     assert np.isnan(table["forearm.angle"][0])
 
@@ -189,9 +190,9 @@ mechanism:
 kinematics: {sweep: {crank: {from: 0, to: 360, step: 5}}, outputs: [B.x]}
 """
     )
-    result = kinematics(study)
+    result = mechdesign.kinematics(study)
     assert [*map(str, result.warnings)] == ["3 poses are at a dead centre: B.x stands still there, and det_J is 0"]
     assert result.tables["motion"].column("det_J").unit == "mm"
-    angle = kinematics(study_of(study.text.decode(), "kinematics.outputs=[rod.angle]"))
+    angle = mechdesign.kinematics(study_of(study.text.decode(), "kinematics.outputs=[rod.angle]"))
     assert [*map(str, angle.warnings)] == ["2 poses are at a dead centre: rod.angle stands still there, and det_J is 0"]
     assert angle.tables["motion"].column("det_J").unit == ""

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import quad
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 FOUR_BAR = """
 units: {length: m}
@@ -99,7 +98,7 @@ def test_a_bar_follows_the_length_of_its_link() -> None:
 def test_a_rod_between_three_joints_is_refused() -> None:
     text = FOUR_BAR.replace(" POINTS", ", inertia: rod, points: {C: [0.05, 0.05]}")
     text = text.replace("D: [0.1, 0]}", "D: [0.1, 0]}\n    other: [C, E, 0.05]")
-    with pytest.raises(StudyError, match="a rod runs between two joints, and 'rod' has 3"):
+    with pytest.raises(mechdesign.StudyError, match="a rod runs between two joints, and 'rod' has 3"):
         mechdesign.load(text=text)
 
 

@@ -10,7 +10,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 SLIDER_CRANK = """
 mechanism:
@@ -87,5 +86,5 @@ def test_the_table_of_extremes_says_what_its_means_are_over() -> None:
 
 def test_means_over_time_need_velocities() -> None:
     text = SLIDER_CRANK % {"command": "kinematics", "swept": "C.x: {from: 70, to: 110, step: 5}", "more": "means: time"}
-    with pytest.raises(StudyError, match="means over time need velocities"):
+    with pytest.raises(mechdesign.StudyError, match="means over time need velocities"):
         mechdesign.load(text=text.replace("rates: {theta: -50}", "outputs: [C]"))

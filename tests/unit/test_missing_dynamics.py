@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 ARM = """
 mechanism:
@@ -46,7 +45,7 @@ def test_an_empty_section_gives_the_same_numbers():
 
 
 def test_where_nothing_acts_it_says_what_to_write():
-    with pytest.raises(StudyError, match=r"dynamics: is missing.*gravity: \[0, -9\.81 m/s\^2\]"):
+    with pytest.raises(mechdesign.StudyError, match=r"dynamics: is missing.*gravity: \[0, -9\.81 m/s\^2\]"):
         mechdesign.dynamics(study())
 
 

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.results import Table
+import mechdesign
 
 
-def limits(text: str, *overrides: str) -> Table:
-    return kinematics(study_of(text, *overrides)).tables["limits"]
+def limits(text: str, *overrides: str) -> mechdesign.Table:
+    return mechdesign.kinematics(study_of(text, *overrides)).tables["limits"]
 
 
 def warnings(text: str, *overrides: str) -> list[str]:
-    return [*map(str, kinematics(study_of(text, *overrides)).warnings)]
+    return [*map(str, mechdesign.kinematics(study_of(text, *overrides)).warnings)]
 
 
 def four_bar(a: float, b: float, c: float, d: float, sketch: str) -> str:
@@ -181,7 +180,7 @@ kinematics: {sweep: {leg: {from: -1, to: 4, step: 0.3}}, outputs: [B]}
 @pytest.mark.slow
 def test_slides_that_become_parallel_are_a_singularity() -> None:
     # A pin in a fixed slot y = 2 and in a slot along a lever: x = 2/tan(lever) is infinite at 180 deg.
-    result = kinematics(
+    result = mechdesign.kinematics(
         study_of("""
 mechanism:
   links: {ground: {O: [0, 0], G: [0, 2]}, pin: {Q: [0, 0], R: [1, 0]}, lever: [O, A, 1]}
@@ -268,7 +267,7 @@ kinematics: {{sweep: {{crank: {{from: 1, to: 361, step: 10}}}}, outputs: [F]}}
     fine = np.arange(100, 36101) / 100
     valid = study.mechanism.forward.solve([np.radians(fine)]).valid
     changes = np.flatnonzero(valid[1:] != valid[:-1])
-    found = kinematics(study).tables["limits"]["crank"]
+    found = mechdesign.kinematics(study).tables["limits"]["crank"]
     assert found == pytest.approx((fine[changes] + fine[changes + 1]) / 2, abs=0.0051)
 
 

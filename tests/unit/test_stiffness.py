@@ -122,7 +122,7 @@ def test_result_does_not_depend_on_jobs_or_chunks(monkeypatch: pytest.MonkeyPatc
     ("text", "said"),
     [
         (FIVE_BAR.split("stiffness:")[0], "stiffness: is missing: say which point"),
-        (FIVE_BAR.replace("at: P", "at: O1"), "^study.yaml:13:7: stiffness.at: point 'O1' belongs to the ground"),
+        (FIVE_BAR.replace("at: P", "at: O1"), "^<study>:13:7: stiffness.at: point 'O1' belongs to the ground"),
     ],
 )
 def test_what_has_no_stiffness_is_told(text: str, said: str) -> None:

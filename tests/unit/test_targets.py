@@ -243,7 +243,7 @@ def test_wrong_targets(targets: str, message: str) -> None:
     with pytest.raises(StudyError) as caught:
         study_of(FOUR_BAR.replace("TARGETS", targets))
     assert message in str(caught.value)
-    assert str(caught.value).startswith("study.yaml:11:")
+    assert str(caught.value).startswith("<study>:11:")
 
 
 def test_every_wrong_target_is_told_beside_other_mistakes() -> None:
