@@ -9,7 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.variables import grid
@@ -44,7 +43,7 @@ def test_grid_by_number() -> None:
 
 def test_an_empty_grid_says_so() -> None:
     study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_a.from=9"])
-    with pytest.raises(StudyError, match=r"optimize.variables.l_a: no value lies"):
+    with pytest.raises(mechdesign.StudyError, match=r"optimize.variables.l_a: no value lies"):
         mechdesign.optimize(study)
 
 
@@ -100,7 +99,7 @@ def test_conditions_leave_designs_out_and_are_counted() -> None:
 
 @pytest.mark.slow
 def test_no_feasible_design_says_why() -> None:
-    with pytest.raises(AssemblyError, match=r"not workspace\.area at least 1000"):
+    with pytest.raises(mechdesign.AssemblyError, match=r"not workspace\.area at least 1000"):
         rrr("optimize.subject_to=[{result: workspace.area, at_least: 1000}]")
 
 
@@ -143,7 +142,7 @@ def test_goals_of_other_questions() -> None:
 
 def test_a_goal_that_no_result_has() -> None:
     changes = "optimize={variables: {r1: {from: 9, to: 11, step: 1}}, maximize: [kinematics.Q.x]}"
-    with pytest.raises(StudyError, match=r"Q\.x"):
+    with pytest.raises(mechdesign.StudyError, match=r"Q\.x"):
         mechdesign.optimize(mechdesign.load(CONFIGS / "two_link_arm.yaml", [changes]))
 
 
@@ -181,7 +180,7 @@ PLATFORM = (
 
 @pytest.mark.slow
 def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         study_of(FOUR_BAR.replace("r: 30", "r: 60"))
     designs = mechdesign.optimize(study_of(FOUR_BAR)).tables["designs"]
     alone = mechdesign.kinematics(study_of(FOUR_BAR, "mechanism.parameters.r=60"))
@@ -197,7 +196,7 @@ def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_th
     asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}
     there = drawn.mechanism.solve(asked, short)
     drives = ", ".join(f"{name}: {float(there[name])!r}" for name in drawn.mechanism.drives)
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", [*PLATFORM, "mechanism.parameters.crank=80"])
     by_drives, by_pose = (
         mechdesign.optimize(

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 FIVE_BAR = """
 mechanism:
@@ -69,13 +68,13 @@ def test_a_sketch_that_is_changed_itself_chooses():
     lower = ["mechanism.links.rocker.2=65", "mechanism.sketch.B=[75, -55]"]
     study = mechdesign.load(text=FOUR_BAR, overrides=lower)
     assert mechdesign.kinematics(study).main["B.y"][0] < 0
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         mechdesign.load(text=FOUR_BAR, overrides=["mechanism.links.rocker.2=5", "mechanism.sketch.B=[75, -55]"])
 
 
 def test_a_file_that_needs_its_override_is_read_with_it():
     text = FOUR_BAR.replace("rod: [A, B, 90]", "rod: [A, B, 9]")
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         mechdesign.load(text=text)
     study = mechdesign.load(text=text, overrides=["mechanism.links.rod.2=90"])
     assert mechdesign.kinematics(study).main["valid"].all()

@@ -16,8 +16,6 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.results import Result
 
 SLIDER_CRANK = """
 mechanism:
@@ -126,21 +124,21 @@ stiffness: {link: boom, at: T, bearings: {O: 3000, M: 400}, actuators: {leg: 200
 }  # fmt: skip
 
 
-def reliability(text: str, outputs: list[str], *overrides: str) -> Result:
+def reliability(text: str, outputs: list[str], *overrides: str) -> mechdesign.Answer:
     poses = study_of(text).resolved["stiffness"]["poses"]
     section = {"poses": poses, "dimensions": {"load.fx": 1.0}, "load": [*FORCE, 0.0], "outputs": outputs,
                "methods": ["analytic"]}  # fmt: skip
     return mechdesign.reliability(study_of(text, f"reliability={section}", *overrides))
 
 
-def shift(result: Result) -> dict[str, float]:
+def shift(result: mechdesign.Answer) -> dict[str, float]:
     """Mean error of each output, to the first order."""
     table = result.tables["moments"]
     errors = (table["mean"] - table["nominal"]).tolist()
     return dict(zip(map(str, table["output"]), errors, strict=True))
 
 
-def midway(result: Result) -> list[str]:
+def midway(result: mechdesign.Answer) -> list[str]:
     return [text for text in map(str, result.warnings) if "is midway" in text]
 
 
@@ -300,7 +298,7 @@ def test_the_asked_pin_is_that_of_the_stiffness_section() -> None:
     (["reliability.limits={rod.B.x: 1, slider.B.x: 1}", "stiffness.bearings={}"], "limited twice"),
 ])  # fmt: skip
 def test_what_cannot_be_meant_is_refused(changes: list[str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(SLIDER_CRANK, *changes)
 
 
@@ -366,7 +364,7 @@ def test_a_pin_with_a_clearance_has_the_same_two_ends(outputs: str) -> None:
 @pytest.mark.parametrize("outputs", ["rod.B.x, slider_end", "rod_end, slider_end", "both"])
 def test_measures_of_two_ends_of_a_clearance_are_refused(outputs: str) -> None:
     more = "mechanism.measures.both=slider.B.x - rod.B.x"
-    with pytest.raises(StudyError, match="all outputs and limits mean one of them"):
+    with pytest.raises(mechdesign.StudyError, match="all outputs and limits mean one of them"):
         study_of(SLIDER_CRANK, *CLEARANCE, more, f"reliability.outputs=[{outputs}]")
 
 

@@ -11,9 +11,7 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.errors import Interrupted
 from mechdesign.questions.reliability import cycle
-from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LEVER = """
@@ -45,11 +43,11 @@ reliability:
 """
 
 
-def ask(text: str, *changes: str, jobs: int = 1) -> Result:
+def ask(text: str, *changes: str, jobs: int = 1) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *changes), jobs=jobs)
 
 
-def row(result: Result, method: str) -> dict[str, Any]:
+def row(result: mechdesign.Answer, method: str) -> dict[str, Any]:
     table = result.tables["reliability"]
     rows = np.flatnonzero((table["scope"] == "cycle") & (table["method"] == method))
     assert len(rows) == 1
@@ -200,7 +198,7 @@ def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.Mon
         return whole(*arguments)
 
     monkeypatch.setattr(cycle, "count_chunk", chunk)
-    with pytest.raises(Interrupted) as caught:
+    with pytest.raises(mechdesign.Interrupted) as caught:
         ask(FOUR_BAR, "reliability.samples=100000")
     result = caught.value.result
     found = row(result, "monte_carlo")

@@ -12,7 +12,6 @@ from scipy.special import ndtr
 
 import mechdesign
 from mechdesign.mechanism.margins import closures
-from mechdesign.results import Result
 
 # At 180 degrees rod and rocker reach 142 over 140.
 FOUR_BAR = """
@@ -89,7 +88,7 @@ reliability:
 """
 
 
-def failures(result: Result) -> dict[str, float]:
+def failures(result: mechdesign.Answer) -> dict[str, float]:
     table = result.tables["reliability"]
     return dict(zip(table["method"].tolist(), table["failure"].tolist(), strict=True))
 

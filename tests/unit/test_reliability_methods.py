@@ -8,10 +8,8 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.errors import Interrupted, StudyError
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.region import curves
-from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 
 SLIDER_CRANK = """
@@ -57,7 +55,7 @@ LIMITS = {
     [("[]", "reliability.methods: name at least one"), ("[auto, form, auto]", "methods.2: 'auto' is given twice")],
 )
 def test_methods_are_at_least_one_and_none_twice(methods: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(SLIDER_CRANK, f"reliability.methods={methods}")
 
 
@@ -115,7 +113,7 @@ def test_a_method_takes_the_pin_model_that_it_declares(kind: str) -> None:
     assert (failures[0] != failures[1]).tolist() == [method.pin == kind for method in METHODS.values()]
 
 
-def a_few_nodes(study: Study) -> Poses:
+def a_few_nodes(study: mechdesign.Study) -> Poses:
     """Some of the nodes, at the region's edges too: all are more than a test needs."""
     whole = curves.workspace_nodes(study)
     (group,) = whole.groups
@@ -163,7 +161,7 @@ def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
         "reliability.limits={B.x: 0.6}",
         f"reliability.methods=[analytic, {method}]",
     ]
-    with pytest.raises(Interrupted) as caught:
+    with pytest.raises(mechdesign.Interrupted) as caught:
         mechdesign.reliability(study_of(SLIDER_CRANK, *changes), progress=Impatient())
     result = caught.value.result
     table = result.tables["reliability"]

@@ -9,7 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.reliability.schema.section import in_words
 
 SLIDER_CRANK = """
@@ -69,7 +68,7 @@ def test_an_output_or_a_limit_names_its_link(change: str, link: str) -> None:
     (["reliability.clearances.A={radial: 0.02, tolerance: [-0.03, 0.1]}"], "0.02 that is 0.03 smaller is negative"),
 ])  # fmt: skip
 def test_what_cannot_be_meant_is_refused(changes: list[str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(SLIDER_CRANK, *changes)
 
 
@@ -108,7 +107,7 @@ def test_a_place_and_the_parameter_that_sets_it_are_told_to_count_both() -> None
     "clearances={A: {radial: 1e14}}",
 ])  # fmt: skip
 def test_what_is_larger_than_any_mechanism_is_refused(change: str) -> None:
-    with pytest.raises(StudyError, match="more than a million"):
+    with pytest.raises(mechdesign.StudyError, match="more than a million"):
         mechdesign.reliability(study_of(SLIDER_CRANK, f"reliability.{change}"))
 
 
@@ -120,7 +119,7 @@ def test_what_is_larger_than_any_mechanism_is_refused(change: str) -> None:
     ],
 )
 def test_what_is_larger_than_any_length_is_refused_when_read(change: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(SLIDER_CRANK, f"reliability.{change}")
 
 

@@ -12,7 +12,6 @@ from scipy.special import ndtr
 import mechdesign
 from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
 from mechdesign.questions.reliability.study_sources import find_sources
-from mechdesign.results import Result
 
 LEVER = """
 mechanism:
@@ -65,11 +64,11 @@ reliability:
 """
 
 
-def ask(text: str, *changes: str, jobs: int = 1) -> Result:
+def ask(text: str, *changes: str, jobs: int = 1) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *changes), jobs=jobs)
 
 
-def moment(result: Result, method: str, name: str, order: str = "position") -> float:
+def moment(result: mechdesign.Answer, method: str, name: str, order: str = "position") -> float:
     table = result.tables["moments"]
     (found,) = table[name][(table["method"] == method) & (table["order"] == order)]
     return float(found)

@@ -10,7 +10,6 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.questions.reliability.engine.problem import binomial
-from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # At 90 deg the rod is 101 +- 3 against a crank of 100: one in six cannot be assembled.
@@ -34,7 +33,7 @@ reliability:
 """
 
 
-def ask(*changes: str) -> Result:
+def ask(*changes: str) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(FOLD, *changes))
 
 

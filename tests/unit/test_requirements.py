@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import Problem, StudyError
-from mechdesign.results import Column, Result, Table
+from mechdesign.errors import Problem
 
 
 @dataclass(frozen=True)
@@ -23,9 +22,13 @@ class Request:
 
 def result(**columns):
     columns = {"theta": [0.0, 90.0, 180.0]} | columns
-    first = Table("motion", tuple(Column(name, np.asarray(values)) for name, values in columns.items()))
-    second = Table("extremes", (Column("output", np.array(["B.x"])), Column("range", np.array([80.0]))))
-    return Result("kinematics", {"motion": first, "extremes": second})
+    first = mechdesign.Table(
+        "motion", tuple(mechdesign.Column(name, np.asarray(values)) for name, values in columns.items())
+    )
+    second = mechdesign.Table(
+        "extremes", (mechdesign.Column("output", np.array(["B.x"])), mechdesign.Column("range", np.array([80.0])))
+    )
+    return mechdesign.Answer("kinematics", {"motion": first, "extremes": second})
 
 
 def judge(answer, asked):
@@ -93,23 +96,28 @@ def test_where_chooses_rows_by_number_and_word(where, worst):
 )
 def test_rows_that_never_are_are_mistakes_of_the_study(where, told):
     columns = {"kind": ["first_order", "first_order", "monte_carlo"], "none": [np.nan] * 3}
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         verdict(Request("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], **columns)
     assert told in str(caught.value)
     assert "requirements.0" in str(caught.value)
 
 
 def test_the_nearest_of_many_rows_is_told():
-    given = Table("motion", (Column("theta", np.linspace(0, 360, 73)), Column("mu", np.ones(73))))
-    with pytest.raises(StudyError, match="there are 0 to 360, 35 the nearest"):
-        judge(Result("kinematics", {"motion": given}), [Request("kinematics.mu", where={"theta": 36}, at_least=1)])
+    given = mechdesign.Table(
+        "motion", (mechdesign.Column("theta", np.linspace(0, 360, 73)), mechdesign.Column("mu", np.ones(73)))
+    )
+    with pytest.raises(mechdesign.StudyError, match="there are 0 to 360, 35 the nearest"):
+        judge(
+            mechdesign.Answer("kinematics", {"motion": given}),
+            [Request("kinematics.mu", where={"theta": 36}, at_least=1)],
+        )
 
 
 def test_no_valid_row_is_not_met():
     asked = Request("kinematics.mu", where={"valid": 1, "theta": 90}, at_least=1)
     assert not verdict(asked, mu=[50.0, np.nan, 60.0], valid=[True, False, True]).met
-    empty = Table("motion", tuple(Column(name, np.zeros(0)) for name in ("theta", "valid", "mu")))
-    assert not judge(Result("kinematics", {"motion": empty}), [asked])[0].met
+    empty = mechdesign.Table("motion", tuple(mechdesign.Column(name, np.zeros(0)) for name in ("theta", "valid", "mu")))
+    assert not judge(mechdesign.Answer("kinematics", {"motion": empty}), [asked])[0].met
 
 
 def test_columns_of_other_tables_and_names_with_dots():
@@ -124,7 +132,7 @@ def test_other_commands_are_left_alone():
 
 def test_unknown_columns_are_mistakes_of_the_study_all_in_one_go():
     asked = [Request("kinematics.muu", at_least=1), Request("kinematics.output", at_least=1)]
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         judge(result(mu=[1.0, 2.0, 3.0]), asked)
     lines = str(caught.value).splitlines()
     assert "requirements.0: " in lines[0]

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
-from mechdesign.errors import StudyError
+import mechdesign
 from mechdesign.questions.reliability import laws
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.laws import (
@@ -192,9 +192,9 @@ def test_correlation_of_any_two_laws_is_what_was_asked(names: tuple[str, str]) -
 
 def test_correlations_that_no_laws_have() -> None:
     three = [Normal(-3, 3)] * 3
-    with pytest.raises(StudyError, match="contradict"):
+    with pytest.raises(mechdesign.StudyError, match="contradict"):
         Correlation.of(three, {(0, 1): 0.9, (1, 2): 0.9, (0, 2): -0.9})
-    with pytest.raises(StudyError, match=r"cannot have -0\.9, only -0\.2 to 1"):
+    with pytest.raises(mechdesign.StudyError, match=r"cannot have -0\.9, only -0\.2 to 1"):
         Correlation.of([Lognormal(-6, 6, 1), Lognormal(-6, 6, 1)], {(0, 1): -0.9})
 
 
@@ -241,5 +241,5 @@ def test_measured_samples_with_outliers_are_drawn_with_the_correlation_asked(
 def test_what_a_measured_sample_cannot_reach_is_refused_with_its_range() -> None:
     """Uniform shares against one jump: at most sqrt(12 p (1 - p)/4) for a jump at the share p."""
     law = two_values(90, 10)
-    with pytest.raises(StudyError, match=r"cannot have 0.7, only -0.52.* to 0.52"):
+    with pytest.raises(mechdesign.StudyError, match=r"cannot have 0.7, only -0.52.* to 0.52"):
         Correlation.of([law, Uniform(0.0, 1.0)], {(0, 1): 0.7})

@@ -5,7 +5,6 @@ import pytest
 from helpers.pages import faults
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
@@ -176,7 +175,7 @@ def test_warnings_of_the_cases_are_told():
     ],
 )
 def test_mistakes_are_told_before_anything_is_computed(change, message):
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         mechdesign.sensitivities(mechdesign.load(text=SLIDER, overrides=[change]))
 
 

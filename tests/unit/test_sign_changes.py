@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from mechdesign.expressions import Expression
-from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 
 
 def resolved(*functions: str, ends: tuple[float, ...] = (0.0, 1.0)) -> Resolved:
     parsed = [Expression.parse(function) for function in functions]
 
-    def look(places: Floats) -> Floats:
+    def look(places: np.ndarray) -> np.ndarray:
         return np.array([np.broadcast_to(one.evaluate({"x": places}), places.shape) for one in parsed])
 
     return Resolved.of(look, np.array(ends), np.zeros(len(parsed)))

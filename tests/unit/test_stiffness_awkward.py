@@ -10,11 +10,10 @@ from helpers.stiffness import ARM, AXIAL, BENDING, FIVE_BAR, METRES, ask_stiffne
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.errors import StudyError
+import mechdesign
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.questions.stiffness.body import ask
 from mechdesign.questions.stiffness.force_method import load, twists_of
-from mechdesign.results import Result
 
 BEAM = "sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}"
 
@@ -25,11 +24,11 @@ def by_elements(text: str, *overrides: str, row: int = 0) -> np.ndarray:
     return Structure(study, solved.configuration, row).compliance()
 
 
-def method(result: Result) -> str:
+def method(result: mechdesign.Answer) -> str:
     return str(result.tables["stiffness"]["method"][0])
 
 
-def free(result: Result, row: int = 0) -> list[float]:
+def free(result: mechdesign.Answer, row: int = 0) -> list[float]:
     return [float(result.tables["stiffness"][f"free_{axis}"][row]) for axis in ("x", "y", "phi")]
 
 
@@ -433,7 +432,7 @@ def test_an_arm_held_rigidly_all_along_is_rigid() -> None:
 
 @pytest.mark.parametrize("name", ["grip", "B"])
 def test_a_clamp_has_no_bearing(name: str) -> None:
-    with pytest.raises(StudyError, match=f"no pin or slide '{name}'"):
+    with pytest.raises(mechdesign.StudyError, match=f"no pin or slide '{name}'"):
         ask_stiffness(BOOM, f"stiffness.bearings={{{name}: 1e6}}")
 
 

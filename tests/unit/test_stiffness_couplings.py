@@ -11,7 +11,6 @@ from helpers.stiffness import ask_stiffness, matrix
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.study.designs import Designs
@@ -367,10 +366,10 @@ def test_mistakes_are_named() -> None:
         "{elbow: {}}": "has a 'force' stiffness or",
     }
     for gives, message in cases.items():
-        with pytest.raises(StudyError) as caught:
+        with pytest.raises(mechdesign.StudyError) as caught:
             study_of(BELT_ARM + f"  couplings: {gives}\n")
         assert message in str(caught.value)
-    with pytest.raises(StudyError, match="no pitch circles"):
+    with pytest.raises(mechdesign.StudyError, match="no pitch circles"):
         study_of(BELT_ARM.replace(", radius: 25", "") + "  couplings: {elbow: 30}\n")
-    with pytest.raises(StudyError, match=r"no angle follows, but guide\.slide"):
+    with pytest.raises(mechdesign.StudyError, match=r"no angle follows, but guide\.slide"):
         study_of(RACK.replace("{rack: 4e3 N/mm}", "{rack: {moment: 3}}"))

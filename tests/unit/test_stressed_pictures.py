@@ -13,8 +13,6 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Result
-from mechdesign.study import Study
 
 HAND = "hand_mit_schraubgreifer_für_große_kästen_und_übergrößen_links"
 ORIENTATIONS = f"""
@@ -122,7 +120,7 @@ stiffness:
 
 
 @cache
-def answered(command: str, text: str) -> tuple[Study, Result]:
+def answered(command: str, text: str) -> tuple[mechdesign.Study, mechdesign.Answer]:
     """A study and what is answered to its question."""
     study = study_of(text)
     return study, getattr(mechdesign, command)(study)

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from mechdesign.errors import StudyError
+import mechdesign
 from mechdesign.study.text.document import read
 
 
@@ -121,7 +121,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 def test_what_is_no_study_is_told_quickly(content, message):
     start = time.perf_counter()
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         read(content, "s.yaml")
     assert message in str(caught.value)
     assert time.perf_counter() - start < 5.0

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.poses import study_poses
 
 CRANK = """
@@ -101,7 +100,7 @@ def test_defaults(poses):
 
 @pytest.mark.parametrize(("text", "message"), [(ARM, "with 2 drives"), (LEG, "'leg' has no limits")])
 def test_nothing_is_assumed_without_reason(poses, text, message):
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         poses(text)
 
 
@@ -124,6 +123,6 @@ def test_nothing_is_assumed_without_reason(poses, text, message):
     ],
 )
 def test_wrong_poses(poses, section, message):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         poses(CRANK + f"kinematics: {section}")
     assert message in str(caught.value)

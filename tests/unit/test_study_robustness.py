@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.study import template
 from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
@@ -70,7 +69,7 @@ def test_damaged_studies(data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.yaml"
         path.write_text(json.dumps(study))
-        with contextlib.suppress(StudyError):
+        with contextlib.suppress(mechdesign.StudyError):
             mechdesign.load(path)
 
 
@@ -81,5 +80,5 @@ def test_half_written_studies(name, tmp_path):
     path = tmp_path / "study.yaml"
     for count in range(len(lines)):
         path.write_text("".join(lines[:count]))
-        with contextlib.suppress(StudyError):
+        with contextlib.suppress(mechdesign.StudyError):
             mechdesign.load(path)

@@ -7,7 +7,6 @@ import jsonschema
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.poses import study_poses
 from mechdesign.study import template, template_path
 from mechdesign.study.schema.study_file import schema
@@ -34,7 +33,7 @@ def test_templates_are_studies(name, validator):
 
 
 def test_unknown_template():
-    with pytest.raises(StudyError, match="no template 'five_bra'; did you mean 'five_bar'"):
+    with pytest.raises(mechdesign.StudyError, match="no template 'five_bra'; did you mean 'five_bar'"):
         template("five_bra")
 
 
@@ -64,7 +63,7 @@ def test_the_schema_accepts_the_shipped_studies(path, validator):
 def test_the_schema_refuses_what_the_loader_refuses(text, validator, tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(text)
-    with pytest.raises(StudyError):
+    with pytest.raises(mechdesign.StudyError):
         mechdesign.load(path)
     assert list(validator.iter_errors(read(text.encode(), "s").data))
 

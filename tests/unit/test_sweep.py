@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import Interrupted, StudyError
 from mechdesign.experiments import sweep as room
 from mechdesign.experiments.design import cases_of
-from mechdesign.numerics.arrays import Floats
 from mechdesign.work.journal import Journal
 from tests.unit.test_cases import SLIDER_CRANK
 
@@ -26,7 +24,7 @@ def study_of(matrix: dict[str, Any], **more: Any) -> Any:
     return mechdesign.load(text=SLIDER_CRANK, overrides={"matrix": matrix} | more)
 
 
-def columns_of(matrix: dict[str, Any], seed: int = 0) -> Floats:
+def columns_of(matrix: dict[str, Any], seed: int = 0) -> np.ndarray:
     return np.array([[value for _, value in case] for case in cases_of(study_of(matrix, seed=seed))])
 
 
@@ -152,14 +150,14 @@ def test_what_is_wrong_is_told_before_anything_is_computed(
         raise AssertionError("a case was computed")
 
     monkeypatch.setattr(room, "answers", computed)
-    with pytest.raises(StudyError) as error:
+    with pytest.raises(mechdesign.StudyError) as error:
         mechdesign.sweep(study_of(matrix))
     assert message in str(error.value)
 
 
 def test_nothing_asked_of_a_case_is_an_error():
     study = mechdesign.load(text=SLIDER_CRANK.partition("requirements")[0], overrides={"matrix": {"vary": {R: [1]}}})
-    with pytest.raises(StudyError, match="what is to be found of each case"):
+    with pytest.raises(mechdesign.StudyError, match="what is to be found of each case"):
         mechdesign.sweep(study)
 
 
@@ -179,7 +177,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("mechdesign.experiments.cases.CASES_AT_ONCE", 1)
     monkeypatch.setattr(room, "answers", stopped)
     path = tmp_path / "unfinished.npz"
-    with pytest.raises(Interrupted) as interrupt:
+    with pytest.raises(mechdesign.Interrupted) as interrupt:
         mechdesign.sweep(study, journal=Journal(path, {"origin": 1}))
     assert interrupt.value.result.main[R].tolist() == [20, 30]
     again = mechdesign.sweep(study, journal=Journal(path, {"origin": 1}, resume=True)).main

@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 
+import mechdesign
 from mechdesign.report.tables import from_csv, json_blocks, to_csv
-from mechdesign.results import Column, Table
 
 
 def table(**columns):
-    return Table("t", tuple(Column(name, np.asarray(values)) for name, values in columns.items()))
+    return mechdesign.Table("t", tuple(mechdesign.Column(name, np.asarray(values)) for name, values in columns.items()))
 
 
 def test_numbers_have_twelve_significant_digits():
