@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from helpers.command_line import invoke
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.commands import COMMANDS
-from mechdesign.report.requirements import foresee
 
 ARM = """\
 mechanism:
@@ -363,18 +365,21 @@ def test_outputs_of_the_jacobian_are_named_apart_from_those_shown() -> None:
          " subject_to: [{result: kinematics.motion.inverse_condition, at_least: 0}]}", r"optimize\.subject_to\.0"),
     ],
 )  # fmt: skip
-def test_why_there_is_no_condition_number_is_told(asked: str, place: str) -> None:
+def test_why_there_is_no_condition_number_is_told(asked: str, place: str, tmp_path: Path) -> None:
     kinematic = "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P, fore.angle]}"
     message = (
         rf"{place}: kinematics has no inverse_condition: 3 outputs \(P\.x, P\.y, fore\.angle\) for 2 drives; "
         r"name as many by kinematics\.jacobian: \[P\]"
     )
-    with pytest.raises(mechdesign.StudyError, match=message):
-        foresee(study_of(ARM, kinematic, asked), COMMANDS, goals=True)
+    (tmp_path / "arm.yaml").write_text(ARM)
+
+    def checked(*changes: str) -> str:
+        said = invoke("check", tmp_path / "arm.yaml", *(f"--set={change}" for change in (kinematic, asked, *changes)))
+        assert said.exit_code == (2 if "no inverse_condition" in said.output else 0)
+        return " ".join(said.output.split())
+
+    assert re.search(message, checked())
     # With as many outputs as drives, but of lengths and angles.
-    with pytest.raises(
-        mechdesign.StudyError, match=rf"{place}: .*no inverse_condition: J mixes lengths and angles; give kinem"
-    ):
-        foresee(study_of(ARM, kinematic, asked, "kinematics.jacobian=[P.x, bend]"), COMMANDS, goals=True)
-    length = ("kinematics.jacobian=[P.x, bend]", "kinematics.characteristic_length=5")
-    foresee(study_of(ARM, kinematic, asked, *length), COMMANDS, goals=True)
+    mixed = ["kinematics.jacobian=[P.x, bend]"]
+    assert re.search(rf"{place}: .*no inverse_condition: J mixes lengths and angles; give kinem", checked(*mixed))
+    assert "no inverse_condition" not in checked(*mixed, "kinematics.characteristic_length=5")

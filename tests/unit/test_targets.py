@@ -9,7 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.kinematics.targets import nearest
 
 FOUR_BAR = """\
 mechanism:
@@ -190,19 +189,26 @@ def test_extremes_of_errors_lie_between_the_poses() -> None:
     assert coarse["max"][list(coarse["output"]).index("B.x_error")] > np.max(sampled["B.x_error"])
 
 
-def test_nearest_points_of_a_polyline() -> None:
-    corners = np.array([0, 1, 1, 1 + 1j])  # with a corner twice
-    points = np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j, np.nan])
-    assert nearest(points, corners)[0][:4] == pytest.approx([0.5, 0, 1 + 0.5j, 1 + 1j])
-    assert np.isnan(nearest(points, corners)[0][4])
-    assert nearest(points, corners[:1])[0][:4] == pytest.approx([0, 0, 0, 0])
-    # Against every point of a fine subdivision of each piece, in more blocks than one.
+def to_polyline(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Errors of an arm's end, held at points, of a path given by corners, as x + iy."""
+    poses = [{"P.x": float(point.real), "P.y": float(point.imag)} for point in points]
+    path = [[float(corner.real), float(corner.imag)] for corner in corners]
+    table = motion(f"{{P: {path}}}", f"kinematics={{poses: {poses}}}", text=ARM)
+    assert table["P_error"] == pytest.approx(np.hypot(table["P.x_error"], table["P.y_error"]), nan_ok=True)
+    return table["P.x_error"] + 1j * table["P.y_error"]
+
+
+def test_a_path_is_met_at_the_nearest_point_of_its_pieces() -> None:
+    corners = 10 + 3j + np.array([0, 0.5, 1, 1, 1 + 1j])  # with a corner twice
+    points = 10 + 3j + np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j])
+    assert to_polyline(points, corners) == pytest.approx([0.2j, -1 - 1j, 1, 1 + 2j], abs=1e-9)
+    # Against every point of a fine subdivision of each piece.
     rng = np.random.default_rng(1)
-    points, corners = rng.normal(size=(3000, 2)) @ [1, 1j], rng.normal(size=(400, 2)) @ [1, 1j]
+    points, corners = (10 + 3j + rng.normal(size=(count, 2)) @ [1, 1j] for count in (40, 400))
     fine = (corners[:-1, None] + np.diff(corners)[:, None] * np.linspace(0, 1, 201)).ravel()
-    distance = np.abs(points[:50, None] - fine).min(axis=1)
-    found = np.abs(points - nearest(points, corners)[0])[:50]
-    assert (found <= distance + 1e-12).all()
+    distance = np.abs(points[:, None] - fine).min(axis=1)
+    found = np.abs(to_polyline(points, corners))
+    assert (found <= distance + 1e-9).all()
     assert found == pytest.approx(distance, abs=0.05)
 
 
