@@ -5,7 +5,6 @@ from __future__ import annotations
 import cmath
 import math
 
-import numpy as np
 import pytest
 from helpers.studies import study_of
 from scipy.special import ndtr
