@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.command_line import invoke
+from helpers import command_line
 
 import mechdesign
 
@@ -84,13 +84,13 @@ def test_a_file_that_needs_its_override_is_read_with_it():
 def test_a_manifest_repeats_what_was_set(tmp_path):
 
     mechdesign.kinematics(mechdesign.load(text=FIVE_BAR, overrides=[WIDE])).save(tmp_path, plots=False)
-    repeated = invoke("run", "--verify", tmp_path)
+    repeated = command_line.ask("run", "--verify", tmp_path, study="")
     assert repeated.exit_code == 0, repeated.output
     manifest = tmp_path / "manifest.json"
     content = json.loads(manifest.read_text())
     # Without the sketch as it was drawn the same numbers make another assembly, or none.
     del content["study"]["drawn"]
     manifest.write_text(json.dumps(content))
-    assert invoke("run", "--verify", tmp_path).exit_code != 0
+    assert command_line.ask("run", "--verify", tmp_path, study="").exit_code != 0
     mechdesign.kinematics(mechdesign.load(text=FIVE_BAR)).save(tmp_path, plots=False)
     assert "drawn" not in json.loads(manifest.read_text())["study"]

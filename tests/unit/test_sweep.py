@@ -177,7 +177,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("mechdesign.experiments.cases.CASES_AT_ONCE", 1)
     monkeypatch.setattr(room, "answers", stopped)
     path = tmp_path / "unfinished.npz"
-    with pytest.raises(mechdesign.Interrupted) as interrupt:
+    with pytest.raises(KeyboardInterrupt) as interrupt:
         mechdesign.sweep(study, journal=Journal(path, {"origin": 1}))
     assert interrupt.value.result.main[R].tolist() == [20, 30]
     again = mechdesign.sweep(study, journal=Journal(path, {"origin": 1}, resume=True)).main
