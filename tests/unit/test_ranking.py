@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.curve.functions import Functions
 from mechdesign.experiments.ranking import Ranking
 from mechdesign.report.cases import best_of
 from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
@@ -188,3 +189,14 @@ def test_what_is_wrong_with_the_goals_is_told(best: dict[str, Any], message: str
     with pytest.raises(mechdesign.errors.StudyError) as error:
         swept(best)
     assert message in str(error.value)
+
+
+def test_thousands_of_requirements_do_not_multiply(monkeypatch: pytest.MonkeyPatch):
+    calls: list[int] = []
+    extremes = Functions.extremes
+    monkeypatch.setattr(Functions, "extremes", lambda *given: calls.append(1) or extremes(*given))
+    many = [{"result": "kinematics.B.x", "at_most": 1000 + k} for k in range(40)]
+    matrix = {"vary": {R: "25:43:2"}}
+    study = mechdesign.load(text=SLIDER_CRANK, overrides={"requirements": many, "matrix": matrix})
+    assert len(mechdesign.sweep(study).main) == 10
+    assert 0 < len(calls) < 20

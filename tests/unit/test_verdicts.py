@@ -114,18 +114,6 @@ matrix: {vary: {requirements.0.at_most: [0.5 deg, 0.6 deg], mechanism.parameters
 # Point 20: what is required is looked at once for each design.
 
 
-def test_thousands_of_requirements_do_not_multiply(monkeypatch: pytest.MonkeyPatch):
-    calls = []
-    from mechdesign.curve.functions import Functions
-
-    extremes = Functions.extremes
-    monkeypatch.setattr(Functions, "extremes", lambda *given: calls.append(1) or extremes(*given))
-    many = "".join(f"  - {{result: kinematics.P.x, at_most: {1000 + k}}}\n" for k in range(40))
-    study = mechdesign.load(text=f"{ARM}requirements:\n{many}matrix: {{vary: {{mechanism.links.arm.2: 90:99:1}}}}\n")
-    assert len(mechdesign.sweep(study).main) == 10
-    assert len(calls) < 20
-
-
 # Point 10: files of cases.
 
 
