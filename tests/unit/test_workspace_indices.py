@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.stiffness import FIVE_BAR as ELASTIC_FIVE_BAR
 from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
@@ -371,3 +372,32 @@ def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     assert any(
         "at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in map(str, result.warnings)
     )
+
+
+@pytest.mark.nightly
+def test_the_point_of_a_workspace_may_be_an_end() -> None:
+    """The map says of every node what the question says there."""
+    text = (
+        ELASTIC_FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "  bearings: {P: 5e3}\n")
+        + """
+workspace: {point: b2.P, scan: {about: [0, 0.45], rays: 12}}
+reliability:
+  dimensions: {load.fy: {sigma: 5}, b1.length: 1e-4}
+  poses: workspace
+  outputs: [b1.P, b2.P, P]
+  limits: {b2.P.y: 2e-3}
+  load: [0, -20]
+  methods: analytic
+"""
+    )
+    study = study_of(text, "stiffness.at=b1.P")
+    poses = study_poses(study, "reliability")
+    place = poses.values["b2.P.x"] + 1j * poses.values["b2.P.y"]
+    found = Local.at(questions(study)[0].field, place, {})
+    sigma, chance = (np.asarray(index.values(found)) for index in prepare(study, ["sigma_position", "reliability"]))
+    result = mechdesign.reliability(study)
+    table, told = result.tables["moments"], result.tables["reliability"]
+    x, y, other = (table["sigma"][table["output"] == name] for name in ("b2.P.x", "b2.P.y", "b1.P.y"))
+    assert sigma == pytest.approx(np.hypot(x, y), rel=1e-6)
+    assert np.mean(np.abs(other - y) > 0.1 * y) > 0.9
+    assert chance == pytest.approx(told["reliability"][told["scope"] == "pose"], abs=1e-8)
