@@ -244,3 +244,14 @@ def test_dimensions_with_which_the_drawn_pose_cannot_be_assembled() -> None:
     assert 0 < tables["motion"]["valid"].sum() < len(tables["motion"])
     loop = next(iter(tables["loops"]))
     assert [loop[f"{part}_length"] for part in ("frame", "input", "coupler", "output")] == pytest.approx([4, 2, 0.4, 3])
+
+
+@pytest.mark.slow
+def test_a_variant_without_a_closed_form_that_closes_at_a_pose_but_not_at_the_sketchs() -> None:
+    sketch = ("mechanism.sketch={A1: [-87.54, -30.3], A2: [57.55, -106.76], A3: [124.76, 149.83], "
+              "C1: [31.43, -45.96], C2: [129.09, -10.42], C3: [49.48, 56.38]}")  # fmt: skip
+    study = mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", [sketch])
+    asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}
+    there = study.mechanism.solve(asked, short)
+    alone = variant(study, {"crank": 80.0}).mechanism
+    assert alone.solve({name: float(there[name]) for name in alone.drives})["P.x"] == pytest.approx(0, abs=1e-9)
