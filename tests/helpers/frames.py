@@ -306,3 +306,9 @@ class Structure:
         if free.size and np.abs(free[here]).max() > 1e-7:
             return np.full((size, size), np.nan)
         return moved[here, :size]
+
+
+def posed(study: Study, row: int = 0, teeth: dict[str, Teeth] | None = None) -> Structure:
+    """A study's mechanism in one of the poses that it lists for its stiffness."""
+    pose = {name: [value] for name, value in study.stiffness.poses[row].items()}
+    return Structure(study, study.mechanism.solve(pose).configuration, teeth=teeth)

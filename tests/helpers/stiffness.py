@@ -6,9 +6,6 @@ import numpy as np
 
 import mechdesign
 from helpers.studies import study_of
-from mechdesign.questions.stiffness.body import ask
-from mechdesign.questions.stiffness.legs import Leg
-from mechdesign.results import Result
 
 METRES = "units: {length: m, angle: deg, time: s, force: N}\n"
 FIVE_BAR = (
@@ -72,19 +69,15 @@ stiffness:
 AXIAL, BENDING = 200e9 * 8e-4, 200e9 * 0.02 * 0.04**3 / 12
 
 
-def ask_stiffness(text: str, *overrides: str) -> Result:
+def ask_stiffness(text: str, *overrides: str) -> mechdesign.Answer:
     return mechdesign.stiffness(study_of(text, *overrides))
 
 
-def matrix(result: Result, letter: str, row: int = 0) -> np.ndarray:
+def matrix(result: mechdesign.Answer, letter: str, row: int = 0) -> np.ndarray:
     table = result.tables["stiffness" if letter == "K" else "compliance"]
     size = 3 if f"{letter}33" in table else 2
     return np.array([[table[f"{letter}{min(i, j)}{max(i, j)}"][row] for j in range(1, size + 1)]
                      for i in range(1, size + 1)])  # fmt: skip
-
-
-def legs_of(text: str, *overrides: str) -> tuple[Leg, ...]:
-    return ask(study_of(text, *overrides)).legs
 
 
 BENT = (

@@ -27,6 +27,30 @@ mechanism:
   sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
 workspace: {point: P, assembly: any}
 """
+# A four-bar with dimensions of all laws; pins of every kind with and without a spread of the radius.
+VARIED = """
+mechanism:
+  links:
+    ground: {A: [0, 0], D: [100, 0]}
+    crank: [A, B, 40]
+    rod: [B, C, 90]
+    rocker: [D, C, 70]
+  drives: {theta: {angle: crank}}
+  sketch: {B: [20, 35], C: [95, 70]}
+reliability:
+  poses: [{theta: 60}]
+  dimensions:
+    crank.length: {tolerance: [-0.2, 1.0], distribution: triangular}
+    rod.length: {sigma: 9, distribution: lognormal}
+    rocker.length: {tolerance: [0, 0.7], distribution: uniform}
+    ground.D.y: {tolerance: 1.5, distribution: truncated_normal}
+    ground.D.x: {sigma: 0.4}
+  clearances:
+    A: {radial: 0.5, tolerance: [-0.2, 0.4], distribution: triangular, pin: uniform, link: crank}
+    B: {radial: 1.0, pin: normal_in_disc, link: rod, effect: length}
+    C: {radial: 0.4, tolerance: 0.3, pin: contact, link: rocker}
+  methods: [second_order]
+"""
 
 
 def study_of(text: str, *overrides: str) -> mechdesign.Study:

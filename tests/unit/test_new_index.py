@@ -7,7 +7,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.workspace import indices
 from mechdesign.report.figures.pictures import figures
 from mechdesign.report.tables import to_csv
@@ -69,13 +68,13 @@ def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
 
 
 def test_what_a_new_index_needs_is_checked(reach: Path) -> None:
-    with pytest.raises(StudyError, match="did you mean 'reach'"):
+    with pytest.raises(mechdesign.StudyError, match="did you mean 'reach'"):
         study_of(ARM, "workspace.indices=[reahc]")
     reach.with_name("firm.py").write_text(FILE.replace(", length)", ', length, section="stiffness")'))
-    with pytest.raises(StudyError, match="the index 'firm' needs the stiffness section"):
+    with pytest.raises(mechdesign.StudyError, match="the index 'firm' needs the stiffness section"):
         study_of(ARM, "workspace.indices=[firm]")
 
 
 def test_without_its_file_there_is_none() -> None:
-    with pytest.raises(StudyError, match="expected one of inverse_condition, "):
+    with pytest.raises(mechdesign.StudyError, match="expected one of inverse_condition, "):
         study_of(ARM)

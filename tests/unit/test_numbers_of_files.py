@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import MechdesignError, StudyError
 
 FOUR_BAR = """
 mechanism:
@@ -60,7 +59,9 @@ def load(tmp_path, monkeypatch):
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("number", ["1e308", "-1.7e308", "1e61"])
 def test_a_number_beyond_all_size_is_told_with_its_line(load, reader, number):
-    with pytest.raises(StudyError, match=r"data\.csv:\d+: the number .* is too large a number: none is beyond 1e\+60"):
+    with pytest.raises(
+        mechdesign.StudyError, match=r"data\.csv:\d+: the number .* is too large a number: none is beyond 1e\+60"
+    ):
         load(reader, number)
 
 
@@ -74,7 +75,7 @@ def test_a_number_below_all_size_is_zero(load, reader):
 def test_points_of_a_spline_may_not_be_apart_by_magnitudes(load, tmp_path):
     load("path", "100")
     (tmp_path / "data.csv").write_text("100,100\n200,100\n1e15,150\n")
-    with pytest.raises(StudyError, match="no two in succession the same"):
+    with pytest.raises(mechdesign.StudyError, match="no two in succession the same"):
         mechdesign.load(text=ARM)
 
 
@@ -122,5 +123,5 @@ mechanism:
 kinematics: {sweep: {one: {from: 0, to: 1e14, number: 5}}, outputs: [B]}
 """
     )
-    with pytest.raises(MechdesignError, match="1,000 at most"):
+    with pytest.raises(mechdesign.MechdesignError, match="1,000 at most"):
         mechdesign.kinematics(study)

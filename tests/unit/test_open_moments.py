@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.questions.stiffness.analysis import stiffness
-from mechdesign.results import Result
+import mechdesign
 
 # A ring of three slides: equilibrium determines their forces and leaves one moment open.
 WEDGE = """
@@ -29,7 +27,7 @@ stiffness: {at: D, link: punch, %(gives)s}
 """
 
 
-def columns(result: Result, joint: str, *names: str) -> list[list[float]]:
+def columns(result: mechdesign.Answer, joint: str, *names: str) -> list[list[float]]:
     """Columns of a joint's force, a value a pose."""
     table = result.tables["joint_forces"]
     rows = table["joint"] == joint
@@ -39,7 +37,7 @@ def columns(result: Result, joint: str, *names: str) -> list[list[float]]:
 def test_bearings_share_a_moment_by_what_they_give() -> None:
     give = {"base": 2e6, "face": 1e6, "guide": 4e6}
     bearings = ", ".join(f"{name}: {{moment: {k}}}" for name, k in give.items())
-    result = dynamics(study_of(WEDGE % {"mass": "", "gives": f"bearings: {{{bearings}}}"}))
+    result = mechdesign.dynamics(study_of(WEDGE % {"mass": "", "gives": f"bearings: {{{bearings}}}"}))
     assert not result.warnings
     base, face, guide = (np.array(columns(result, name, "moment")[0]) / k for name, k in give.items())
     # The wedge turns on its base, the punch on the wedge; that is what it turns in its guide.
@@ -52,14 +50,14 @@ def test_bearings_share_a_moment_by_what_they_give() -> None:
 def test_a_beam_does_not_turn_between_its_rigid_slides() -> None:
     """The mean bending moment of the punch is zero; its weight of 30 N acts to the left in its middle."""
     beam = "sections: {bar: {E: 200 GPa, width: 20 mm, height: 40 mm}}, elastic: {punch: bar}"
-    result = dynamics(study_of(WEDGE % {"mass": ", mass: 3, center: [0, 0.5]", "gives": beam}))
+    result = mechdesign.dynamics(study_of(WEDGE % {"mass": ", mass: 3, center: [0, 0.5]", "gives": beam}))
     normal, moment = columns(result, "guide", "fx", "moment")
     # At s below D the moment is M - N s + 30 max(0, s - 1/2); its mean is M - N / 2 + 30 / 8.
     assert moment == pytest.approx([n / 2 - 30 / 8 for n in normal], rel=1e-12)
 
 
 def test_a_rigid_chain_stays_open() -> None:
-    result = dynamics(study_of(WEDGE % {"mass": "", "gives": "bearings: {base: {radial: 2e6}}"}))
+    result = mechdesign.dynamics(study_of(WEDGE % {"mass": "", "gives": "bearings: {base: {radial: 2e6}}"}))
     assert np.isnan(columns(result, "guide", "moment")).all()
     (caution,) = result.warnings
     assert "base, face, guide" in caution.message
@@ -106,7 +104,7 @@ def test_the_mass_of_beams_is_spread_along_them() -> None:
 def agree(text: str) -> None:
     """Joint forces of dynamics are those of stiffness under its load."""
     study = study_of(text)
-    result, forces = dynamics(study), stiffness(study).tables["forces"]
+    result, forces = mechdesign.dynamics(study), mechdesign.stiffness(study).tables["forces"]
     assert not result.main["valid"][1]
     names = {"O": "root", "E": "tip"}
     for k in range(len(forces) - 1):

@@ -9,67 +9,87 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.questions.optimize.goals import goal
-from mechdesign.questions.optimize.judge import Designs
-from mechdesign.questions.optimize.variables import grid
-from mechdesign.study.designs import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 COARSE = ("optimize.variables.l_min.step=0.5", "optimize.variables.l_a.step=0.5")
 
 
-def rrr(*changes: str) -> mechdesign.results.Result:
+def rrr(*changes: str) -> mechdesign.Answer:
     return mechdesign.optimize(mechdesign.load(CONFIGS / "two_rrr.yaml", [*COARSE, *changes]))
 
 
+# Stretched along x, where P.x is a + b.
+ARM = """
+mechanism:
+  parameters: {R: 1, a: 1, b: 1}
+  links: {ground: {O: [0, 0]}, upper: [O, E, a], fore: [E, P, b]}
+  drives: [upper, fore]
+  sketch: {E: [1, 0], P: [2, 0]}
+  measures: {f: FORMULA}
+kinematics: {poses: [{upper: 0, fore: 0}], outputs: [f]}
+"""
+
+
+def grid(variables: str) -> mechdesign.Table:
+    asked = f"optimize={{variables: {variables}, maximize: kinematics.f}}"
+    return mechdesign.optimize(study_of(ARM.replace("FORMULA", "P.x"), asked)).tables["designs"]
+
+
 def test_grid_with_bounds_that_depend_on_variables_above() -> None:
-    found = grid(mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_min.to=1.1"]))
-    assert found["l_min"] == pytest.approx([1, 1.03, 1.06, 1.06, 1.09, 1.09])
-    assert found["l_a"] == pytest.approx([1, 1, 1, 1.03, 1, 1.03])
-    everything = grid(mechdesign.load(CONFIGS / "two_rrr.yaml"))
-    assert len(everything["l_min"]) == 4556
-    assert everything["l_min"].max() == pytest.approx(4.99)
+    variables = "{{a: {{from: R, to: {}, step: {step}}}, b: {{from: R, to: (a + R)/2, step: {step}}}}}"
+    found = grid(variables.format("1.1*R", step=0.03))
+    assert found["a"] == pytest.approx([1, 1.03, 1.06, 1.06, 1.09, 1.09])
+    assert found["b"] == pytest.approx([1, 1, 1, 1.03, 1, 1.03])
+    wide = grid(variables.format("5*R", step=0.3))
+    assert len(wide) == sum(1 + k // 2 for k in range(14))
+    assert wide["a"].max() == pytest.approx(4.9)
 
 
 def test_grid_takes_a_last_step_that_rounding_puts_beyond_the_bound() -> None:
-    found = grid(mechdesign.load(CONFIGS / "two_rpr.yaml", ["optimize.variables.l_min={from: 1, to: 1.3, step: 0.1}"]))
-    assert found["l_min"] == pytest.approx([1, 1.1, 1.2, 1.3])
+    assert grid("{a: {from: 1, to: 1.3, step: 0.1}}")["a"] == pytest.approx([1, 1.1, 1.2, 1.3])
 
 
 def test_grid_by_number() -> None:
-    found = grid(mechdesign.load(CONFIGS / "two_rpr.yaml", ["optimize.variables.l_min={from: 1, to: 2, number: 5}"]))
-    assert found["l_min"] == pytest.approx([1, 1.25, 1.5, 1.75, 2])
+    assert grid("{a: {from: 1, to: 2, number: 5}}")["a"] == pytest.approx([1, 1.25, 1.5, 1.75, 2])
 
 
 def test_an_empty_grid_says_so() -> None:
     study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_a.from=9"])
-    with pytest.raises(StudyError, match=r"optimize.variables.l_a: no value lies"):
+    with pytest.raises(mechdesign.StudyError, match=r"optimize.variables.l_a: no value lies"):
         mechdesign.optimize(study)
 
 
-def compare(values: list[float], *, smallest: bool = False, feasible: int | None = None) -> Designs:
-    """Designs of one goal, of which the first so many are feasible."""
-    one, count = goal("kinematics.P.x", smallest=smallest), len(values)
-    codes = np.where(np.arange(count) < (count if feasible is None else feasible), 0, 1).astype(np.int32)
-    study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
-    return Designs(
-        study, {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"],
-        np.full(count, np.nan), np.ones((1, 1)), {},
-    )  # fmt: skip
+def compare(values: list[float], *, smallest: bool = False, feasible: int = 9) -> tuple[np.ndarray, float]:
+    """CPI of designs with these values, of which the first so many are feasible, and the number of the best."""
+    # Lagrange's polynomial over the upper arm, whose lengths are 1, 2, ...; the forearm is 1.
+    places = range(1, 1 + len(values))
+    parts = ["*".join([repr(y), *(f"((E.x - {m})/{k - m})" for m in places if m != k)])
+             for k, y in zip(places, values, strict=True)]  # fmt: skip
+    asked = (
+        f"optimize={{variables: {{a: {{from: 1, to: {len(values)}, step: 1}}}}, "
+        f"{'minimize' if smallest else 'maximize'}: kinematics.f, "
+        f"subject_to: [{{result: kinematics.E.x, at_most: {feasible + 0.5}}}]}}"
+    )
+    study = study_of(ARM.replace("FORMULA", f'"{" + ".join(parts)}"'), asked, "kinematics.outputs=[f, E.x]")
+    tables = mechdesign.optimize(study).tables
+    assert tables["designs"]["kinematics.f"] == pytest.approx(values)
+    return tables["designs"]["CPI"], tables["optimum"]["a"][0] - 1
 
 
 def test_normalisation_over_feasible_designs() -> None:
     for smallest, shares in ((False, [1, 0, 0.5]), (True, [0, 1, 0.5])):
-        compared = compare([3.0, 1.0, 2.0, 9.0], smallest=smallest, feasible=3)
-        assert compared.cpi[:3] == pytest.approx(shares)
-        assert np.isnan(compared.cpi[3])
-        assert compared.winners.tolist() == [shares.index(1)]
-    assert compare([1.0] * 4, smallest=True).cpi == pytest.approx([0, 0, 0, 0])
+        cpi, best = compare([3.0, 1.0, 2.0, 9.0], smallest=smallest, feasible=3)
+        assert cpi[:3] == pytest.approx(shares)
+        assert np.isnan(cpi[3])
+        assert best == shares.index(1)
+    assert compare([1.0] * 4, smallest=True)[0] == pytest.approx([0, 0, 0, 0])
 
 
 def test_ties_go_to_the_first_design() -> None:
-    assert compare([1.0, 2.0, 2.0, 9.0], feasible=3).winners.tolist() == [1]
+    asked = "optimize={variables: {a: {from: 1, to: 3, step: 1}}, maximize: kinematics.f}"
+    tables = mechdesign.optimize(study_of(ARM.replace("FORMULA", '"min(E.x, 2)"'), asked)).tables
+    assert tables["designs"]["kinematics.f"].tolist() == [1, 2, 2]
+    assert tables["optimum"]["a"].tolist() == [2]
 
 
 @pytest.mark.slow
@@ -100,7 +120,7 @@ def test_conditions_leave_designs_out_and_are_counted() -> None:
 
 @pytest.mark.slow
 def test_no_feasible_design_says_why() -> None:
-    with pytest.raises(AssemblyError, match=r"not workspace\.area at least 1000"):
+    with pytest.raises(mechdesign.AssemblyError, match=r"not workspace\.area at least 1000"):
         rrr("optimize.subject_to=[{result: workspace.area, at_least: 1000}]")
 
 
@@ -143,7 +163,7 @@ def test_goals_of_other_questions() -> None:
 
 def test_a_goal_that_no_result_has() -> None:
     changes = "optimize={variables: {r1: {from: 9, to: 11, step: 1}}, maximize: [kinematics.Q.x]}"
-    with pytest.raises(StudyError, match=r"Q\.x"):
+    with pytest.raises(mechdesign.StudyError, match=r"Q\.x"):
         mechdesign.optimize(mechdesign.load(CONFIGS / "two_link_arm.yaml", [changes]))
 
 
@@ -181,7 +201,7 @@ PLATFORM = (
 
 @pytest.mark.slow
 def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         study_of(FOUR_BAR.replace("r: 30", "r: 60"))
     designs = mechdesign.optimize(study_of(FOUR_BAR)).tables["designs"]
     alone = mechdesign.kinematics(study_of(FOUR_BAR, "mechanism.parameters.r=60"))
@@ -197,7 +217,7 @@ def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_th
     asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}
     there = drawn.mechanism.solve(asked, short)
     drives = ", ".join(f"{name}: {float(there[name])!r}" for name in drawn.mechanism.drives)
-    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+    with pytest.raises(mechdesign.StudyError, match="the sketch cannot be assembled"):
         mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", [*PLATFORM, "mechanism.parameters.crank=80"])
     by_drives, by_pose = (
         mechdesign.optimize(
@@ -212,7 +232,3 @@ def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_th
     name = "kinematics.inverse_condition"
     assert by_drives.tables["designs"]["feasible"][0]
     assert by_drives.tables["designs"][name][0] == pytest.approx(by_pose.tables["designs"][name][0])
-    # Alone, as designs are asked for tables that are not found of all at once.
-    alone = variant(drawn, {"crank": 80.0}).mechanism
-    values = [float(there[name]) for name in alone.drives]
-    assert alone.solve(dict(zip(alone.drives, values, strict=True)))["P.x"] == pytest.approx(0, abs=1e-9)

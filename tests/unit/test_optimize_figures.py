@@ -24,8 +24,6 @@ from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Column, Table
-from mechdesign.study import Study
 
 ARM = """
 mechanism:
@@ -50,8 +48,10 @@ def drawn(*names: str, goals: str = "maximize: [GII, SUI]"):
         return figures(study, result), result
 
 
-def table(**columns: object) -> Table:
-    return Table("designs", tuple(Column(name, np.asarray(values), "mm") for name, values in columns.items()))
+def table(**columns: object) -> mechdesign.Table:
+    return mechdesign.Table(
+        "designs", tuple(mechdesign.Column(name, np.asarray(values), "mm") for name, values in columns.items())
+    )
 
 
 @pytest.mark.nightly
@@ -90,7 +90,7 @@ def test_a_single_goal_is_shown_in_its_own_unit() -> None:
 RANGES = "{a: {from: 0, to: 1}, b: {from: 0, to: 1}, c: {from: 0, to: 1}}"
 
 
-def designed() -> Study:
+def designed() -> mechdesign.Study:
     return study_of(ARM, f"optimize={{method: search, variables: {RANGES}, maximize: kinematics.P.x}}")
 
 

@@ -10,7 +10,6 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
@@ -18,7 +17,6 @@ from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.curves import workspace_nodes
 from mechdesign.region.rays import SINGLE
-from mechdesign.results import Result
 
 FIVE_BAR = """
 units: {length: dimensionless}
@@ -107,7 +105,7 @@ class Filled:
         return int(self.label[row, column])
 
 
-def check(result: Result, filled: Filled, number: int) -> None:
+def check(result: mechdesign.Answer, filled: Filled, number: int) -> None:
     """Every piece has the area of the flood fill's piece at its place, and the indices are of the first."""
     main, pieces = result.main, result.tables["pieces"]
     assert pieces["piece"].tolist() == list(range(1, number + 1))
@@ -439,7 +437,7 @@ def test_a_determinant_that_touches_zero_on_a_circle_divides_nothing(about: str)
 
 
 def test_an_empty_region_says_where() -> None:
-    with pytest.raises(AssemblyError, match=r"point P reaches nothing on the scan about \(0, 0\)"):
+    with pytest.raises(mechdesign.AssemblyError, match=r"point P reaches nothing on the scan about \(0, 0\)"):
         mechdesign.workspace(study_of(FOLDED, "workspace.scan={about: [0, 0], from: 0, to: 180}"))
 
 
@@ -452,7 +450,7 @@ TOO_WIDE = [
 @pytest.mark.nightly
 @pytest.mark.parametrize("changes", TOO_WIDE)
 def test_a_scan_is_a_turn_at_most(changes: tuple[str, ...]) -> None:
-    with pytest.raises(StudyError, match="more than a turn beyond 'from'"):
+    with pytest.raises(mechdesign.StudyError, match="more than a turn beyond 'from'"):
         study_of(FOLDED, *changes)
     area = [mechdesign.workspace(study_of(FOLDED, "units.angle=rad", f"workspace.scan={scan}")).main["area"][0]
             for scan in ("{about: [0, -0.18]}", "{about: [0, -0.18], from: 0, to: 6.2832}")]  # fmt: skip

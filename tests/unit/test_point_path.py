@@ -7,7 +7,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
 
 FOUR_BAR = """
 mechanism:
@@ -83,10 +82,10 @@ def test_a_driven_slide_within_its_limits_and_beyond_them() -> None:
 
 
 def test_a_slide_without_limits_has_no_path() -> None:
-    with pytest.raises(StudyError, match="give it limits"):
+    with pytest.raises(mechdesign.StudyError, match="give it limits"):
         mechdesign.workspace(study_of(SLIDER, "mechanism.limits=[]"))
 
 
 def test_limits_that_nothing_meets() -> None:
-    with pytest.raises(AssemblyError, match="no position"):
+    with pytest.raises(mechdesign.AssemblyError, match="no position"):
         mechdesign.workspace(study_of(SLIDER, "mechanism.limits=[{drive: s, min: 200, max: 350}]"))

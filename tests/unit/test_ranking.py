@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.curve.functions import Functions
 from mechdesign.experiments.ranking import Ranking
 from mechdesign.report.cases import best_of
 from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
 from mechdesign.report.page.headlines import headlines
-from mechdesign.results import Column, Table
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE, ANGLE = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
@@ -145,11 +145,11 @@ def test_a_page_says_which_limits_the_best_case_keeps_and_how_many_cases_do():
 
 def test_of_many_cases_a_page_has_the_best_or_else_the_first():
     count = MOST_CELLS
-    columns = (Column("case", np.arange(1, count + 1)), Column("rank", np.arange(count, 0, -1.0)))
-    table, words = telling_rows(Table("sweep", columns))
+    columns = (mechdesign.Column("case", np.arange(1, count + 1)), mechdesign.Column("rank", np.arange(count, 0, -1.0)))
+    table, words = telling_rows(mechdesign.Table("sweep", columns))
     assert words == f"the best {count // 2} of"
     assert table["rank"].tolist() == [*range(1, count // 2 + 1)]
-    table, words = telling_rows(Table("sweep", (*columns[:1], Column("met", np.zeros(count)))))
+    table, words = telling_rows(mechdesign.Table("sweep", (*columns[:1], mechdesign.Column("met", np.zeros(count)))))
     assert words == f"the first {count // 2} of"
     assert table["case"].tolist() == [*range(1, count // 2 + 1)]
     assert telling_rows(table)[1] == "all"
@@ -189,3 +189,14 @@ def test_what_is_wrong_with_the_goals_is_told(best: dict[str, Any], message: str
     with pytest.raises(mechdesign.errors.StudyError) as error:
         swept(best)
     assert message in str(error.value)
+
+
+def test_thousands_of_requirements_do_not_multiply(monkeypatch: pytest.MonkeyPatch):
+    calls: list[int] = []
+    extremes = Functions.extremes
+    monkeypatch.setattr(Functions, "extremes", lambda *given: calls.append(1) or extremes(*given))
+    many = [{"result": "kinematics.B.x", "at_most": 1000 + k} for k in range(40)]
+    matrix = {"vary": {R: "25:43:2"}}
+    study = mechdesign.load(text=SLIDER_CRANK, overrides={"requirements": many, "matrix": matrix})
+    assert len(mechdesign.sweep(study).main) == 10
+    assert 0 < len(calls) < 20

@@ -11,8 +11,6 @@ import pytest
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SLIDER_CRANK = """
@@ -41,13 +39,13 @@ reliability:
 """
 
 
-def ask(tmp_path: Path, text: str, *lines: str, jobs: int = 1, seed: int | None = None) -> Result:
+def ask(tmp_path: Path, text: str, *lines: str, jobs: int = 1, seed: int | None = None) -> mechdesign.Answer:
     file = tmp_path / "study.yaml"
     file.write_text(text + "".join(f"  {line}\n" for line in lines))
     return mechdesign.reliability(mechdesign.load(file), jobs=jobs, seed=seed)
 
 
-def pick(result: Result, table: str, column: str, **chosen: object) -> np.ndarray:
+def pick(result: mechdesign.Answer, table: str, column: str, **chosen: object) -> np.ndarray:
     found = result.tables[table]
     rows = np.ones(len(found), dtype=bool)
     for name, value in chosen.items():
@@ -253,7 +251,7 @@ def test_a_listed_pose_that_fails_is_named_and_the_others_are_computed(tmp_path:
     assert "B.x = 500 mm" in result.failed
     assert np.isfinite(result.tables["moments"]["sigma"]).tolist() == [True, True, False, False]
     assert np.isnan(result.tables["reliability"]["reliability"]).tolist() == [False, False, True, True]
-    with pytest.raises(AssemblyError, match=r"B\.x = 500 mm"):
+    with pytest.raises(mechdesign.AssemblyError, match=r"B\.x = 500 mm"):
         ask(tmp_path, SLIDER_CRANK.replace("{theta: 60}", "{B.x: 500}"), "dimensions: {a: 0.3}")
 
 
@@ -271,7 +269,7 @@ def test_moments_along_a_sweep_import_no_scipy(tmp_path: Path) -> None:
 
 
 def test_nothing_varies(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="what varies"):
+    with pytest.raises(mechdesign.StudyError, match="what varies"):
         ask(tmp_path, SLIDER_CRANK)
 
 

@@ -11,9 +11,6 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.errors import Interrupted
-from mechdesign.questions.reliability import cycle
-from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LEVER = """
@@ -45,11 +42,11 @@ reliability:
 """
 
 
-def ask(text: str, *changes: str, jobs: int = 1) -> Result:
+def ask(text: str, *changes: str, jobs: int = 1) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *changes), jobs=jobs)
 
 
-def row(result: Result, method: str) -> dict[str, Any]:
+def row(result: mechdesign.Answer, method: str) -> dict[str, Any]:
     table = result.tables["reliability"]
     rows = np.flatnonzero((table["scope"] == "cycle") & (table["method"] == method))
     assert len(rows) == 1
@@ -188,28 +185,29 @@ def test_without_a_failure_monte_carlo_warns_and_gives_the_bound() -> None:
 
 
 @pytest.mark.slow
-def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = 0
-    whole = cycle.count_chunk
+def test_an_interrupt_gives_the_cycles_that_were_counted() -> None:
+    class Impatient:
+        """Ctrl-C at the third report of whole cycles."""
 
-    def chunk(*arguments: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == 3:
-            raise KeyboardInterrupt
-        return whole(*arguments)
+        def start(self, total: int, stage: str) -> None:
+            self.stage, self.reports = stage, 0
 
-    monkeypatch.setattr(cycle, "count_chunk", chunk)
-    with pytest.raises(Interrupted) as caught:
-        ask(FOUR_BAR, "reliability.samples=100000")
+        def update(self, n: int) -> None:
+            self.reports += 1
+            if (self.stage, self.reports) == ("whole cycles", 3):
+                raise KeyboardInterrupt
+
+    study = study_of(FOUR_BAR, "reliability.samples=100000")
+    with pytest.raises(KeyboardInterrupt) as caught:
+        mechdesign.reliability(study, progress=Impatient())
     result = caught.value.result
     found = row(result, "monte_carlo")
-    assert found["samples"] == 2 * 20_000
+    assert found["samples"] == 3 * 20_000
     assert found["failure_low"] < 0.02975 < found["failure_high"]
     # The poses had been simulated before.
     table = result.tables["reliability"]
     assert (table["samples"][table["scope"] == "pose"] == 100_000).all()
-    assert "40000 whole cycles" in result.interrupted
+    assert "60000 whole cycles" in result.interrupted
 
 
 SWEPT = """

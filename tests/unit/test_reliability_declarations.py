@@ -11,7 +11,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.reliability.engine.design_points import DesignPoints
 from mechdesign.questions.reliability.engine.problem import Estimate, Problem
 from mechdesign.questions.reliability.methods import normal
@@ -59,7 +58,7 @@ def cautious() -> Iterator[None]:
 
 
 def test_an_unknown_method_is_refused() -> None:
-    with pytest.raises(StudyError, match="expected one of analytic, second_order"):
+    with pytest.raises(mechdesign.StudyError, match="expected one of analytic, second_order"):
         study_of(LEVER, "reliability.methods=[cautious]")
 
 
@@ -81,5 +80,5 @@ def test_a_declared_method_is_in_schema_tables_and_pictures() -> None:
     # Among the steps of auto it says a half, whatever the others say.
     alone = mechdesign.reliability(study_of(LEVER, "reliability.methods=auto", "reliability.precision=0.02"))
     assert any(warning.startswith("form and cautious disagree") for warning in map(str, alone.warnings))
-    with pytest.raises(StudyError, match="did you mean 'cautious'"):
+    with pytest.raises(mechdesign.StudyError, match="did you mean 'cautious'"):
         study_of(LEVER, "reliability.methods=[cautios]")

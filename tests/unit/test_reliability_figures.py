@@ -13,7 +13,6 @@ from matplotlib.patches import StepPatch
 from matplotlib.path import Path as Outline
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability.figures.bars import allocation, contributions
 from mechdesign.questions.reliability.figures.densities import SHARES, smoothed
@@ -23,7 +22,6 @@ from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.looks import look
 from mechdesign.report.figures.panels import number, plane
 from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Column, Table
 
 SLIDER = """
 units: {length: mm}
@@ -235,7 +233,7 @@ def test_a_study_may_choose_the_pose_whose_samples_are_shown() -> None:
     (["reliability.shown=1", "reliability.methods=[analytic]"], "no method draws samples"),
 ])  # fmt: skip
 def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", *overrides)
 
 
@@ -467,7 +465,9 @@ def test_contributions_are_one_bar_with_sobol_indices_where_these_differ() -> No
         "sobol_first_high": [0.31, 0.62, 0.41, 0.62], "sobol_total": [0.4, 0.7, 0.4, 0.6],
         "sobol_total_low": [0.37, 0.69, 0.39, 0.59], "sobol_total_high": [0.45, 0.71, 0.41, 0.61],
     }  # fmt: skip
-    table = Table("contributions", tuple(Column(name, np.array(values)) for name, values in columns.items()))
+    table = mechdesign.Table(
+        "contributions", tuple(mechdesign.Column(name, np.array(values)) for name, values in columns.items())
+    )
     with style.context():
         figure = draw(contributions(study, table, study_poses(study, "reliability")))
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["l", "r"]
@@ -498,7 +498,7 @@ def test_allocation_shows_given_beside_allocated_and_how_often_either_fails() ->
               "failure_low": [0.02, 0.05, 0.06], "failure_high": [0.02, 0.05, 0.06]}  # fmt: skip
     after = {"simulated": [0.9995, 0.9991], "low": [0.9993, 0.999], "high": [0.9997, 0.9992]}
     tables = {
-        name: Table(name, tuple(Column(key, np.array(values)) for key, values in data.items()))
+        name: mechdesign.Table(name, tuple(mechdesign.Column(key, np.array(values)) for key, values in data.items()))
         for name, data in {"allocation": columns, "reliability": before, "confirmation": after}.items()
     }
     with style.context():

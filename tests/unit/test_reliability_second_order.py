@@ -6,13 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers.studies import study_of
+from helpers.studies import VARIED, study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
-from mechdesign.questions.reliability.study_sources import find_sources
-from mechdesign.results import Result
 
 LEVER = """
 mechanism:
@@ -39,37 +36,13 @@ reliability:
   methods: [analytic, second_order, monte_carlo]
   samples: 1000000
 """
-# All laws; pins of every kind with and without a spread of the radius.
-VARIED = """
-mechanism:
-  links:
-    ground: {A: [0, 0], D: [100, 0]}
-    crank: [A, B, 40]
-    rod: [B, C, 90]
-    rocker: [D, C, 70]
-  drives: {theta: {angle: crank}}
-  sketch: {B: [20, 35], C: [95, 70]}
-reliability:
-  poses: [{theta: 60}]
-  dimensions:
-    crank.length: {tolerance: [-0.2, 1.0], distribution: triangular}
-    rod.length: {sigma: 9, distribution: lognormal}
-    rocker.length: {tolerance: [0, 0.7], distribution: uniform}
-    ground.D.y: {tolerance: 1.5, distribution: truncated_normal}
-    ground.D.x: {sigma: 0.4}
-  clearances:
-    A: {radial: 0.5, tolerance: [-0.2, 0.4], distribution: triangular, pin: uniform, link: crank}
-    B: {radial: 1.0, pin: normal_in_disc, link: rod, effect: length}
-    C: {radial: 0.4, tolerance: 0.3, pin: contact, link: rocker}
-  methods: [second_order]
-"""
 
 
-def ask(text: str, *changes: str, jobs: int = 1) -> Result:
+def ask(text: str, *changes: str, jobs: int = 1) -> mechdesign.Answer:
     return mechdesign.reliability(study_of(text, *changes), jobs=jobs)
 
 
-def moment(result: Result, method: str, name: str, order: str = "position") -> float:
+def moment(result: mechdesign.Answer, method: str, name: str, order: str = "position") -> float:
     table = result.tables["moments"]
     (found,) = table[name][(table["method"] == method) & (table["order"] == order)]
     return float(found)
@@ -121,33 +94,6 @@ def test_correlated_normal_dimensions_of_a_quadratic_error() -> None:
     variance = slope @ covariance @ slope + 0.5 * np.trace(hessian @ covariance @ hessian @ covariance)
     assert moment(result, "second_order", "mean") == pytest.approx(mean, rel=1e-8)
     assert moment(result, "second_order", "sigma") == pytest.approx(np.sqrt(variance), rel=1e-7)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("correlation", ["null", "[[crank.length, rod.length, 0.6]]"])
-def test_cumulants_are_those_of_what_is_drawn(correlation: str) -> None:
-    """Moments of random quadratic functions of all that varies against a million draws."""
-    changes = [] if correlation == "null" else [f"reliability.correlation={correlation}"]
-    sources, _ = find_sources(study_of(VARIED, *changes))
-    law = cumulants(sources)
-    count = 1_000_000
-    drawn = sources.draw(np.random.default_rng(5), count)
-    pins = drawn[len(sources.scalars) :].reshape(-1, 3, count)
-    z = np.concatenate([drawn[: len(sources.scalars)], (pins[:, :1] * pins[:, 1:]).reshape(-1, count)])
-    rng = np.random.default_rng(6)
-    sigma = np.sqrt(np.diagonal(law.covariance))
-    slope = rng.normal(size=(3, len(z))) / sigma
-    bend = rng.normal(size=(3, len(z), len(z))) / np.outer(sigma, sigma)
-    # The last is bent by the places of pins only, most of all by x^2 - y^2 and x y of each.
-    bend[2, :5], bend[2, :, :5] = 0.0, 0.0
-    bend += bend.swapaxes(1, 2)
-    mean, covariance = Quadratic(np.zeros(3), slope, bend).moments(law)
-    values = slope @ z + 0.5 * np.einsum("cij,in,jn->cn", bend, z, z, optimize=True)
-    centred = values - values.mean(axis=1, keepdims=True)
-    assert (np.abs(values.mean(axis=1) - mean) < 4.5 * values.std(axis=1) / np.sqrt(count)).all()
-    products = centred[:, None] * centred
-    error = products.std(axis=2) / np.sqrt(count)
-    assert (np.abs(products.mean(axis=2) - covariance) < 4.5 * error).all()
 
 
 def test_a_clearance_that_only_changes_the_length_lengthens_it() -> None:

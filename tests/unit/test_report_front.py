@@ -11,14 +11,12 @@ import pytest
 from helpers.fronts import FRONTS
 from helpers.tracks import decoded
 
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.analysis import optimize
+import mechdesign
 from mechdesign.questions.optimize.variables import study_of
 from mechdesign.report.figures import style
 from mechdesign.report.page import front as page
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.section import section
-from mechdesign.study import load
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -26,8 +24,8 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 @pytest.fixture(scope="module")
 def asked() -> Any:
     """Hoeken's linkage with a few designs."""
-    study = load(CONFIGS / "gallery" / "straight_line_front.yaml", ["optimize.evaluations=200"])
-    return study, optimize(study)
+    study = mechdesign.load(CONFIGS / "gallery" / "straight_line_front.yaml", ["optimize.evaluations=200"])
+    return study, mechdesign.optimize(study)
 
 
 def shown(result: Any) -> Any:
@@ -43,7 +41,7 @@ def test_every_design_moves_as_its_own_study_does(asked: Any) -> None:
     for choice in moving.data["choices"][:: max(1, len(moving.data["choices"]) // 4)]:
         row = choice["number"] - 1
         own = study_of(study, {name: table[name][row].item() for name in study.optimize.variables})
-        motion = kinematics(own).tables["motion"]
+        motion = mechdesign.kinematics(own).tables["motion"]
         which = choice["given"][0][2]
         decimals, steps = choice["numbers"][which]
         crank = decoded(steps, choice["poses"]) / 10**decimals
@@ -97,7 +95,9 @@ def test_the_front_stands_beside_the_linkage_and_not_once_more(asked: Any) -> No
 
 def test_of_three_goals_the_designs_stand_in_every_panel() -> None:
     case = FRONTS["dtlz2"]
-    result = optimize(case.study(3, "optimize.evaluations=150", "kinematics.sweep={arm: {from: 0, to: 90, step: 10}}"))
+    result = mechdesign.optimize(
+        case.study(3, "optimize.evaluations=150", "kinematics.sweep={arm: {from: 0, to: 90, step: 10}}")
+    )
     moving = shown(result)
     assert len(moving.data["front"]) == 3
     assert all(len(x) == len(moving.data["choices"]) for panel in moving.data["front"] for x in panel)
@@ -106,8 +106,8 @@ def test_of_three_goals_the_designs_stand_in_every_panel() -> None:
 @pytest.mark.slow
 def test_a_front_without_a_motion_shows_the_workspace_of_its_knee() -> None:
     asked = "{method: pareto, evaluations: 12, maximize: [GII, area], variables: {l_a: {from: 90, to: 110}}}"
-    study = load(CONFIGS / "five_bar.yaml", ["kinematics=", "requirements=", f"optimize={asked}"])
-    result = optimize(study)
+    study = mechdesign.load(CONFIGS / "five_bar.yaml", ["kinematics=", "requirements=", f"optimize={asked}"])
+    result = mechdesign.optimize(study)
     part, warnings = section(study, result, {}, "", (), plots=True)
     assert warnings == ()
     assert "front" not in part["moving"]["data"]

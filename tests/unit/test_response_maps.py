@@ -12,8 +12,6 @@ from matplotlib.figure import Figure
 import mechdesign
 from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
 from mechdesign.experiments.figures.sweep.quantities import Axis, sample
-from mechdesign.numerics.arrays import Floats
-from mechdesign.results import Column, Table
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE, ANGLE = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
@@ -33,7 +31,7 @@ def axis(name: str, values: Any, **limits: float) -> Axis:
     return Axis(name, "mm", np.asarray(values, dtype=float), (), limits.get("low"), limits.get("high"))
 
 
-def contours(figure: Figure) -> list[Floats]:
+def contours(figure: Figure) -> list[np.ndarray]:
     """Points of the contours of limits on the first map."""
     axes = maps_of(figure)[0]
     sets = [each for each in axes.collections if isinstance(each, ContourSet) and not each.filled]
@@ -59,7 +57,7 @@ def test_hatched_is_where_what_is_required_is_not_met():
     r, length = (values.ravel() for values in np.meshgrid(np.arange(30.0, 46, 2), np.arange(90.0, 131, 5)))
     met = np.ones(len(r), dtype=bool)
     met[0] = False
-    table = Table("sweep", (Column("s_met", r > 35.05), Column("q_met", met)))
+    table = mechdesign.Table("sweep", (mechdesign.Column("s_met", r > 35.05), mechdesign.Column("q_met", met)))
     limited = [axis("s", 2 * r, low=70.1), axis("q", np.where(met, r + length, np.nan), high=160.03)]
     plane = Plane.of(axis("r", r), axis("l", length), others=False)
     assert plane is not None
@@ -137,7 +135,7 @@ def test_of_many_cases_a_sample_is_drawn_with_the_best_and_the_front(monkeypatch
     count = 40_000
     rank = np.where(np.arange(count) == 12_345, 1.0, 2.0)
     front = np.isin(np.arange(count), [12_345, 777, 31_000])
-    table = Table("sweep", (Column("rank", rank), Column("front", front)))
+    table = mechdesign.Table("sweep", (mechdesign.Column("rank", rank), mechdesign.Column("front", front)))
     rows, _ = sample(table, 500)
     assert {12_345, 777, 31_000} <= {*rows.tolist()}
     assert 500 <= len(rows) <= 503

@@ -5,7 +5,6 @@ import math
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 ARM = """
 mechanism: {{links: {{ground: {{O: [0, 0]}}, arm: [O, P, 100]}}, drives: [arm]}}
@@ -48,7 +47,7 @@ def test_a_bound_is_converted_to_the_unit_of_its_column(requirement, margin):
     ],
 )
 def test_a_bound_of_another_kind_is_a_mistake_with_its_place(requirement, message):
-    with pytest.raises(StudyError, match=message) as caught:
+    with pytest.raises(mechdesign.StudyError, match=message) as caught:
         verdict(requirement)
     assert caught.value.problems[0].key.startswith("requirements.0")
 
@@ -90,7 +89,7 @@ def test_conditions_and_ranges_of_optimize_are_converted():
     assert optimised(f"{{{variables}, subject_to: [{{result: kinematics.P.x, at_most: 4.5 cm}}]}}")["r"] == 45
     assert optimised(f"{{{variables}, subject_to: [{{result: 2*r, at_most: 7 cm}}]}}")["r"] == 35
     variables = variables.replace("kinematics.P.x", "{result: kinematics.P.x, where: {arm: 0.5 rad}}")
-    with pytest.raises(StudyError, match="there are"):
+    with pytest.raises(mechdesign.StudyError, match="there are"):
         optimised(f"{{{variables}}}")
 
 
@@ -103,7 +102,7 @@ def test_conditions_and_ranges_of_optimize_are_converted():
     ],
 )
 def test_conditions_and_goals_of_another_kind_are_mistakes(section):
-    with pytest.raises(StudyError, match=WRONG.format("length", "angle")):
+    with pytest.raises(mechdesign.StudyError, match=WRONG.format("length", "angle")):
         optimised(section)
 
 
@@ -125,7 +124,7 @@ def test_a_parameter_carries_its_unit(old, new, key):
     )
     mechdesign.optimize(mechdesign.load(text=text))
     assert old in text
-    with pytest.raises(StudyError, match="is expected") as caught:
+    with pytest.raises(mechdesign.StudyError, match="is expected") as caught:
         mechdesign.optimize(mechdesign.load(text=text.replace(old, new)))
     assert [problem.key for problem in caught.value.problems] == [key]
 
@@ -134,7 +133,7 @@ def test_a_parameter_carries_its_unit(old, new, key):
 def test_a_tolerance_of_a_parameter_is_in_its_unit(tolerance):
     text = OPTIMIZE.format("{}").replace("optimize: {}", f"reliability: {{dimensions: {{r: {tolerance}}}}}")
     mechdesign.load(text=text.replace("deg", "mm"))
-    with pytest.raises(StudyError, match="is an angle, where a length is expected"):
+    with pytest.raises(mechdesign.StudyError, match="is an angle, where a length is expected"):
         mechdesign.load(text=text)
 
 
@@ -143,13 +142,13 @@ def test_steps_and_cases_are_in_the_unit_of_what_changes():
     text = OPTIMIZE.replace("optimize: {}", asked)
     study = mechdesign.load(text=text.format("1 cm"))
     assert mechdesign.sensitivities(study).main["derivative"] == pytest.approx([1.0])
-    with pytest.raises(StudyError, match=WRONG.format("force", "length")):
+    with pytest.raises(mechdesign.StudyError, match=WRONG.format("force", "length")):
         mechdesign.sensitivities(mechdesign.load(text=text.format("1 N")))
     asked = "matrix: {{results: [kinematics.P.x.max], vary: {{mechanism.parameters.r: {}}}}}"
     text = OPTIMIZE.replace("optimize: {}", asked)
     found = mechdesign.sweep(mechdesign.load(text=text.format("[4 cm, 50 mm]"))).main
     assert found["kinematics.P.x.max"] == pytest.approx([40.0, 50.0])
-    with pytest.raises(StudyError, match="is an angle, where a length is expected"):
+    with pytest.raises(mechdesign.StudyError, match="is an angle, where a length is expected"):
         mechdesign.sweep(mechdesign.load(text=text.format("[4 deg, 50 deg]")))
 
 
@@ -172,7 +171,7 @@ kinematics: {{sweep: {{arm: {{from: 0, to: 90, step: 45}}}}}}
     ],
 )
 def test_targets_are_of_the_kind_of_their_output_and_drive(targets):
-    with pytest.raises(StudyError, match=WRONG.format("length", "angle")):
+    with pytest.raises(mechdesign.StudyError, match=WRONG.format("length", "angle")):
         mechdesign.load(text=TARGETS.format(targets))
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.studies import VARIED, study_of
 from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
-from mechdesign.errors import StudyError
+import mechdesign
 from mechdesign.questions.reliability import laws
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.laws import (
@@ -20,9 +21,11 @@ from mechdesign.questions.reliability.laws import (
     TruncatedNormal,
     Uniform,
 )
+from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
 from mechdesign.questions.reliability.pin_laws import PIN_LAWS
 from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.reliability.simulation import generator
+from mechdesign.questions.reliability.study_sources import find_sources
 
 SAMPLES = 200_000
 OF_SIGMA = [law.name for law in laws.LAWS.values() if not law.between_ends]
@@ -192,9 +195,9 @@ def test_correlation_of_any_two_laws_is_what_was_asked(names: tuple[str, str]) -
 
 def test_correlations_that_no_laws_have() -> None:
     three = [Normal(-3, 3)] * 3
-    with pytest.raises(StudyError, match="contradict"):
+    with pytest.raises(mechdesign.StudyError, match="contradict"):
         Correlation.of(three, {(0, 1): 0.9, (1, 2): 0.9, (0, 2): -0.9})
-    with pytest.raises(StudyError, match=r"cannot have -0\.9, only -0\.2 to 1"):
+    with pytest.raises(mechdesign.StudyError, match=r"cannot have -0\.9, only -0\.2 to 1"):
         Correlation.of([Lognormal(-6, 6, 1), Lognormal(-6, 6, 1)], {(0, 1): -0.9})
 
 
@@ -241,5 +244,32 @@ def test_measured_samples_with_outliers_are_drawn_with_the_correlation_asked(
 def test_what_a_measured_sample_cannot_reach_is_refused_with_its_range() -> None:
     """Uniform shares against one jump: at most sqrt(12 p (1 - p)/4) for a jump at the share p."""
     law = two_values(90, 10)
-    with pytest.raises(StudyError, match=r"cannot have 0.7, only -0.52.* to 0.52"):
+    with pytest.raises(mechdesign.StudyError, match=r"cannot have 0.7, only -0.52.* to 0.52"):
         Correlation.of([law, Uniform(0.0, 1.0)], {(0, 1): 0.7})
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("correlation", ["null", "[[crank.length, rod.length, 0.6]]"])
+def test_cumulants_are_those_of_what_is_drawn(correlation: str) -> None:
+    """Moments of random quadratic functions of all that varies against a million draws."""
+    changes = [] if correlation == "null" else [f"reliability.correlation={correlation}"]
+    sources, _ = find_sources(study_of(VARIED, *changes))
+    law = cumulants(sources)
+    count = 1_000_000
+    drawn = sources.draw(np.random.default_rng(5), count)
+    pins = drawn[len(sources.scalars) :].reshape(-1, 3, count)
+    z = np.concatenate([drawn[: len(sources.scalars)], (pins[:, :1] * pins[:, 1:]).reshape(-1, count)])
+    rng = np.random.default_rng(6)
+    sigma = np.sqrt(np.diagonal(law.covariance))
+    slope = rng.normal(size=(3, len(z))) / sigma
+    bend = rng.normal(size=(3, len(z), len(z))) / np.outer(sigma, sigma)
+    # The last is bent by the places of pins only, most of all by x^2 - y^2 and x y of each.
+    bend[2, :5], bend[2, :, :5] = 0.0, 0.0
+    bend += bend.swapaxes(1, 2)
+    mean, covariance = Quadratic(np.zeros(3), slope, bend).moments(law)
+    values = slope @ z + 0.5 * np.einsum("cij,in,jn->cn", bend, z, z, optimize=True)
+    centred = values - values.mean(axis=1, keepdims=True)
+    assert (np.abs(values.mean(axis=1) - mean) < 4.5 * values.std(axis=1) / np.sqrt(count)).all()
+    products = centred[:, None] * centred
+    error = products.std(axis=2) / np.sqrt(count)
+    assert (np.abs(products.mean(axis=2) - covariance) < 4.5 * error).all()

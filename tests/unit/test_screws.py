@@ -1,4 +1,4 @@
-"""Reciprocal wrenches and the stiffness that they give: invariances and awkward cases."""
+"""Reciprocal wrenches and the stiffness that they give: invariances and awkward cases; legs of a study."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.stiffness import ARM, BENT, FIVE_BAR, SLIDER, SLOTTED, ask_stiffness, matrix
+from helpers.studies import study_of
 
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.stiffness.body import ask
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches
-from mechdesign.questions.stiffness.force_method import Twists, load
+from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge
+from mechdesign.questions.stiffness.force_method import Twists, load, twists_of
 from mechdesign.questions.stiffness.network import Network, NetworkEdge
 from mechdesign.questions.stiffness.screws import (
     LegScrews,
@@ -273,3 +277,43 @@ def test_poses_of_a_batch_do_not_mix(solve: Callable[..., Any]) -> None:
     else:
         assert both[2].tolist() == [True, False]
         assert both[1][0].tolist() == alone[1][0].tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text", [FIVE_BAR, ARM, SLIDER, BENT, SLOTTED], ids=["five_bar", "arm", "slider", "bent", "slot"]
+)
+@pytest.mark.parametrize("share", [0.1, 1.0, 10.0])
+def test_the_force_method_gives_what_serial_legs_give(text: str, share: float) -> None:
+    """Whatever length rotations are counted by."""
+    study = study_of(text)
+    asked = ask(study)
+    assert asked.legs is not None
+    pose = study.mechanism.solve({name: [value] for name, value in study.stiffness.poses[0].items()}).configuration
+    held = load(twists_of(asked.network, asked.section, pose, share * asked.length(pose)), asked.size).held
+    result = ask_stiffness(text)
+    for letter, found in (("K", held.stiffness[0]), ("C", held.compliance[0])):
+        expected = matrix(result, letter)
+        scale = np.nanmax(np.abs(expected), initial=1e-300)
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-12 * scale, nan_ok=True)
+
+
+def test_leg_elements_in_order_from_the_base() -> None:
+    links = study_of(SLIDER).mechanism.description.links
+    upper, lower = Beam(links["crank"], "O", "A", "beam"), Beam(links["rod"], "A", "B", "beam")
+    crank, guide = ask(study_of(SLIDER)).legs
+    assert (crank.name, guide.name) == ("crank+rod", "guide")
+    assert crank.elements == (Hinge("O", "crank"), upper, Hinge("A"), lower, Hinge("B"))
+    assert [type(element) for element in guide.elements] == [Guide]
+    # A rigid drive is no element.
+    crank, _ = ask(study_of(SLIDER, "stiffness.actuators={}")).legs
+    assert crank.elements[0] == upper
+    _, lever = sorted(ask(study_of(SLOTTED)).legs, key=lambda leg: leg.name == "lever")
+    assert [type(element) for element in lever.elements] == [Hinge, Beam, Guide, Hinge]
+
+
+def test_a_link_of_several_points_is_one_beam_along_them() -> None:
+    bracket, _ = ask(study_of(BENT)).legs
+    link = study_of(BENT).mechanism.description.links["bracket"]
+    assert link.corners == ("O", "M", "A", "X")
+    assert [element for element in bracket.elements if isinstance(element, Beam)] == [Beam(link, "O", "A", "beam")]

@@ -7,7 +7,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 RADIAL, LENGTH = 0.5, 20.0
 # A slider on a line at 30 deg, moved along it; T is a point of the slider.
@@ -134,18 +133,18 @@ def test_every_method_agrees_on_a_slider_crank_with_slide_and_pin_clearances():
 )
 def test_a_slide_says_what_its_clearance_lacks(clearance, message):
     text = re.sub(r"\{guide: \{radial.*\}\}", f"{{guide: {clearance}}}", GUIDED)
-    with pytest.raises(StudyError, match=re.escape(message)):
+    with pytest.raises(mechdesign.StudyError, match=re.escape(message)):
         mechdesign.load(text=text)
 
 
 def test_a_slot_and_a_pin_have_no_length_and_form_no_walls():
-    with pytest.raises(StudyError, match="a pin in a slot does not tilt"):
+    with pytest.raises(mechdesign.StudyError, match="a pin in a slot does not tilt"):
         mechdesign.load(text=QUICK_RETURN.replace("H8/f7", "H8/f7, length: 9"))
-    with pytest.raises(StudyError, match="a pin's clearance has none"):
+    with pytest.raises(mechdesign.StudyError, match="a pin's clearance has none"):
         mechdesign.load(text=QUICK_RETURN.replace("slot: {fit", "P: {length: 9, fit"))
     slot = QUICK_RETURN.replace("H8/f7", "H8/f7, pin: contact")
     for text in (GUIDED.replace("PIN", "contact"), slot):
-        with pytest.raises(StudyError, match="ask for monte_carlo or another pin model"):
+        with pytest.raises(mechdesign.StudyError, match="ask for monte_carlo or another pin model"):
             mechdesign.load(text=text.replace("second_order", "form"))
 
 

@@ -9,7 +9,6 @@ import pytest
 from helpers.studies import IN_LINE, study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import Goal, goals_of
 from mechdesign.questions.optimize.question import designs_question
@@ -286,7 +285,7 @@ def test_sums_of_numbers_of_one_unit() -> None:
     ],
 )
 def test_mistakes_are_told_in_words(requirement: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         required(FOUR_BAR, requirement)
 
 

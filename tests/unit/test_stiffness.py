@@ -14,7 +14,6 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
 
 
 def test_five_bar_with_rigid_links_on_its_motors() -> None:
@@ -95,7 +94,7 @@ def test_listed_pose_that_fails_is_told_after_the_others() -> None:
     assert result.tables["stiffness"]["valid"].tolist() == [True, False]
     assert np.isnan(result.tables["stiffness"]["K11"][1])
     assert len(result.tables["springs"]) == 2
-    with pytest.raises(AssemblyError, match="no pose"):
+    with pytest.raises(mechdesign.AssemblyError, match="no pose"):
         ask_stiffness(FIVE_BAR, "stiffness.poses=[{P.x: 5, P.y: 5}]")
 
 
@@ -126,7 +125,7 @@ def test_result_does_not_depend_on_jobs_or_chunks(monkeypatch: pytest.MonkeyPatc
     ],
 )
 def test_what_has_no_stiffness_is_told(text: str, said: str) -> None:
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(mechdesign.StudyError, match=said):
         ask_stiffness(text)
 
 

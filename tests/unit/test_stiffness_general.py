@@ -8,13 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers.beam_model import Frame
-from helpers.stiffness import ARM, AXIAL, BENDING, BENT, FIVE_BAR, METRES, SLIDER, SLOTTED, ask_stiffness, matrix
+from helpers.stiffness import ARM, AXIAL, BENDING, BENT, METRES, ask_stiffness, matrix
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
-
-from mechdesign.questions.poses import solve_poses, study_poses
-from mechdesign.questions.stiffness.body import ask
-from mechdesign.questions.stiffness.force_method import load, twists_of
 
 PRESS = (
     METRES
@@ -134,23 +130,6 @@ def test_displacements_of_all_points_are_those_of_the_deflected_mechanism() -> N
     rigid = ask_stiffness(PRESS, "stiffness.elastic={}").tables
     ratio = rigid["forces"]["mz"][rigid["forces"]["joint"] == "O2"][0] / -1000
     assert rigid["deflections"]["dy"][0] == pytest.approx(-1000 * ratio**2 / 2000, rel=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "text", [FIVE_BAR, ARM, SLIDER, BENT, SLOTTED], ids=["five_bar", "arm", "slider", "bent", "slot"]
-)
-def test_the_force_method_gives_what_serial_legs_give(text: str) -> None:
-    study = study_of(text)
-    asked = ask(study)
-    assert asked.legs is not None
-    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
-    twists = twists_of(asked.network, asked.section, solved.configuration, asked.length(solved.configuration))
-    held = load(twists, asked.size).held
-    result = ask_stiffness(text)
-    for letter, found in (("K", held.stiffness[0]), ("C", held.compliance[0])):
-        expected = matrix(result, letter)
-        assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.nanmax(np.abs(expected), initial=1e-300))
 
 
 def test_motor_that_holds_a_link_from_the_ground_across_a_joint() -> None:

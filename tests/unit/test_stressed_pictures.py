@@ -13,8 +13,6 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Result
-from mechdesign.study import Study
 
 HAND = "hand_mit_schraubgreifer_für_große_kästen_und_übergrößen_links"
 ORIENTATIONS = f"""
@@ -95,6 +93,16 @@ matrix:
     mechanism.parameters.c: [59, 61]
 """
 )
+SLOPES = """
+mechanism:
+  parameters: {the_radius_of_the_crank: 30, l: 100, e: 10}
+  links: {ground: {O: [0, 0], G: [0, e]}, crank: [O, A, the_radius_of_the_crank], rod: [A, B, l], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [95, 10]}
+kinematics: {poses: [{crank: 60}], outputs: [B.x]}
+sensitivities: {results: [kinematics.B.x], parameters: [the_radius_of_the_crank, l, e, kinematics.poses.0.crank]}
+"""
 TIPS = [f"P{k}" for k in range(22)]
 PLACES = ", ".join(f"{tip}: [{3 * k}, {2 * k - 21}]" for k, tip in enumerate(TIPS))
 CURVES = f"""
@@ -122,7 +130,7 @@ stiffness:
 
 
 @cache
-def answered(command: str, text: str) -> tuple[Study, Result]:
+def answered(command: str, text: str) -> tuple[mechdesign.Study, mechdesign.Answer]:
     """A study and what is answered to its question."""
     study = study_of(text)
     return study, getattr(mechdesign, command)(study)
@@ -139,8 +147,10 @@ def answered(command: str, text: str) -> tuple[Study, Result]:
                                 "contributions"}),
         ("optimize", GOALS, {"CPI", "designs", "pareto", "hypervolume", "optimum"}),
         ("sweep", CASES, {"main_effects", "scatter", "response"}),
+        ("sensitivities", SLOPES, {"sensitivities"}),
     ],
-    ids=["seven orientations", "a thin strip", "a large press with small clearances", "three goals", "200 cases"],
+    ids=["seven orientations", "a thin strip", "a large press with small clearances", "three goals", "200 cases",
+         "a parameter of many letters"],
 )  # fmt: skip
 def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expected: set[str], look: str) -> None:
     given, result = answered(command, study)

@@ -2,10 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.mechanism.model import Drive, Fixed, Line, Prismatic, Slot
 
 FOUR_BAR = """
 mechanism:
@@ -33,10 +33,10 @@ def test_the_shortest_study(load):
     study = load(FOUR_BAR)
     assert study.name == "study"
     assert (study.units.length, study.units.angle, study.seed, study.questions) == ("mm", "deg", 0, ())
-    description = study.mechanism.description
-    assert description.drives == {"crank": Drive("crank", "angle", "crank")}
-    assert description.links["rod"].points == {"A": (0.0, 0.0), "B": ("rod.length", 0.0)}
-    assert nominal(description)["rod.length"] == 90.0
+    assert (study.mechanism.drives, study.mechanism.quantity("crank")) == (("crank",), "angle")
+    pose = study.mechanism.solve({"crank": 90})
+    assert (pose["A.x"], pose["A.y"]) == pytest.approx((0, 30), abs=1e-12)
+    assert math.hypot(pose["B.x"], pose["B.y"] - 30) == pytest.approx(90)
 
 
 @pytest.mark.parametrize(
@@ -105,18 +105,22 @@ mechanism:
 """
 
 
-def test_prismatic_defaults(load):
-    study = load(SLIDER)
-    joint = study.mechanism.description.joints["guide"]
-    assert joint == Prismatic("guide", Line("ground", "G", "guide.direction"), "slider", "B", "guide.angle")
-    assert nominal(study.mechanism.description)["guide.direction"] == 0.0
-    assert nominal(study.mechanism.description)["ground.G.y"] == -20.0
+def test_a_slide_is_level_by_default_and_meets_its_body_at_the_point_they_share(load):
+    mechanism = load(SLIDER).mechanism
+    pose = mechanism.solve({"theta": [0, 50, 130]})
+    assert pose["B.y"] == pytest.approx(-20)
+    assert pose["slider.angle"] == pytest.approx(0)
+    # Its direction and its angle are dimensions.
+    turned = mechanism.solve({"theta": [0, 50, 130]}, {"guide.direction": 10, "guide.angle": 5})
+    assert turned["B.y"] + 20 == pytest.approx(turned["B.x"] * math.tan(math.radians(10)))
+    assert np.abs(turned["slider.angle"] - 10) == pytest.approx(5)
 
 
 def test_a_line_through_two_points_has_no_direction_of_its_own(load):
-    description = load(SLIDER.replace("through: G", "through: [G, H]")).mechanism.description
-    assert description.joints["guide"].line == Line("ground", "G", 0.0, "H")
-    assert "guide.direction" not in description.places
+    mechanism = load(SLIDER.replace("through: G", "through: [G, H]")).mechanism
+    assert "guide.direction" not in mechanism.nominal
+    pose = mechanism.solve({"theta": 50}, {"ground.H.y": -18})
+    assert pose["B.y"] + 20 == pytest.approx(pose["B.x"] * 0.2)
 
 
 def test_angles_of_joints_are_places_in_radians(load):
@@ -142,20 +146,26 @@ mechanism:
   sketch: {E: [40, 40], A: [20, 10], C: [0, 10]}
 """
     text = text.replace("leg: null", "s: {slide: groove}")
-    description = load(text).mechanism.description
-    assert description.joints["groove"] == Slot("groove", Line("arm", None, "groove.direction"), "A")
-    assert description.links["leg"].telescopic
-    assert description.drives["s"] == Drive("s", "slide", "groove")
+    mechanism = load(text).mechanism
+    assert mechanism.drives == ("q", "s")
+    assert [mechanism.quantity(name) for name in mechanism.drives] == ["angle", "length"]
+    # The arm's line carries A, at any place from its beginning on.
+    pose = mechanism.solve({"q": 60, "s": [40, 70]})
+    assert pose["A.x"] == pytest.approx(np.array([40, 70]) / 2)
+    assert pose["A.y"] + 30 == pytest.approx(np.array([40, 70]) * math.sqrt(3) / 2)
     # The carrier's x axis is drawn upwards, the leg at atan2(10, 20).
-    assert description.joints["weld"] == Fixed("weld", ("leg", "carrier"), "O", "weld.angle")
-    assert nominal(description)["weld.angle"] == pytest.approx(math.pi / 2 - math.atan2(10, 20))
-    shown = load(text.replace("s: {slide: groove}", "leg: {length: leg}")).mechanism.description
-    assert shown.drives["leg"] == Drive("leg", "length", "leg")
+    welded = math.degrees(math.pi / 2 - math.atan2(10, 20))
+    assert pose["carrier.angle"] - pose["leg.angle"] == pytest.approx(welded)
+    by_leg = load(text.replace("s: {slide: groove}", "leg: {length: leg}")).mechanism
+    pose = by_leg.solve({"q": 60, "leg": 25})
+    assert math.hypot(pose["A.x"], pose["A.y"]) == pytest.approx(25)
 
 
 def test_a_drive_list_names_links_legs_and_slides(load):
     text = SLIDER.replace("drives: {theta: {angle: crank}}", "drives: [guide]")
-    assert load(text).mechanism.description.drives == {"guide": Drive("guide", "slide", "guide")}
+    mechanism = load(text).mechanism
+    assert (mechanism.drives, mechanism.quantity("guide")) == (("guide",), "length")
+    assert mechanism.solve({"guide": 100})["B.x"] == pytest.approx(100)
 
 
 def test_limits_and_measures(load):

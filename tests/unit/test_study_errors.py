@@ -5,8 +5,6 @@ import time
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.study import load
 
 STUDY = """\
 mechanism:
@@ -24,7 +22,7 @@ mechanism:
 def problems(tmp_path, monkeypatch, text, *overrides):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.yaml").write_text(text)
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         mechdesign.load("study.yaml", overrides)
     return str(caught.value).splitlines()
 
@@ -346,9 +344,9 @@ def test_what_is_no_mapping_is_no_study(tmp_path, monkeypatch, text):
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    with pytest.raises(StudyError, match=r"missing.yaml: cannot be read: No such file"):
+    with pytest.raises(mechdesign.StudyError, match=r"missing.yaml: cannot be read: No such file"):
         mechdesign.load(tmp_path / "missing.yaml")
-    with pytest.raises(StudyError, match="cannot be read: Is a directory"):
+    with pytest.raises(mechdesign.StudyError, match="cannot be read: Is a directory"):
         mechdesign.load(tmp_path)
 
 
@@ -364,7 +362,7 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_a_missing_section_is_told_with_its_file_and_line(tmp_path, question, said):
     path = tmp_path / "study.yaml"
     path.write_text(STUDY)
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         getattr(mechdesign, question)(mechdesign.load(path))
     assert str(caught.value).startswith(f"{path}:1:1: {said}")
 
@@ -375,8 +373,8 @@ def test_thousands_of_mistakes_are_reported_in_proportion(part: str) -> None:
     def seconds(number: int) -> float:
         keys = f"\n{'  ' * ('kin' in part)}".join(f"kinematisc{index}: 1" for index in range(number))
         begun = time.process_time()
-        with pytest.raises(StudyError) as caught:
-            load(text=part.format(keys))
+        with pytest.raises(mechdesign.StudyError) as caught:
+            mechdesign.load(text=part.format(keys))
         told = str(caught.value).splitlines()
         assert len(caught.value.problems) >= number
         assert len(told) == 101
@@ -389,16 +387,16 @@ def test_thousands_of_mistakes_are_reported_in_proportion(part: str) -> None:
 
 def test_names_are_suggested_for_the_first_twenty() -> None:
     keys = "\n".join(f"kinematic{index}: 1" for index in range(50))
-    with pytest.raises(StudyError) as caught:
-        load(text=keys)
+    with pytest.raises(mechdesign.StudyError) as caught:
+        mechdesign.load(text=keys)
     assert str(caught.value).count("did you mean 'kinematics'?") == 20
 
 
 def test_what_is_echoed_is_short_and_printable() -> None:
     odd = r'"\x1b[2J\u202e\n\0' + "x" * 900 + '"'
     text = f"{odd}: 1\nmechanism: {{links: {{{odd}: 1}}, drives: [{odd}]}}"
-    with pytest.raises(StudyError) as caught:
-        load(text=text, overrides=[f"seed={'9' * 500}x"])
+    with pytest.raises(mechdesign.StudyError) as caught:
+        mechdesign.load(text=text, overrides=[f"seed={'9' * 500}x"])
     told = str(caught.value).splitlines()
     assert len(told) == len(caught.value.problems) >= 4
     assert all(line.isprintable() and len(line) < 400 for line in told)
@@ -408,14 +406,16 @@ def test_what_is_echoed_is_short_and_printable() -> None:
 @pytest.mark.nightly
 def test_a_mechanism_has_a_bounded_number_of_links() -> None:
     links = "".join(f"    a{index}: [O, P{index}, 1]\n" for index in range(20_000))
-    with pytest.raises(StudyError, match=r"mechanism\.links: 20001 links are too many"):
-        load(text=f"mechanism:\n  links:\n    ground: {{O: [0, 0]}}\n{links}  drives: [a1]\n")
+    with pytest.raises(mechdesign.StudyError, match=r"mechanism\.links: 20001 links are too many"):
+        mechdesign.load(text=f"mechanism:\n  links:\n    ground: {{O: [0, 0]}}\n{links}  drives: [a1]\n")
 
 
 def test_a_sketch_in_a_singular_pose_is_told_as_such() -> None:
     # All legs point at P: with drawn places that are rounded, the platform cannot turn into the lengths measured.
-    with pytest.raises(StudyError, match=r"the sketch may be drawn in a singular pose.*the platform turned a little"):
-        load(
+    with pytest.raises(
+        mechdesign.StudyError, match=r"the sketch may be drawn in a singular pose.*the platform turned a little"
+    ):
+        mechdesign.load(
             text="""\
 mechanism:
   links:

@@ -3,7 +3,6 @@
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 STUDY = """\
 mechanism:
@@ -73,7 +72,7 @@ def test_dotted_names(load, override, read, value):
     ],
 )
 def test_wrong_overrides(load, override, message):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         load(override)
     assert str(caught.value).startswith(f"--set {override}")
     assert message in str(caught.value)
@@ -92,7 +91,7 @@ def test_wrong_overrides(load, override, message):
     ],
 )
 def test_what_an_override_adds_for_nothing(load, overrides, message):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         load(*overrides)
     assert str(caught.value).startswith(f"--set {overrides[0]}") or len(overrides) > 1
     assert message in str(caught.value)
@@ -141,7 +140,7 @@ def test_a_parameter_that_nothing_uses_is_told(use, tmp_path):
 
 @pytest.mark.parametrize("text", ["²", "99999999999999999999", "٣", "-1", "1e3", "", " "])
 def test_odd_places_in_a_list(text, load):
-    with pytest.raises(StudyError):
+    with pytest.raises(mechdesign.StudyError):
         load(f"mechanism.links.rocker.{text}=3")
 
 
@@ -150,7 +149,7 @@ def test_odd_places_in_a_list(text, load):
     ["\udcff=3", "name=\udcff", "a\n.b=3", "x" * 100_000 + "=1", ".".join("a" * 3000) + "=1", "seed=\x00", "=", "."],
 )
 def test_odd_overrides(override, load):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         load(override)
     assert len(str(caught.value)) < 2000
 

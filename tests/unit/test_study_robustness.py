@@ -7,16 +7,18 @@ import tempfile
 from pathlib import Path
 
 import pytest
+import yaml
+from helpers import command_line
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.study import template
-from mechdesign.study.templates import templates
-from mechdesign.study.text.document import read
 
-STUDIES = [read(template(name).encode(), name).data for name in templates()]
+TEMPLATES = {
+    name: command_line.ask("new", name, study="").stdout
+    for name in ("five_bar", "four_bar", "slider_crank", "two_link_arm")
+}
+STUDIES = [yaml.safe_load(text) for text in TEMPLATES.values()]
 WORDS = [
     "O",
     "A",
@@ -70,16 +72,16 @@ def test_damaged_studies(data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.yaml"
         path.write_text(json.dumps(study))
-        with contextlib.suppress(StudyError):
+        with contextlib.suppress(mechdesign.StudyError):
             mechdesign.load(path)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", templates())
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_half_written_studies(name, tmp_path):
-    lines = template(name).splitlines(keepends=True)
+    lines = TEMPLATES[name].splitlines(keepends=True)
     path = tmp_path / "study.yaml"
     for count in range(len(lines)):
         path.write_text("".join(lines[:count]))
-        with contextlib.suppress(StudyError):
+        with contextlib.suppress(mechdesign.StudyError):
             mechdesign.load(path)

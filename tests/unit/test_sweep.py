@@ -10,11 +10,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import Interrupted, StudyError
-from mechdesign.experiments import sweep as room
-from mechdesign.experiments.design import cases_of
-from mechdesign.numerics.arrays import Floats
-from mechdesign.work.journal import Journal
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE = "kinematics.extremes.B.x.range"
@@ -26,8 +21,9 @@ def study_of(matrix: dict[str, Any], **more: Any) -> Any:
     return mechdesign.load(text=SLIDER_CRANK, overrides={"matrix": matrix} | more)
 
 
-def columns_of(matrix: dict[str, Any], seed: int = 0) -> Floats:
-    return np.array([[value for _, value in case] for case in cases_of(study_of(matrix, seed=seed))])
+def columns_of(matrix: dict[str, Any], seed: int = 0) -> np.ndarray:
+    table = mechdesign.sweep(study_of(matrix, seed=seed)).main
+    return np.array([table[entry] for entry in matrix["vary"]]).T
 
 
 def test_a_grid_of_slider_cranks():
@@ -82,7 +78,7 @@ def test_sobol_has_one_sample_in_each_elementary_rectangle():
 
 def test_words_of_a_random_design_come_equally_often():
     matrix = {"vary": {"mechanism.branch": ["side", "follow"], R: "20:30"}, "method": "latin_hypercube", "samples": 10}
-    words = [dict(case)["mechanism.branch"] for case in cases_of(study_of(matrix))]
+    words = mechdesign.sweep(study_of(matrix)).main["mechanism.branch"].tolist()
     assert (words.count("side"), words.count("follow")) == (5, 5)
 
 
@@ -145,47 +141,24 @@ def test_cases_of_a_file(tmp_path: Path):
         ({"cases": "none.csv"}, "none.csv cannot be read"),
     ],
 )
-def test_what_is_wrong_is_told_before_anything_is_computed(
-    matrix: dict[str, Any], message: str, monkeypatch: pytest.MonkeyPatch
-):
-    def computed(*_: object, **__: object) -> None:
-        raise AssertionError("a case was computed")
+def test_what_is_wrong_is_told_before_anything_is_computed(matrix: dict[str, Any], message: str):
+    class Untouched:
+        """Progress of nothing."""
 
-    monkeypatch.setattr(room, "answers", computed)
-    with pytest.raises(StudyError) as error:
-        mechdesign.sweep(study_of(matrix))
+        def start(self, total: int, stage: str) -> None:
+            raise AssertionError("a case was begun")
+
+        update = start
+
+    with pytest.raises(mechdesign.StudyError) as error:
+        mechdesign.sweep(study_of(matrix), progress=Untouched())
     assert message in str(error.value)
 
 
 def test_nothing_asked_of_a_case_is_an_error():
     study = mechdesign.load(text=SLIDER_CRANK.partition("requirements")[0], overrides={"matrix": {"vary": {R: [1]}}})
-    with pytest.raises(StudyError, match="what is to be found of each case"):
+    with pytest.raises(mechdesign.StudyError, match="what is to be found of each case"):
         mechdesign.sweep(study)
-
-
-@pytest.mark.slow
-def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    study = study_of({"vary": {R: [20, 30, 40]}})
-    whole = mechdesign.sweep(study).main
-    answered, computed = room.answers, []
-
-    def stopped(*given: Any, **options: Any) -> Any:
-        for each in answered(*given, **options):
-            yield each
-            computed.append(each)
-            if len(computed) == 2:
-                raise KeyboardInterrupt
-
-    monkeypatch.setattr("mechdesign.experiments.cases.CASES_AT_ONCE", 1)
-    monkeypatch.setattr(room, "answers", stopped)
-    path = tmp_path / "unfinished.npz"
-    with pytest.raises(Interrupted) as interrupt:
-        mechdesign.sweep(study, journal=Journal(path, {"origin": 1}))
-    assert interrupt.value.result.main[R].tolist() == [20, 30]
-    again = mechdesign.sweep(study, journal=Journal(path, {"origin": 1}, resume=True)).main
-    assert len(computed) == 3
-    for column in whole.columns:
-        np.testing.assert_array_equal(again[column.name], column.values)
 
 
 @pytest.mark.slow

@@ -6,12 +6,13 @@ import json
 
 import numpy as np
 
+import mechdesign
 from mechdesign.report.tables import from_csv, json_blocks, to_csv
-from mechdesign.results import Column, Table
+from mechdesign.results import LongTable
 
 
 def table(**columns):
-    return Table("t", tuple(Column(name, np.asarray(values)) for name, values in columns.items()))
+    return mechdesign.Table("t", tuple(mechdesign.Column(name, np.asarray(values)) for name, values in columns.items()))
 
 
 def test_numbers_have_twelve_significant_digits():
@@ -54,3 +55,9 @@ def test_json_and_csv_say_the_same_digits():
 
 def test_a_table_without_rows_is_an_empty_list():
     assert json.loads("".join(json_blocks(table(x=np.array([]))))) == []
+
+
+def test_a_table_that_is_made_block_by_block_shows_itself_as_if_it_were_in_memory():
+    whole = table(x=np.arange(30) / 7, valid=np.arange(30) > 0)
+    long = LongTable(whole.take(np.arange(10)), 30, lambda: iter([whole]))
+    assert long._repr_html_() == whole._repr_html_()

@@ -9,11 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.kinematics.targets import nearest
-from mechdesign.questions.optimize.analysis import optimize
-from mechdesign.results import Table
 
 FOUR_BAR = """\
 mechanism:
@@ -39,8 +34,8 @@ mechanism:
 """
 
 
-def motion(targets: str, *overrides: str, text: str = FOUR_BAR) -> Table:
-    return kinematics(study_of(text.replace("TARGETS", targets), *overrides)).tables["motion"]
+def motion(targets: str, *overrides: str, text: str = FOUR_BAR) -> mechdesign.Table:
+    return mechdesign.kinematics(study_of(text.replace("TARGETS", targets), *overrides)).tables["motion"]
 
 
 def test_a_function_of_the_drive_and_parameters() -> None:
@@ -75,7 +70,9 @@ def test_measures_have_targets() -> None:
 
 
 def test_what_has_a_target_is_an_output_but_not_of_the_jacobian() -> None:
-    result = kinematics(study_of(FOUR_BAR.replace("TARGETS", "{C.y: 40}"), "kinematics.outputs=[rocker.angle]"))
+    result = mechdesign.kinematics(
+        study_of(FOUR_BAR.replace("TARGETS", "{C.y: 40}"), "kinematics.outputs=[rocker.angle]")
+    )
     assert result.tables["jacobian"].names == ("theta", "rocker.angle_by_theta", "valid")
     names = result.tables["motion"].names
     assert names == ("theta", "rocker.angle", "C.y", "C.y_error", "det_J", "inverse_condition", "conditioning", "valid")
@@ -107,7 +104,7 @@ def test_three_columns_are_the_drive_and_the_point() -> None:
 
 def test_a_table_over_one_turn_serves_all_turns_and_nothing_outside_it() -> None:
     targets = "{B.x: [[0, 70], [90, 79], [180, 70]]}"
-    result = kinematics(
+    result = mechdesign.kinematics(
         study_of(FOUR_BAR.replace("TARGETS", targets), "kinematics.sweep.theta={from: -360, to: 0, step: 90}")
     )
     table = result.tables["motion"]
@@ -131,7 +128,7 @@ def test_files_stand_beside_the_study(tmp_path: Path) -> None:
     (tmp_path / "values.csv").write_text("\n".join(["y", *["7"] * 37]))
     targets = "{C: {file: path.csv}, B.y: values.csv}"
     (tmp_path / "study.yaml").write_text(FOUR_BAR.replace("TARGETS", targets))
-    table = kinematics(mechdesign.load(tmp_path / "study.yaml")).tables["motion"]
+    table = mechdesign.kinematics(mechdesign.load(tmp_path / "study.yaml")).tables["motion"]
     assert table["C.x_error"] == pytest.approx(table["C.x"] - 1)
     assert table["B.y_error"] == pytest.approx(table["B.y"] - 7)
 
@@ -139,7 +136,7 @@ def test_files_stand_beside_the_study(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_errors_of_a_turn_are_those_of_the_curve() -> None:
     targets = '{rocker.angle: "100", C: [[0, 50], [60, 50]]}'
-    table = kinematics(study_of(FOUR_BAR.replace("TARGETS", targets), "kinematics.sweep.theta.step=30"))
+    table = mechdesign.kinematics(study_of(FOUR_BAR.replace("TARGETS", targets), "kinematics.sweep.theta.step=30"))
     fine = motion(targets, "kinematics.sweep.theta.step=0.1")
     table = table.tables["targets"]
     assert list(table["output"]) == ["rocker.angle", "C.x", "C.y", "C"]
@@ -154,13 +151,13 @@ def test_errors_of_a_turn_are_those_of_the_curve() -> None:
 
 def test_errors_of_listed_poses_are_those_of_the_poses() -> None:
     poses = "{poses: [{theta: 0}, {theta: 90}, {theta: 180}, {theta: 270}]}"
-    result = kinematics(study_of(FOUR_BAR.replace("TARGETS", "{A.x: 0}"), f"kinematics={poses}"))
+    result = mechdesign.kinematics(study_of(FOUR_BAR.replace("TARGETS", "{A.x: 0}"), f"kinematics={poses}"))
     (rms, *_), (largest, *_) = result.tables["targets"]["rms"], result.tables["targets"]["max_abs"]
     assert (rms, largest) == pytest.approx((np.sqrt(450), 30))
 
 
 def test_the_root_mean_square_over_a_turn_counts_its_start_once() -> None:
-    targets = kinematics(study_of(FOUR_BAR.replace("TARGETS", "{A.x: 0}"))).tables["targets"]
+    targets = mechdesign.kinematics(study_of(FOUR_BAR.replace("TARGETS", "{A.x: 0}"))).tables["targets"]
     assert targets["rms"][0] == pytest.approx(30 / np.sqrt(2), rel=1e-12)
     assert targets["mean"][0] == pytest.approx(0, abs=1e-12)
 
@@ -171,7 +168,7 @@ def test_errors_count_up_to_a_limit() -> None:
             "kinematics:", "  limits: [{drive: theta, min: 0, max: 85}]\nkinematics:"
         )
     )
-    table = kinematics(study).tables["targets"]
+    table = mechdesign.kinematics(study).tables["targets"]
     assert table["max_abs"][0] == pytest.approx(30 * np.sin(np.radians(85)), rel=1e-9)
 
 
@@ -179,9 +176,9 @@ def test_errors_count_up_to_a_limit() -> None:
 def test_extremes_of_errors_lie_between_the_poses() -> None:
     targets = '{B.x: "70 + 5*sin(theta)", C: [[0, 50], [20, 60], [60, 50]], gap: 90}'
     coarse, fine = (
-        kinematics(study_of(FOUR_BAR.replace("TARGETS", targets), f"kinematics.sweep.theta.step={step}")).tables[
-            "extremes"
-        ]
+        mechdesign.kinematics(
+            study_of(FOUR_BAR.replace("TARGETS", targets), f"kinematics.sweep.theta.step={step}")
+        ).tables["extremes"]
         for step in (10, 0.01)
     )
     rows = [name.endswith("_error") for name in fine["output"]]
@@ -192,19 +189,26 @@ def test_extremes_of_errors_lie_between_the_poses() -> None:
     assert coarse["max"][list(coarse["output"]).index("B.x_error")] > np.max(sampled["B.x_error"])
 
 
-def test_nearest_points_of_a_polyline() -> None:
-    corners = np.array([0, 1, 1, 1 + 1j])  # with a corner twice
-    points = np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j, np.nan])
-    assert nearest(points, corners)[0][:4] == pytest.approx([0.5, 0, 1 + 0.5j, 1 + 1j])
-    assert np.isnan(nearest(points, corners)[0][4])
-    assert nearest(points, corners[:1])[0][:4] == pytest.approx([0, 0, 0, 0])
-    # Against every point of a fine subdivision of each piece, in more blocks than one.
+def to_polyline(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Errors of an arm's end, held at points, of a path given by corners, as x + iy."""
+    poses = [{"P.x": float(point.real), "P.y": float(point.imag)} for point in points]
+    path = [[float(corner.real), float(corner.imag)] for corner in corners]
+    table = motion(f"{{P: {path}}}", f"kinematics={{poses: {poses}}}", text=ARM)
+    assert table["P_error"] == pytest.approx(np.hypot(table["P.x_error"], table["P.y_error"]), nan_ok=True)
+    return table["P.x_error"] + 1j * table["P.y_error"]
+
+
+def test_a_path_is_met_at_the_nearest_point_of_its_pieces() -> None:
+    corners = 10 + 3j + np.array([0, 0.5, 1, 1, 1 + 1j])  # with a corner twice
+    points = 10 + 3j + np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j])
+    assert to_polyline(points, corners) == pytest.approx([0.2j, -1 - 1j, 1, 1 + 2j], abs=1e-9)
+    # Against every point of a fine subdivision of each piece.
     rng = np.random.default_rng(1)
-    points, corners = rng.normal(size=(3000, 2)) @ [1, 1j], rng.normal(size=(400, 2)) @ [1, 1j]
+    points, corners = (10 + 3j + rng.normal(size=(count, 2)) @ [1, 1j] for count in (40, 400))
     fine = (corners[:-1, None] + np.diff(corners)[:, None] * np.linspace(0, 1, 201)).ravel()
-    distance = np.abs(points[:50, None] - fine).min(axis=1)
-    found = np.abs(points - nearest(points, corners)[0])[:50]
-    assert (found <= distance + 1e-12).all()
+    distance = np.abs(points[:, None] - fine).min(axis=1)
+    found = np.abs(to_polyline(points, corners))
+    assert (found <= distance + 1e-9).all()
     assert found == pytest.approx(distance, abs=0.05)
 
 
@@ -240,20 +244,20 @@ def test_nearest_points_of_a_polyline() -> None:
     ],
 )
 def test_wrong_targets(targets: str, message: str) -> None:
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         study_of(FOUR_BAR.replace("TARGETS", targets))
     assert message in str(caught.value)
     assert str(caught.value).startswith("<study>:11:")
 
 
 def test_every_wrong_target_is_told_beside_other_mistakes() -> None:
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(mechdesign.StudyError) as caught:
         study_of(FOUR_BAR.replace("TARGETS", "{B.x: 1/0, Q: 3, C.x: [1]}").replace("[D, B, 60]", "[D, B, -60]"))
     assert len(caught.value.problems) == 3
 
 
 def test_no_single_drive_to_interpolate_over() -> None:
-    with pytest.raises(StudyError, match="of upper, fore no single one is swept; give one row a pose"):
+    with pytest.raises(mechdesign.StudyError, match="of upper, fore no single one is swept; give one row a pose"):
         study_of(ARM.replace("TARGETS", "{P: [[0, 1, 2], [9, 3, 4]]}"), "kinematics.poses=[{upper: 1, fore: 2}]")
 
 
@@ -266,6 +270,6 @@ def test_an_optimisation_minimises_the_largest_error(tmp_path: Path) -> None:
     (tmp_path / "study.yaml").write_text(
         text + "optimize: {variables: {r: {from: 50, to: 70, step: 5}}, minimize: [kinematics.rocker.angle_error]}"
     )
-    optimum = optimize(mechdesign.load(tmp_path / "study.yaml")).tables["optimum"]
+    optimum = mechdesign.optimize(mechdesign.load(tmp_path / "study.yaml")).tables["optimum"]
     assert optimum["r"] == [60]
     assert optimum["kinematics.rocker.angle_error"] == pytest.approx(0, abs=1e-6)

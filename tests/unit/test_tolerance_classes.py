@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.questions.reliability.laws import fit_law
 from mechdesign.questions.reliability.schema.iso_tolerances import (
     ToleranceClassError,
@@ -164,7 +163,7 @@ def test_a_parameter_has_the_class_of_the_length_that_it_sets():
     )  # fmt: skip
     found = mechdesign.load(text=text + "reliability: {dimensions: {r: js9}}")
     assert ends(found, "r")[1] == pytest.approx(0.0435)
-    with pytest.raises(StudyError, match="js9 is of a length or an angle of the drawing"):
+    with pytest.raises(mechdesign.StudyError, match="js9 is of a length or an angle of the drawing"):
         mechdesign.load(text=text + "reliability: {dimensions: {k: js9}}")
 
 
@@ -175,7 +174,7 @@ def test_classes_go_by_millimetres_in_any_unit():
     found = mechdesign.load(text=text + section)
     assert ends(found, "arm.length")[1] == pytest.approx(0.037 / 25.4)
     assert found.reliability.clearances["P"].radius == pytest.approx(0.5 * 0.024 / 25.4)
-    with pytest.raises(StudyError, match="this study's lengths are dimensionless"):
+    with pytest.raises(mechdesign.StudyError, match="this study's lengths are dimensionless"):
         mechdesign.load(text=text.replace("length: in", "length: dimensionless") + section)
 
 
@@ -190,7 +189,7 @@ def test_an_angle_goes_by_its_shorter_leg():
     """
     found = mechdesign.load(text=text + f"reliability: {{poses: [{{arm: 70}}], outputs: [T], {section}}}")
     assert ends(found, "plate.angle") == pytest.approx((-0.5, 0.5))
-    with pytest.raises(StudyError, match="shorter leg; say which"):
+    with pytest.raises(mechdesign.StudyError, match="shorter leg; say which"):
         mechdesign.load(text=text + "reliability: {dimensions: {plate.angle: ISO 2768-c}}")
 
 
@@ -213,7 +212,7 @@ def test_an_angle_goes_by_its_shorter_leg():
     ],
 )  # fmt: skip
 def test_wrong_classes_and_fits_say_what_to_write(section, message):
-    with pytest.raises(StudyError, match=re.escape(message)):
+    with pytest.raises(mechdesign.StudyError, match=re.escape(message)):
         study(section)
 
 

@@ -7,10 +7,7 @@ import pytest
 from helpers.studies import study_of
 from scipy.interpolate import CubicSpline
 
-from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.reliability.analysis import reliability
+import mechdesign
 
 # Whitworth's slotted arm follows the pin of a crank about a pivot inside of its circle, and a wheel follows the arm.
 WHITWORTH = """
@@ -37,7 +34,7 @@ def whitworth(
     return WHITWORTH % locals()
 
 
-def arm_of(crank: Floats, radius: float, pivot: float) -> Floats:
+def arm_of(crank: np.ndarray, radius: float, pivot: float) -> np.ndarray:
     """Angle of an arm about a pivot inside of a crank's circle, on the axis; less than half a turn from the crank's."""
     pin = radius * np.exp(1j * np.radians(crank))
     return crank + np.degrees(np.angle((pin - pivot) * np.exp(-1j * np.radians(crank))))
@@ -52,7 +49,9 @@ def test_a_wheel_counts_the_turns_of_a_slotted_arm(
     begin: float, end: float, c: float, ratio: float, step: float
 ) -> None:  # fmt: skip
     step = step if end > begin else -step
-    motion = kinematics(study_of(whitworth(begin, end, step, c=c, law=f"to: {ratio}*arm.angle"))).tables["motion"]
+    motion = mechdesign.kinematics(study_of(whitworth(begin, end, step, c=c, law=f"to: {ratio}*arm.angle"))).tables[
+        "motion"
+    ]
     wheel = ratio * arm_of(motion["theta"], 100, c)
     assert motion["wheel.angle"] == pytest.approx(wheel, abs=1e-9)
     assert motion["P.y"] == pytest.approx(20 * np.sin(np.radians(wheel)), abs=1e-9)
@@ -70,7 +69,7 @@ def test_turns_count_in_sweeps_of_any_coordinate(
     begin: float, step: float, swept: str, drive: str, law: str, ratio: float
 ) -> None:  # fmt: skip
     study = study_of(whitworth(begin, begin + 12 * step, step, swept=swept, drive=drive, law=law))
-    motion = kinematics(study).tables["motion"]
+    motion = mechdesign.kinematics(study).tables["motion"]
     followed = motion["arm.angle"] if ratio else motion["crank.angle"]
     assert motion["wheel.angle"] == pytest.approx((ratio or 0.3) * followed, abs=1e-9)
     # Whole turns aside, which are those of the first pose, both go on without a jump.
@@ -85,7 +84,7 @@ def test_expressions_and_tables_count_turns() -> None:
         (f"of: arm.angle, table: {table}", spline),
         ("to: 90*sin(arm.angle/3) + arm.angle/7", lambda x: 90 * np.sin(np.radians(x / 3)) + x / 7),
     ):
-        motion = kinematics(study_of(whitworth(-200, 1240, 120, law=law))).tables["motion"]
+        motion = mechdesign.kinematics(study_of(whitworth(-200, 1240, 120, law=law))).tables["motion"]
         assert motion["wheel.angle"] == pytest.approx(value(arm_of(motion["theta"], 100, 40)), abs=1e-9)
 
 
@@ -118,7 +117,7 @@ def test_a_coupling_that_follows_by_a_coupling_counts_turns(ratio: float, begin:
     tip = 325 + 90 * (pin - 325) / abs(pin - 325)
     places = ([float(place.real), float(place.imag)] for place in (pin, tip))
     study = study_of(CHAIN % (ratio, *places, begin, begin + 16 * step, step))
-    motion = kinematics(study).tables["motion"]
+    motion = mechdesign.kinematics(study).tables["motion"]
     # In the sketch angles lie between -180 and 180 deg.
     at_sketch = arm_of(drawn, 30, -15)
     turns = 360 * np.round(at_sketch / 360)
@@ -143,7 +142,7 @@ mechanism:
   sketch: {{B: [0, 100], C: [70, 140]}}
 kinematics: {{path: {{C: {path}}}, outputs: [C, one.angle, wheel.angle]}}
 """)
-    motion = kinematics(study).tables["motion"]
+    motion = mechdesign.kinematics(study).tables["motion"]
     place = motion["C.x"] + 1j * motion["C.y"]
     reach = np.abs(place)
     one = np.unwrap(np.angle(place)) + np.arccos((100**2 + reach**2 - 80**2) / (200 * reach))
@@ -156,14 +155,14 @@ kinematics: {{path: {{C: {path}}}, outputs: [C, one.angle, wheel.angle]}}
 @pytest.mark.slow
 def test_extremes_between_poses_and_efforts_are_those_of_the_turns() -> None:
     text = whitworth(0, 720, 120)
-    extremes = kinematics(study_of(text)).tables["extremes"]
+    extremes = mechdesign.kinematics(study_of(text)).tables["extremes"]
     rows = list(extremes["output"])
     angle = arm_of(np.linspace(0, 720, 100_001), 100, 40)
     assert extremes["max"][rows.index("P.y")] == pytest.approx(np.sin(np.radians(-0.5 * angle)).max() * 20, abs=1e-6)
     loads = "dynamics: {loads: [{at: P, force: [10, 0]}], sweep: {theta: {from: 0, to: 720, step: 120}}}"
-    effort = dynamics(study_of(text + loads)).tables["dynamics"]
+    effort = mechdesign.dynamics(study_of(text + loads)).tables["dynamics"]
 
-    def work(theta: Floats) -> Floats:
+    def work(theta: np.ndarray) -> np.ndarray:
         return 200 * np.cos(np.radians(-0.5 * arm_of(theta, 100, 40)))
 
     slope = np.degrees(work(effort["theta"] + 1e-3) - work(effort["theta"] - 1e-3)) / 2e-3
@@ -183,7 +182,7 @@ reliability:
   samples: 1000
 """
     )
-    moments = reliability(study).tables["moments"]
+    moments = mechdesign.reliability(study).tables["moments"]
     place = 140 + 20 * np.exp(-0.5j * np.radians(arm_of(moments["theta"], 100, 40)))
     nominal = np.where(moments["output"] == "P.x", place.real, place.imag)
     assert moments["nominal"] == pytest.approx(nominal, abs=1e-9)

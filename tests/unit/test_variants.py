@@ -10,9 +10,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.mechanism.mechanism import drawn
-from mechdesign.study import Study
 from mechdesign.study.designs import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -72,11 +70,11 @@ mechanism:
 """
 
 
-def places_in(study: Study) -> Mapping[str, float]:
+def places_in(study: mechdesign.Study) -> Mapping[str, float]:
     return study.mechanism.nominal
 
 
-def alike(study: Study, other: Study, commands: tuple[str, ...] = ("kinematics",)) -> None:
+def alike(study: mechdesign.Study, other: mechdesign.Study, commands: tuple[str, ...] = ("kinematics",)) -> None:
     """Places, sections, parameters and every number that follows from them."""
     assert places_in(study) == pytest.approx(places_in(other), rel=1e-14, abs=1e-14)
     assert study.parameters.nominal == pytest.approx(other.parameters.nominal, rel=1e-14)
@@ -186,7 +184,7 @@ def test_configurations_with_every_length_changed(name: str) -> None:
     alike(found, _from_data(found))
 
 
-def _from_data(study: Study) -> Study:
+def _from_data(study: mechdesign.Study) -> mechdesign.Study:
     import yaml
 
     return study_of(yaml.safe_dump(study.resolved, sort_keys=False))
@@ -209,9 +207,9 @@ def test_numbers_that_make_no_mechanism() -> None:
         ({"r": np.nan}, "r has no finite value"),
         ({"limits.0.min": -1.0}, "never negative"),
     ):
-        with pytest.raises(StudyError, match=message):
+        with pytest.raises(mechdesign.StudyError, match=message):
             variant(study, changed)
-    with pytest.raises(StudyError, match="nose: is neither a parameter nor a dimension"):
+    with pytest.raises(mechdesign.StudyError, match="nose: is neither a parameter nor a dimension"):
         variant(study, {"nose": 1.0})
 
 
@@ -232,7 +230,7 @@ kinematics: {poses: [{floor: 0}, {floor: 10}], outputs: [F]}
 def test_a_closed_chain_of_slides_whose_angles_contradict() -> None:
     found = variant(study_of(WEDGE), {"slope": 30.0})
     assert mechdesign.kinematics(found).main["F.y"] == pytest.approx(np.array([30, 20]) * np.tan(np.radians(30)))
-    with pytest.raises(StudyError, match="contradict"):
+    with pytest.raises(mechdesign.StudyError, match="contradict"):
         variant(study_of(WEDGE), {"incline.direction": 30.0})
 
 
@@ -246,3 +244,14 @@ def test_dimensions_with_which_the_drawn_pose_cannot_be_assembled() -> None:
     assert 0 < tables["motion"]["valid"].sum() < len(tables["motion"])
     loop = next(iter(tables["loops"]))
     assert [loop[f"{part}_length"] for part in ("frame", "input", "coupler", "output")] == pytest.approx([4, 2, 0.4, 3])
+
+
+@pytest.mark.slow
+def test_a_variant_without_a_closed_form_that_closes_at_a_pose_but_not_at_the_sketchs() -> None:
+    sketch = ("mechanism.sketch={A1: [-87.54, -30.3], A2: [57.55, -106.76], A3: [124.76, 149.83], "
+              "C1: [31.43, -45.96], C2: [129.09, -10.42], C3: [49.48, 56.38]}")  # fmt: skip
+    study = mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", [sketch])
+    asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}
+    there = study.mechanism.solve(asked, short)
+    alone = variant(study, {"crank": 80.0}).mechanism
+    assert alone.solve({name: float(there[name]) for name in alone.drives})["P.x"] == pytest.approx(0, abs=1e-9)

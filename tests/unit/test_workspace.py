@@ -9,7 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
@@ -158,7 +157,7 @@ def test_roots_of_many_functions() -> None:
     ],
 )
 def test_what_a_section_lacks(changes: tuple[str, ...], said: str) -> None:
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(mechdesign.StudyError, match=said):
         mechdesign.workspace(study_of(LEGS, *changes))
 
 
@@ -170,7 +169,7 @@ def test_one_degree_of_freedom_gives_a_path() -> None:
 def test_mixed_units_need_a_length() -> None:
     path = Path(__file__).parents[2] / "configs" / "planar_3rpr.yaml"
     section = "workspace={point: P, at: {platform.angle: [0, 10]}}"
-    with pytest.raises(StudyError, match="characteristic_length"):
+    with pytest.raises(mechdesign.StudyError, match="characteristic_length"):
         mechdesign.workspace(mechdesign.load(path, [section]))
 
 
@@ -195,12 +194,12 @@ def test_platform_at_constant_orientation() -> None:
 
 @pytest.mark.slow
 def test_a_region_without_an_end_says_so() -> None:
-    with pytest.raises(AssemblyError, match="has no end"):
+    with pytest.raises(mechdesign.AssemblyError, match="has no end"):
         mechdesign.workspace(study_of(LEGS, "mechanism.limits=[]"))
 
 
 def test_nothing_reachable_says_so() -> None:
-    with pytest.raises(AssemblyError, match="reaches nothing"):
+    with pytest.raises(mechdesign.AssemblyError, match="reaches nothing"):
         mechdesign.workspace(study_of(LEGS, "workspace.scan={about: [9, 0], from: -20, to: 20}"))
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.stiffness import FIVE_BAR as ELASTIC_FIVE_BAR
 from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
 from mechdesign import indices
-from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
@@ -21,7 +21,6 @@ from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH
 from mechdesign.rows import choose
-from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 L1, L2 = np.sqrt(2.0), 1.0
@@ -47,7 +46,7 @@ ELASTIC = (
 )
 
 
-def local(study: Study, *places: complex) -> dict[str, np.ndarray]:
+def local(study: mechdesign.Study, *places: complex) -> dict[str, np.ndarray]:
     """The Jacobian's indices and its determinant at points."""
     found = Local.at(questions(study)[0].field, np.array(places), {})
     values = {index.name: np.asarray(index.values(found)) for index in prepare(study, USUAL)}
@@ -236,7 +235,7 @@ def test_what_indices_need(change: str, said: str | None) -> None:
     if said is None:
         assert study_poses(study_of(FIVE_BAR, change), "reliability").grid[1] == 33
         return
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(mechdesign.StudyError, match=said):
         study_of(FIVE_BAR, change)
 
 
@@ -245,7 +244,7 @@ def test_a_section_that_is_wrong_is_not_said_to_be_missing() -> None:
         ["stiffness={at: P, stiff: 1}", "workspace.indices=[k_min]"],
         ["stiffness={at: P, poses: workspace}", "workspace.shape=1"],
     ):
-        with pytest.raises(StudyError, match="unknown key") as caught:
+        with pytest.raises(mechdesign.StudyError, match="unknown key") as caught:
             study_of(FIVE_BAR, *change)
         assert len(caught.value.problems) == 1
 
@@ -253,20 +252,20 @@ def test_a_section_that_is_wrong_is_not_said_to_be_missing() -> None:
 @pytest.mark.parametrize(("name", "said"), [("k_direction", "needs a direction"), ("deflection", "needs loads")])
 def test_stiffness_indices_need_what_they_are_about(name: str, said: str) -> None:
     study = study_of(FIVE_BAR, ELASTIC, f"workspace.indices=[{name}]")
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(mechdesign.StudyError, match=said):
         mechdesign.workspace(study)
 
 
 def test_stiffness_indices_need_something_that_gives() -> None:
     """Where nothing does, k_min is infinite everywhere: neither integrated nor drawn."""
     study = study_of(FIVE_BAR, "stiffness={at: P}", "workspace.indices=[k_min]")
-    with pytest.raises(StudyError, match="stiffness: indices of stiffness need something that gives"):
+    with pytest.raises(mechdesign.StudyError, match="stiffness: indices of stiffness need something that gives"):
         mechdesign.workspace(study)
 
 
 def test_reliability_as_an_index_needs_limits() -> None:
     study = study_of(FIVE_BAR, "reliability={dimensions: {q1: 0.1}}", "workspace.indices=[reliability]")
-    with pytest.raises(StudyError, match="needs limits"):
+    with pytest.raises(mechdesign.StudyError, match="needs limits"):
         mechdesign.workspace(study)
 
 
@@ -373,3 +372,32 @@ def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     assert any(
         "at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in map(str, result.warnings)
     )
+
+
+@pytest.mark.nightly
+def test_the_point_of_a_workspace_may_be_an_end() -> None:
+    """The map says of every node what the question says there."""
+    text = (
+        ELASTIC_FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "  bearings: {P: 5e3}\n")
+        + """
+workspace: {point: b2.P, scan: {about: [0, 0.45], rays: 12}}
+reliability:
+  dimensions: {load.fy: {sigma: 5}, b1.length: 1e-4}
+  poses: workspace
+  outputs: [b1.P, b2.P, P]
+  limits: {b2.P.y: 2e-3}
+  load: [0, -20]
+  methods: analytic
+"""
+    )
+    study = study_of(text, "stiffness.at=b1.P")
+    poses = study_poses(study, "reliability")
+    place = poses.values["b2.P.x"] + 1j * poses.values["b2.P.y"]
+    found = Local.at(questions(study)[0].field, place, {})
+    sigma, chance = (np.asarray(index.values(found)) for index in prepare(study, ["sigma_position", "reliability"]))
+    result = mechdesign.reliability(study)
+    table, told = result.tables["moments"], result.tables["reliability"]
+    x, y, other = (table["sigma"][table["output"] == name] for name in ("b2.P.x", "b2.P.y", "b1.P.y"))
+    assert sigma == pytest.approx(np.hypot(x, y), rel=1e-6)
+    assert np.mean(np.abs(other - y) > 0.1 * y) > 0.9
+    assert chance == pytest.approx(told["reliability"][told["scope"] == "pose"], abs=1e-8)
