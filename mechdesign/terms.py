@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Expression
+from mechdesign.notation import ExpressionError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Result
 from mechdesign.rows import Chosen, UnknownColumnError, amount_in, choose, named

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Callable
 
 from mechdesign.errors import cut
-from mechdesign.expressions import RESERVED
+from mechdesign.functions import RESERVED
 from mechdesign.mechanism.graph import GROUND
 
 _UNFIT = re.compile(r"\W+")

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from mechdesign.errors import MechanismError, suggestion
-from mechdesign.expressions import Corner, Expression, Step
+from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import (
@@ -23,6 +23,7 @@ from mechdesign.mechanism.model import (
     Spring,
     play,
 )
+from mechdesign.notation import Step
 
 # The law of a cam closes after a turn where it misses its begin by less than this part of its lift.
 CLOSED = 1e-6

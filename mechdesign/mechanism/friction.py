@@ -18,9 +18,10 @@ from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction_equations import Equations
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.joint_contacts import PIN, Joints
 from mechdesign.mechanism.model import Friction
 from mechdesign.mechanism.outputs import Rates
-from mechdesign.mechanism.statics import PIN, Balance, Joints, Reaction, balance, reactions
+from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 

@@ -12,11 +12,11 @@ from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
-from mechdesign.mechanism.cams import cams
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.followers import cams
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan

@@ -14,28 +14,21 @@ closed form. What is left at the given coordinates are the efforts of the drives
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
-from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate, coupled
+from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.forces import Forces, bases
-from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
+from mechdesign.mechanism.forces import Forces
+from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.loops import nothing
-from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.mechanism.structure import Group
 from mechdesign.mechanism.wheels import Engagement, Pressed
-
-# Prefix of the pin of several links; its point follows.
-PIN = "pin:"
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,203 +164,6 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
     acting = replace(forces)
     acting.nodes, acting.bodies, acting.slides = on_pins, forces.bodies, forces.slides
     return Balance(linear, acting, efforts, edges, [couplings[k] for k in structure.numbers])
-
-
-class Contact(NamedTuple):
-    """A joint between two bodies, or between a body and a pin that several share.
-
-    The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
-    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge. Links
-    that are `engaged` press each other where they touch.
-    """
-
-    joint: str
-    on: str
-    by: str
-    node: int
-    edges: tuple[tuple[int, int], ...]
-    bodies: tuple[str, ...] = ()
-    turns: bool = True
-    slides: bool = False
-    engaged: Engagement | None = None
-
-    def place(self, configuration: Configuration) -> Vector:
-        """Where it is."""
-        place: Vector = configuration.nodes[self.node]
-        return place if self.engaged is None else self.engaged.place(configuration)
-
-
-class _Member(NamedTuple):
-    """What meets at a pin: a body, or the guide of a slot; its force on the pin by edges, and by the load on a body."""
-
-    name: str
-    edges: tuple[tuple[int, int], ...]
-    bodies: tuple[str, ...] = ()
-    slot: str = ""
-
-
-class Joints:
-    """The joints of a mechanism, compiled once: between which bodies each acts, and how its force follows from edges.
-
-    At `loaded` nodes a force acts on the pin itself: what the bodies there bear are no opposite forces.
-    """
-
-    def __init__(
-        self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(),
-        engaged: Sequence[Engagement] = (),
-    ) -> None:  # fmt: skip
-        self.description, self.graph, self.bases = description, graph, bases(graph)
-        self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
-        self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
-        #: By node at which one body alone has a point, this body: it bears what acts on the pin.
-        self.sole: dict[int, str] = {}
-        #: By leg, prismatic or fixed joint, the two bodies that it keeps from turning against each other.
-        self.ties = {name: (name, rod_of(name)) for name, link in description.links.items() if link.telescopic}
-        for slide, (guide, slider) in self.guides.items():
-            if slider is not None:
-                self.ties[graph.slides[slide]] = guide, slider
-        for name, joint in description.joints.items():
-            if isinstance(joint, Fixed):
-                one, other = joint.links
-                self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
-        touching = [Contact(pair.coupling, *pair.links, pair.nodes[0], (), engaged=pair) for pair in engaged]
-        self.contacts = (*self._slides(), *self._pins(), *touching)
-        self.order, self.open = self._tie_order()
-
-    @cached_property
-    def names(self) -> list[str]:
-        """Names of the contacts' forces: of their joint, and what it acts on where it has several."""
-        counts = Counter(contact.joint for contact in self.contacts)
-        return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
-
-    @cached_property
-    def guides(self) -> dict[int, tuple[str, str | None]]:
-        """By slide, the body that carries its line, and its slider; None for the pin of a slot."""
-        guides: dict[int, tuple[str, str | None]] = {}
-        for slide, name in enumerate(self.graph.slides):
-            if slide in self.graph.telescopic:
-                guides[slide] = name, rod_of(name)
-                continue
-            joint = self.description.joints[name]
-            assert isinstance(joint, Prismatic | Slot)
-            line = joint.line
-            guide = self.graph.holder(line.link, line.through or origin_of(line.link))
-            slider = self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
-            guides[slide] = guide, slider
-        return guides
-
-    def _slides(self) -> list[Contact]:
-        contacts = []
-        for k, edge in enumerate(self.graph.edges):
-            if edge.slide is not None and (slider := self.guides[edge.slide][1]) is not None:
-                name, guide = self.graph.slides[edge.slide], self.guides[edge.slide][0]
-                contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), turns=False, slides=True))
-        return contacts
-
-    def _members(self) -> dict[int, list[_Member]]:
-        """By node, what meets there."""
-        forces: dict[tuple[int, str], list[tuple[int, int]]] = {
-            (self.graph.nodes.index(point), body): [] for body, point in self.graph.points
-        }
-        slots: dict[int, list[_Member]] = {}
-        for k, edge in enumerate(self.graph.edges):
-            if edge.slide is None:
-                tail = head = edge.locals[0][1]
-            else:
-                tail, slider = self.guides[edge.slide]
-                head = slider or ""
-                if slider is None:
-                    name = self.graph.slides[edge.slide]
-                    slots.setdefault(edge.head, []).append(_Member(tail, ((k, -1),), (), name))
-            forces[edge.tail, tail].append((k, 1))
-            if head:
-                forces[edge.head, head].append((k, -1))
-        members: dict[int, list[_Member]] = {}
-        for (node, body), edges in forces.items():
-            own = (body,) if self.bases[body] == node else ()
-            members.setdefault(node, []).append(_Member(body, tuple(edges), own))
-        for node, listed in slots.items():
-            members[node] += listed
-        return members
-
-    def _pins(self) -> list[Contact]:
-        contacts = []
-        for node, members in self._members().items():
-            point = self.graph.nodes[node]
-            clamped, free = self._clamped(node, members)
-            contacts += clamped
-            if len(free) == 1:
-                self.sole[node] = free[0].name
-            # The pin that a ground's origin would be bears nothing.
-            if len(free) < 2 or ":" in point:
-                continue
-            ground = next((member for member in free if member.name == GROUND and not member.slot), None)
-            if ground is not None:
-                # The pin is fixed in the ground, and so is what acts on it.
-                for member in free:
-                    if member is not ground:
-                        contacts.append(
-                            Contact(member.slot, GROUND, member.name, node, member.edges)
-                            if member.slot else _borne(point, member, GROUND, node)
-                        )  # fmt: skip
-            elif len(free) == 2 and node not in self.loaded:
-                by, on = sorted(free, key=lambda member: not member.slot)
-                contacts.append(_borne(by.slot or point, on, by.name, node))
-            else:
-                pin = f"{PIN}{point}"
-                contacts += [_borne(point, member, pin, node) for member in free if not member.slot]
-                contacts += [
-                    Contact(member.slot, pin, member.name, node, member.edges) for member in free if member.slot
-                ]
-        return contacts
-
-    def _clamped(self, node: int, members: Sequence[_Member]) -> tuple[list[Contact], list[_Member]]:
-        """The clamps at a node, and its members: of links clamped together one, the ground or a first, with all edges.
-
-        Each clamp holds what hangs on it, seen from this one.
-        """
-        apart = {member.name: member for member in members if not member.slot}
-        clamps = {
-            name: self.ties[name] for name, joint in self.description.joints.items()
-            if isinstance(joint, Fixed) and joint.point == self.graph.nodes[node]
-        }  # fmt: skip
-        contacts = []
-
-        def hold(member: _Member) -> _Member:
-            for name, pair in clamps.items():
-                other = pair[1 - pair.index(member.name)] if member.name in pair else ""
-                if other in apart:
-                    hanging = hold(apart.pop(other))
-                    contacts.append(_borne(name, hanging, member.name, node, turns=False))
-                    edges, bodies = member.edges + hanging.edges, member.bodies + hanging.bodies
-                    member = _Member(member.name, edges, bodies)
-            return member
-
-        second = {pair[1] for pair in clamps.values()}
-        order = sorted(apart, key=lambda name: (name != GROUND, name in second))
-        held = [hold(apart.pop(name)) for name in order if name in apart]
-        return contacts, held + [member for member in members if member.slot]
-
-    def _tie_order(self) -> tuple[list[tuple[str, str]], frozenset[str]]:
-        """Joints of `ties` from the outside in, each with the body that it holds; and those of closed chains."""
-        left = dict(self.ties)
-        order: list[tuple[str, str]] = []
-        while True:
-            held: dict[str, list[str]] = {}
-            for name, pair in left.items():
-                for body in pair:
-                    held.setdefault(body, []).append(name)
-            ends = [(names[0], body) for body, names in held.items() if len(names) == 1 and body != GROUND]
-            if not ends:
-                return order, frozenset(left)
-            order.append(ends[0])
-            del left[ends[0][0]]
-
-
-def _borne(joint: str, member: _Member, by: str, node: int, *, turns: bool = True) -> Contact:
-    """The contact through which a pin bears a member: the force on it is against that on the pin."""
-    edges = tuple((k, -sign) for k, sign in member.edges)
-    return Contact(joint, member.name, by, node, edges, member.bodies, turns)
 
 
 class Reaction(NamedTuple):

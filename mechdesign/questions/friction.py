@@ -13,8 +13,9 @@ from mechdesign.mechanism.algebra import Value, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
+from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.mechanism.statics import Balance, Joints, Reaction
+from mechdesign.mechanism.statics import Balance, Reaction
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.poses import pose_in_words

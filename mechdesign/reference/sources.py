@@ -8,7 +8,7 @@ from inspect import getdoc
 from itertools import chain
 
 from mechdesign.errors import EXIT_CODES
-from mechdesign.expressions import CONSTANTS, FUNCTIONS, meanings
+from mechdesign.functions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
 from mechdesign.reference import keys, synonyms, tables
 from mechdesign.reference.entries import Entry

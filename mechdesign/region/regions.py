@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.errors import MechanismError, StudyError
-from mechdesign.mechanism.derivatives import mixes
+from mechdesign.mechanism.jacobians import mixes
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.any_mode import in_any_assembly

@@ -20,7 +20,8 @@ from pydantic_core import PydanticCustomError
 from mechdesign.cautions import ALL, Caution
 from mechdesign.commands import COMMANDS, SECTIONS
 from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
-from mechdesign.expressions import RESERVED, Expression
+from mechdesign.expressions import Expression
+from mechdesign.functions import RESERVED
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description

@@ -13,7 +13,8 @@ from helpers.studies import study_of
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.forces import Forces, Moving, inertia
-from mechdesign.mechanism.statics import Joints, balance, reactions
+from mechdesign.mechanism.joint_contacts import Joints
+from mechdesign.mechanism.statics import balance, reactions
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.report.tables import csv_blocks
 from mechdesign.work.threads import keep_freed_memory

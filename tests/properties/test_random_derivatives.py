@@ -15,8 +15,8 @@ from hypothesis import assume, given, settings
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Jacobian
 from mechdesign.mechanism.geometry import offset_names
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats
 

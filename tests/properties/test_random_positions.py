@@ -20,7 +20,8 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.mechanism.derivatives import Jacobian, regularity
+from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.plan import Plan
 

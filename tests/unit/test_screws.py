@@ -11,11 +11,12 @@ from helpers.stiffness import ARM, BENT, FIVE_BAR, SLIDER, SLOTTED, ask_stiffnes
 from helpers.studies import study_of
 
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.stiffness.bodies import NetworkEdge
 from mechdesign.questions.stiffness.body import ask
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches
 from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge
 from mechdesign.questions.stiffness.force_method import Twists, load, twists_of
-from mechdesign.questions.stiffness.network import Network, NetworkEdge
+from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import (
     LegScrews,
     constraint_compliance,

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.expressions import Corner, Expression, Step
+from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.questions.dynamics.instants import Instants

@@ -17,7 +17,7 @@ import numpy as np
 
 from mechdesign.curve.motion import from_sketch
 from mechdesign.errors import AssemblyError, MechanismError
-from mechdesign.expressions import Expression, Step
+from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.charts import Atlas, Chart, Positions, Sides, regularity
@@ -30,6 +30,7 @@ from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
+from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection

@@ -11,7 +11,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.statics import PIN, Contact
+from mechdesign.mechanism.joint_contacts import PIN, Contact
 from mechdesign.mechanism.wheels import Mesh
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.tables import question_of

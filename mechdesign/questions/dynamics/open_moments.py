@@ -13,12 +13,14 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.statics import Joints, Reaction
+from mechdesign.mechanism.statics import Reaction
 from mechdesign.questions.stiffness.applied import Applied
+from mechdesign.questions.stiffness.bodies import build_bodies
 from mechdesign.questions.stiffness.elements import Coil
 from mechdesign.questions.stiffness.force_method import load, moments_about, twists_of
-from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
+from mechdesign.questions.stiffness.network import Network, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # A moment that a rigid chain may bear besides is rounding below this part of a unit of force on the length of a radian.

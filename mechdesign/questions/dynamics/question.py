@@ -18,9 +18,10 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first, pulled
-from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
+from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds

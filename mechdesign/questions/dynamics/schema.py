@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.statics import Joints
+from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.study.schema.checker import ORDERS, Checker
 from mechdesign.study.schema.loads import (
     VELOCITY,

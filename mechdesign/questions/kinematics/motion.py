@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
+from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import play
 from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.mechanism.plates import CLEARANCE, Clearances

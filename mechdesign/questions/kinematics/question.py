@@ -15,8 +15,9 @@ from mechdesign.errors import counted
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import Linearization, mixes
+from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Moving
+from mechdesign.mechanism.jacobians import mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.numerics.arrays import Ints

@@ -10,8 +10,9 @@ import numpy as np
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, picked
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
+from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.forces import Moving
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.poses import SolvedPoses, radians

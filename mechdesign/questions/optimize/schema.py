@@ -9,7 +9,8 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Expression
+from mechdesign.notation import ExpressionError
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import Condition, Judged, check_result
 from mechdesign.study.schema.variable import Variable

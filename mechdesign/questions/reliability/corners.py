@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from mechdesign.expressions import Expression, Tabulated
+from mechdesign.expressions import Expression
+from mechdesign.functions import Tabulated
 from mechdesign.mechanism.coordinates import Coordinate
 
 

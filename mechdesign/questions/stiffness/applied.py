@@ -17,8 +17,9 @@ from mechdesign.mechanism.algebra import Value, Vector, cross
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.questions.stiffness.bodies import link_of
 from mechdesign.questions.stiffness.elements import BeamLine, Piece, beam_line, piece_freedoms
-from mechdesign.questions.stiffness.network import Network, link_of
+from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.schema import Profile
 
 # Force per length of a beam at places of its line, shape (n,).

@@ -18,11 +18,12 @@ from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
 from mechdesign.questions.poses import SolvedPoses
 from mechdesign.questions.stiffness.applied import Applied
+from mechdesign.questions.stiffness.bodies import build_bodies
 from mechdesign.questions.stiffness.compliance import Held, put
 from mechdesign.questions.stiffness.elements import spread
 from mechdesign.questions.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.questions.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
+from mechdesign.questions.stiffness.network import Network, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import Springs

@@ -23,8 +23,9 @@ from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Wrench, borne
+from mechdesign.questions.stiffness.bodies import Transmission
 from mechdesign.questions.stiffness.elements import slide_direction
-from mechdesign.questions.stiffness.network import Network, Transmission
+from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 

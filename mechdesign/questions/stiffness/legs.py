@@ -14,9 +14,9 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.stiffness.bodies import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.questions.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, screw_origin
-from mechdesign.questions.stiffness.network import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.stiffness.screws import (
     LegScrews,

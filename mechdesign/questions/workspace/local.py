@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.derivatives import Jacobian
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.region.field import LENGTH, Field, Places
 from mechdesign.region.rays import Designs

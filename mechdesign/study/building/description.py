@@ -11,7 +11,8 @@ from typing import Literal, NoReturn
 import numpy as np
 
 from mechdesign.errors import MechanismError, StudyError, suggestion
-from mechdesign.expressions import Expression, ExpressionError, Step, Tabulated
+from mechdesign.expressions import Expression
+from mechdesign.functions import Tabulated
 from mechdesign.mechanism.coordinates import coupled
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import GROUND, build_graph
@@ -38,6 +39,7 @@ from mechdesign.mechanism.model import (
     play,
 )
 from mechdesign.mechanism.sketch import locate
+from mechdesign.notation import ExpressionError, Step
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.csv_files import read_table

@@ -14,9 +14,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import cut, suggestion
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND, OF_LINKS
 from mechdesign.mechanism.model import Quantity
+from mechdesign.notation import ExpressionError
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.inputs import file_of

@@ -12,8 +12,9 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Expression
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
+from mechdesign.notation import ExpressionError
 from mechdesign.statistics import STATISTICS as STATISTICS_OF_ROWS
 from mechdesign.statistics import Interval
 from mechdesign.study.schema.checker import Checker

@@ -24,7 +24,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.errors import cut, suggestion
-from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.expressions import Expression
+from mechdesign.notation import ExpressionError
 from mechdesign.study.text.document import read
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure, written
 

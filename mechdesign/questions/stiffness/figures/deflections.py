@@ -17,11 +17,11 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
+from mechdesign.questions.stiffness.bodies import NetworkEdge
 from mechdesign.questions.stiffness.elements import beam_line
 from mechdesign.questions.stiffness.figures.joint_forces import cases_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
-from mechdesign.questions.stiffness.network import NetworkEdge
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
