@@ -152,9 +152,9 @@ def fitting_rows(legend: int, most: int) -> int:
     return min(most, int((style.tallest() - _AROUND_ROWS) / room)) if style.narrow() else most
 
 
-def fitting_names(rows: int, bars: int) -> float:
-    """Names with so many bars each that rows of panels have room for on one page."""
-    return (style.tallest() - _AROUND_BARS) / rows / bar_height(bars) - _ABOUT_BARS
+def fitting_names(names: Sequence[str], rows: int, bars: int) -> float:
+    """How many of the names, with so many bars each, rows of panels have room for on one page."""
+    return (style.tallest() - _AROUND_BARS) / rows / _bar_height(names, bars) - _ABOUT_BARS
 
 
 def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
@@ -249,21 +249,21 @@ def _height(cell: _Cell, wide: float, rows: int) -> float:
     if panel.kind == "map" and rows == 1:
         highest = _HIGHEST_MAP
     if panel.bars:
-        lines = 1 + max((name.count("\n") for name in _folded_names(panel.y.words)), default=0)
-        return (0.15 + len(panel.bars[0].values)) * bar_height(panel.bars[0].count, lines)
+        return (0.15 + len(panel.bars[0].values)) * _bar_height(panel.y.words, panel.bars[0].count)
     if panel.equal:
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         return min(highest, wide * abs((high - low) / (right - left)))
     if panel.kind == "map":
         return min(highest, _MAP * wide)
-    return panel.size * (
-        _ALONE if rows == 1 else _SOME if rows <= _MOST_SOME else _MORE if rows <= _MOST_MORE else _MOST
-    )
+    if rows == 1:
+        return _ALONE
+    return panel.size * (_SOME if rows <= _MOST_SOME else _MORE if rows <= _MOST_MORE else _MOST)
 
 
-def bar_height(count: int, lines: int = 1) -> float:
+def _bar_height(names: Sequence[str], bars: int) -> float:
     """Inches of a name with so many bars."""
-    return max(_BAR, _ONE_OF_SEVERAL * count + 0.04, style.line(_LABEL) * lines)
+    lines = 1 + max((name.count("\n") for name in _folded_names(names)), default=0)
+    return max(_BAR, _ONE_OF_SEVERAL * bars + 0.04, style.line(_LABEL) * lines)
 
 
 def _size(cell: _Cell, wide: float) -> None:

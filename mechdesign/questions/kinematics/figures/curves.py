@@ -80,10 +80,12 @@ class _Group(NamedTuple):
 def motion_picture(view: MotionView) -> Picture | None:
     """Every output of a motion."""
     poses = view.sweep.poses
-    return curves(view.study, view.result.tables, poses, view.before) if poses.motion else None
+    return motion_curves(view.study, view.result.tables, poses, view.before) if poses.motion else None
 
 
-def curves(study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None) -> Picture | None:
+def motion_curves(
+    study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None
+) -> Picture | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
     table = tables["motion"]
     over = abscissa(study, poses, _speed(study)) if moving_names(poses) else None
