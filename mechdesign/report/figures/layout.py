@@ -23,7 +23,7 @@ OVER = "over "
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 _STEPS = (1, 2, 2.5, 5, 10)
-_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL = 11.0, 8.5, 9.5, 8.5, 10.0  # points
+_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL, _WORD = 11.0, 8.5, 9.5, 8.5, 10.0, 8.0  # points
 # Inches: at the edges of a page, between what is separate, between a text and what it is of.
 _EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
 # Inches: the least width of panels by their kind, and the room beside them at first.
@@ -175,7 +175,7 @@ def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
         outer_x = not same_x or not any(picture.panels[k + columns :: columns])
         outer_y = not same_y or not any(picture.panels[row * columns : k])
         # One that is left over is as wide as the page, unless it shares its axis or is a map.
-        alone = k + 1 == len(picture.panels) and not (column or same_x or panel.kind == "map" or panel.equal)
+        alone = k + 1 == len(picture.panels) and not (column or same_x or same_y or panel.kind == "map" or panel.equal)
         yield _Cell(panel, axes, row, column, columns if alone else 1, outer_x, outer_y)
 
 
@@ -246,7 +246,7 @@ def _widen(axes: Axes) -> None:
 def _height(cell: _Cell, wide: float, rows: int) -> float:
     """Inches of a panel of a width."""
     panel, axes, highest = cell.panel, cell.axes, _HIGHEST_OF_TWO
-    if panel.kind == "map" and rows == 1:
+    if panel.equal and panel.kind == "map" and rows == 1:
         highest = _HIGHEST_MAP
     if panel.bars:
         return (0.15 + len(panel.bars[0].values)) * _bar_height(panel.y.words, panel.bars[0].count)
@@ -275,7 +275,7 @@ def _size(cell: _Cell, wide: float) -> None:
         # What axes share is set at one of them.
         if outer:
             _tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
-        axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer)
+        axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer and declared.numbers)
         axis.set_label_text(declared.label if outer else "")
         axis.offsetText.set_visible(outer)
 
@@ -285,11 +285,13 @@ def _tick(axis: Drawn, declared: Axis, inches: float) -> None:
     upright = axis is axis.axes.yaxis
     if declared.words or len(declared.ticks):
         places = declared.ticks if len(declared.ticks) else range(len(declared.words))
-        words = _folded_names(declared.words) if upright else [
-            style.folded(word, 8.0, inches / len(declared.words) - _PAD) for word in declared.words]  # fmt: skip
-        axis.set_ticks([*places], labels=words or None)
+        room = _NAMES * style.width() if upright else inches / max(len(declared.words), 1) - _PAD
+        words = [style.folded(word, _LABEL if upright else _WORD, room) for word in declared.words]
+        # Names that have no room side by side stand upright.
+        lies = upright or all(style.length(line, _WORD) <= 72 * room for word in words for line in word.split("\n"))
+        axis.set_ticks([*places], labels=(words if lies else declared.words) or None)
         if words and not upright:
-            axis.set_tick_params(labelsize=8.0)
+            axis.set_tick_params(labelsize=_WORD, labelrotation=0 if lies else 90)
     elif declared.scale == "linear":
         low, high = axis.get_view_interval()
         turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > 150

@@ -273,8 +273,8 @@ def _panel(
         places = abscissa(before.study, was, _speed(before.study)).values
         for curve, color in zip(group.curves, used, strict=True):
             if curve.column.name in earlier:
-                look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
-                marks.append(Trace(places, earlier[curve.column.name], look=look))
+                earlier_look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
+                marks.append(Trace(places, earlier[curve.column.name], look=earlier_look))
     title = first.order.replace("_", " ")
     if title == "position":
         kinds = {units.label("angle"): "angle", units.label("length"): "position"}
