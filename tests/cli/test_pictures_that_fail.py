@@ -21,7 +21,7 @@ def failing(*arguments, **options):
 @pytest.mark.parametrize(
     ("module", "function", "lost", "name"),
     [
-        ("questions.kinematics.figures.curves", "curves_figure", "motion.png", "motion"),
+        ("questions.kinematics.figures.curves", "motion_curves", "motion.png", "motion"),
         ("questions.kinematics.figures.paths", "paths_figure", "paths.png", "paths"),
         ("report.figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
         ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
@@ -88,7 +88,7 @@ def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, m
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(curves, "curves_figure", interrupt)
+        patch.setattr(curves, "motion_curves", interrupt)
         assert invoke("run", STUDY).exit_code == 130
     out = folder / "results/slider/kinematics"
     assert {path.name for path in out.iterdir()} >= TABLES

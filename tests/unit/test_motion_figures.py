@@ -13,14 +13,14 @@ import mechdesign
 from mechdesign.questions.kinematics.figures.animation import _frames as frames_of
 from mechdesign.questions.kinematics.figures.animation import in_order
 from mechdesign.questions.kinematics.figures.centrodes import centrodes
-from mechdesign.questions.kinematics.figures.curves import curves_figure, motion_figure
+from mechdesign.questions.kinematics.figures.curves import motion_curves
 from mechdesign.questions.kinematics.figures.paths import draw_paths, path_looks
 from mechdesign.questions.kinematics.figures.polygons import centripetal, images
 from mechdesign.questions.kinematics.figures.poses import place_of
-from mechdesign.questions.kinematics.figures.transmission import transmission_figure
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.pictures import figures
 from mechdesign.report.figures.scene import Sweep, ranks
@@ -182,7 +182,7 @@ def test_limits_of_motion_and_what_is_not_valid_are_marked():
     limits = sorted(result.tables["limits"]["crank"])
     assert len(limits) == 2
     with style.context():
-        figure = curves_figure(study, result.tables, result.drawn.shown.poses)
+        figure = draw(motion_curves(study, result.tables, result.drawn.shown.poses))
     for axes in figure.axes:
         marks = sorted(line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
         assert marks == pytest.approx(limits)
@@ -198,7 +198,7 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
     study = study_of(ROCKER, f"kinematics.sweep={{crank: {{from: {limit + 1e-4}, to: 180, step: 2}}}}")
     result = mechdesign.kinematics(study)
     with style.context():
-        figure = curves_figure(study, result.tables, result.drawn.shown.poses)
+        figure = draw(motion_curves(study, result.tables, result.drawn.shown.poses))
     rates = result.tables["motion"]["rocker.angle_velocity"]
     usual = np.nanpercentile(np.abs(rates), 90)
     axes = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity\n[deg/s]")
@@ -318,7 +318,7 @@ def test_crank_angles_stand_beside_their_places_on_the_coupler_curve():
 def test_a_path_passed_at_a_speed_has_the_time_on_its_axis():
     study = study_of(FIVE_BAR)
     with style.context():
-        figure = motion_figure(MotionView(study, mechdesign.kinematics(study)))
+        figure = figure_of(study, mechdesign.kinematics(study), "motion")
     axes = figure.axes[-1]
     assert axes.get_xlabel() == "time [s]"
     # Twelve places of a circle, of which the last is an eleventh of a twelfth from the first.
@@ -439,7 +439,7 @@ def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_pla
     study = study_of(FOUR_BAR, advantage)
     result = mechdesign.kinematics(study)
     with style.context():
-        figure = transmission_figure(MotionView(study, result))
+        figure = figure_of(study, result, "transmission")
     axes = figure.axes[1]
     assert axes.get_yscale() == "log"
     marks = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]
@@ -485,7 +485,7 @@ def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
 def test_a_large_effort_has_its_power_of_ten_with_its_unit(look):
     study = study_of(FOUR_BAR, "kinematics.loads=[{link: rocker, moment: 2e7}]")
     axes = drawn(study, "motion", look).axes[-1]
-    assert axes.get_ylabel() == "effort\n[10\N{SUPERSCRIPT SIX} N\N{MIDDLE DOT}mm]"
+    assert axes.get_ylabel() == "effort [10\N{SUPERSCRIPT SIX} N\N{MIDDLE DOT}mm]"
     assert not axes.yaxis.offsetText.get_visible()
 
 

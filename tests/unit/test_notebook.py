@@ -181,7 +181,7 @@ def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.Mon
     def fail(*given):
         raise ValueError("no ink")
 
-    monkeypatch.setattr("mechdesign.questions.kinematics.figures.curves.curves_figure", fail)
+    monkeypatch.setattr("mechdesign.questions.kinematics.figures.curves.motion_curves", fail)
     result = mechdesign.kinematics(mechdesign.load(DATA))
     with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
         assert result.figures == ("paths", "poses", "transmission", "mechanism")

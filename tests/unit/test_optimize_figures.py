@@ -11,8 +11,8 @@ from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
 import mechdesign
-from mechdesign.questions.optimize.figures.designs import enlarge_dots, value_text
-from mechdesign.questions.optimize.figures.front import front_figure
+from mechdesign.questions.optimize.figures.designs import value_text
+from mechdesign.questions.optimize.figures.front import front_picture
 from mechdesign.questions.optimize.figures.scores import (
     ENVELOPE_STEPS,
     MAX_LINES,
@@ -23,6 +23,8 @@ from mechdesign.questions.optimize.figures.scores import (
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
+from mechdesign.report.figures.layout import draw
+from mechdesign.report.figures.marks import Dots, Panel, Picture
 from mechdesign.report.figures.pictures import figures
 
 ARM = """
@@ -108,7 +110,7 @@ def many(count: int = 500) -> Designs:
 def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
     designs = many()
     with style.context():
-        axes = parallel_axes(designs).axes[0]
+        axes = draw(parallel_axes(designs)).axes[0]
     lines = axes.collections[0].get_segments()
     assert len(lines) == MAX_LINES
     cost = designs.values[designs.feasible, 0]
@@ -119,7 +121,7 @@ def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
 
 def test_convergence_never_falls_and_ends_at_the_best() -> None:
     with style.context():
-        axes = convergence(many()).axes[0]
+        axes = draw(convergence(many())).axes[0]
     heights = axes.lines[0].get_ydata()
     assert (np.diff(heights) >= 0).all()
     assert heights[-1] == 1
@@ -130,7 +132,7 @@ def test_the_front_is_drawn_with_its_knee() -> None:
     front = table(a=[0.1, 0.2, 0.3], b=[0.1, 0.1, 0.1], c=[0.5, 0.5, 0.5], cost=[0.2, 0.3, 0.4], mass=[1.4, 0.9, 0.8],
                   knee=[False, True, False])  # fmt: skip
     with style.context():
-        axes = front_figure(designs, front).axes[0]
+        axes = draw(front_picture(designs, front)).axes[0]
     labels = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
     assert labels["A: best cost, a = 0.1 mm, b = 0.1 mm, c = 0.5 mm"] == [[0.2, 1.4]]
     assert labels["knee, a = 0.2 mm, b = 0.1 mm, c = 0.5 mm"] == [[0.3, 0.9]]
@@ -149,15 +151,13 @@ def test_very_small_values_have_a_power_of_ten() -> None:
 
 
 def test_dots_of_a_legend_can_be_seen() -> None:
+    dots = Dots([1], [2], label="designs", look={"marker": ".", "markersize": 2, "alpha": 0.5})
     with style.context():
-        figure = style.new_figure(2.0)
-        axes = figure.add_subplot()
-        (dots,) = axes.plot([1], [2], ".", markersize=2, alpha=0.5, label="designs")
-        enlarge_dots(shown := axes.legend())
-    (handle,) = shown.legend_handles
+        figure = draw(Picture("", [Panel([dots])]))
+    (handle,) = figure.legends[0].legend_handles
     assert handle.get_markersize() >= 6
     assert handle.get_alpha() == 1.0
-    assert dots.get_markersize() == 2
+    assert figure.axes[0].lines[0].get_markersize() == 2
 
 
 @pytest.mark.parametrize("look", ["screen", "paper"])
@@ -171,7 +171,7 @@ def test_labels_of_a_front_of_three_goals_lie_apart(look: str) -> None:
     front = table(a=x[:3], b=y[:3], c=z[:3], knee=[False, True, False],
                   **{name: values[:3] for name, values in zip(names, (x, y, z), strict=True)})  # fmt: skip
     with style.context(look):
-        figure = front_figure(designs, front)
+        figure = draw(front_picture(designs, front))
         figure.canvas.draw()
         texts = [axes.xaxis.label for axes in figure.axes] + [axes.yaxis.label for axes in figure.axes]
         boxes = [text.get_window_extent() for text in [*texts, *figure.texts]]
@@ -207,7 +207,7 @@ def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
     designs = Designs(designed(), {"a": x, "b": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
                       np.full(2000, np.nan), np.ones((1, 1)), {})  # fmt: skip
     with style.context():
-        figure = score_curves(designs)
+        figure = draw(score_curves(designs))
     dots, envelope = figure.axes[0].lines[:2]
     assert len(dots.get_xdata()) == 2000
     along, least = envelope.get_data()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,22 +23,23 @@ OVER = "over "
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 _STEPS = (1, 2, 2.5, 5, 10)
-_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL = 11.0, 8.5, 9.5, 8.5, 10.0  # points
+_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL, _WORD = 11.0, 8.5, 9.5, 8.5, 10.0, 8.0  # points
 # Inches: at the edges of a page, between what is separate, between a text and what it is of.
 _EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
 # Inches: the least width of panels by their kind, and the room beside them at first.
 _NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "": 2.0}
 _BESIDE = 0.9
-# Inches: the height of a panel that stands alone, among few, among many below each other, and the least.
-_ALONE, _FEW, _MANY, _LOWEST = 2.6, 1.75, 1.3, 0.7
-_MOST_FEW = 4
+# Inches: the height of a panel that stands alone, among up to so many below each other, among more, and the least.
+_ALONE, _SOME, _MORE, _MOST, _LOWEST = 2.6, 1.75, 1.5, 1.2, 0.7
+_MOST_SOME, _MOST_MORE = 4, 7
 _HIGHEST_MAP, _HIGHEST_OF_TWO, _MAP = 5.2, 3.8, 0.8  # inches; height over width of a map whose axes are not equal
 _STILL = 1e-6  # of its size, by which a curve changes that stands still
 _SLIVER = 0.45  # least height over width of axes of one scale
 _MARGIN = 0.08  # of the range, beyond curves from a given end
 _BAR, _ONE_OF_SEVERAL = 0.24, 0.16  # inches of a name with one bar, and of each of several
+_AROUND_ROWS = 1.2  # inches of legend and axis of a page
 _AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for which title and axis of a panel take room
-_UP, _ALONG, _DIGIT = 0.33, 0.47, 0.083  # inches from tick to tick, and of a digit
+_UP, _ALONG, _DIGIT = 0.29, 0.47, 0.083  # inches from tick to tick, and of a digit
 _MOST_TICKS = 9
 _LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
 _LEGEND_DOT = 8.0  # points
@@ -82,8 +84,9 @@ def draw(picture: Picture) -> Figure:
     rows = -(-len(picture.panels) // columns)
     figure = style.new_figure(2.0 * rows, layout=None)
     cells, entries = [*_cells(figure, picture, columns)], dict[str, Any]()
+    several = Counter(map(id, picture.marks()))
     for cell in cells:
-        _fill(cell, entries, alone=len(cells) == 1)
+        _fill(cell, entries, several, alone=len(cells) == 1)
     for cell in cells:
         _end(cell)
     legend = _legend(figure, entries) if entries else None
@@ -143,9 +146,15 @@ def fitting_panels(kind: str = "", names: Sequence[str] = ()) -> int:
     return max(1, int((style.width() - min(_NAMES * style.width(), _DIGIT * letters)) / _NARROWEST[kind]))
 
 
-def fitting_names(rows: int, bars: int) -> float:
-    """Names with so many bars each that rows of panels have room for on one page."""
-    return (style.tallest() - _AROUND_BARS) / rows / bar_height(bars) - _ABOUT_BARS
+def fitting_rows(legend: int, most: int) -> int:
+    """Panels below each other that one page has room for, with so many rows of a legend above each."""
+    room = _LOWEST + _GAP + style.line(_LABEL) * legend
+    return min(most, int((style.tallest() - _AROUND_ROWS) / room)) if style.narrow() else most
+
+
+def fitting_names(names: Sequence[str], rows: int, bars: int) -> float:
+    """How many of the names, with so many bars each, rows of panels have room for on one page."""
+    return (style.tallest() - _AROUND_BARS) / rows / _bar_height(names, bars) - _ABOUT_BARS
 
 
 def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
@@ -166,11 +175,11 @@ def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
         outer_x = not same_x or not any(picture.panels[k + columns :: columns])
         outer_y = not same_y or not any(picture.panels[row * columns : k])
         # One that is left over is as wide as the page, unless it shares its axis or is a map.
-        alone = k + 1 == len(picture.panels) and not (column or same_x or panel.kind == "map" or panel.equal)
+        alone = k + 1 == len(picture.panels) and not (column or same_x or same_y or panel.kind == "map" or panel.equal)
         yield _Cell(panel, axes, row, column, columns if alone else 1, outer_x, outer_y)
 
 
-def _fill(cell: _Cell, entries: dict[str, Any], *, alone: bool) -> None:
+def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, alone: bool) -> None:
     """Draw the marks of a panel on its scales, and note what a legend names."""
     axes, panel = cell.axes, cell.panel
     for name, declared in (("x", panel.x), ("y", panel.y)):
@@ -185,9 +194,11 @@ def _fill(cell: _Cell, entries: dict[str, Any], *, alone: bool) -> None:
         if handle is not None and mark.label:
             # A straight line is no curve, also not among those that `lost_curves` of the tests looks at.
             handle.set_label("" if isinstance(mark, Lines) else mark.label)
-            own.setdefault(mark.label, handle)
+            (entries if several[id(mark)] > 1 else own).setdefault(mark.label, handle)
     if own and own is not entries:
-        outside = _ABOVE_LEGEND | {"ncols": fitting([*own])} if style.narrow() else _BESIDE_LEGEND
+        outside = (
+            _ABOVE_LEGEND | {"ncols": fitting([*own], style.width() - _BESIDE)} if style.narrow() else _BESIDE_LEGEND
+        )
         place = outside if panel.legend == "beside" else _INSIDE_LEGEND | {"loc": panel.legend}
         heading: dict[str, Any] = {"title": panel.heading or None, "title_fontsize": 9, "alignment": "left"}
         _enlarge_dots(axes.legend(own.values(), own.keys(), **place, **heading))
@@ -235,22 +246,24 @@ def _widen(axes: Axes) -> None:
 def _height(cell: _Cell, wide: float, rows: int) -> float:
     """Inches of a panel of a width."""
     panel, axes, highest = cell.panel, cell.axes, _HIGHEST_OF_TWO
-    if panel.kind == "map" and rows == 1:
+    if panel.equal and panel.kind == "map" and rows == 1:
         highest = _HIGHEST_MAP
     if panel.bars:
-        lines = 1 + max((name.count("\n") for name in _folded_names(panel.y.words)), default=0)
-        return (0.15 + len(panel.bars[0].values)) * bar_height(panel.bars[0].count, lines)
+        return (0.15 + len(panel.bars[0].values)) * _bar_height(panel.y.words, panel.bars[0].count)
     if panel.equal:
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         return min(highest, wide * abs((high - low) / (right - left)))
     if panel.kind == "map":
         return min(highest, _MAP * wide)
-    return panel.size * (_ALONE if rows == 1 else _FEW if rows <= _MOST_FEW else _MANY)
+    if rows == 1:
+        return _ALONE
+    return panel.size * (_SOME if rows <= _MOST_SOME else _MORE if rows <= _MOST_MORE else _MOST)
 
 
-def bar_height(count: int, lines: int = 1) -> float:
+def _bar_height(names: Sequence[str], bars: int) -> float:
     """Inches of a name with so many bars."""
-    return max(_BAR, _ONE_OF_SEVERAL * count + 0.04, style.line(_LABEL) * lines)
+    lines = 1 + max((name.count("\n") for name in _folded_names(names)), default=0)
+    return max(_BAR, _ONE_OF_SEVERAL * bars + 0.04, style.line(_LABEL) * lines)
 
 
 def _size(cell: _Cell, wide: float) -> None:
@@ -262,7 +275,7 @@ def _size(cell: _Cell, wide: float) -> None:
         # What axes share is set at one of them.
         if outer:
             _tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
-        axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer)
+        axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer and declared.numbers)
         axis.set_label_text(declared.label if outer else "")
         axis.offsetText.set_visible(outer)
 
@@ -272,11 +285,13 @@ def _tick(axis: Drawn, declared: Axis, inches: float) -> None:
     upright = axis is axis.axes.yaxis
     if declared.words or len(declared.ticks):
         places = declared.ticks if len(declared.ticks) else range(len(declared.words))
-        words = _folded_names(declared.words) if upright else [
-            style.folded(word, 8.0, inches / len(declared.words) - _PAD) for word in declared.words]  # fmt: skip
-        axis.set_ticks([*places], labels=words or None)
+        room = _NAMES * style.width() if upright else inches / max(len(declared.words), 1) - _PAD
+        words = [style.folded(word, _LABEL if upright else _WORD, room) for word in declared.words]
+        # Names that have no room side by side stand upright.
+        lies = upright or all(style.length(line, _WORD) <= 72 * room for word in words for line in word.split("\n"))
+        axis.set_ticks([*places], labels=(words if lies else declared.words) or None)
         if words and not upright:
-            axis.set_tick_params(labelsize=8.0)
+            axis.set_tick_params(labelsize=_WORD, labelrotation=0 if lies else 90)
     elif declared.scale == "linear":
         low, high = axis.get_view_interval()
         turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > 150
@@ -367,9 +382,9 @@ def _legend(figure: Figure, entries: Mapping[str, Any]) -> Legend:
                                        borderaxespad=0.2))  # fmt: skip
 
 
-def fitting(labels: Sequence[str]) -> int:
-    """Columns of a legend that a page holds."""
-    letters = int(_LEGEND_LETTERS * style.width())
+def fitting(labels: Sequence[str], width: float | None = None) -> int:
+    """Columns of a legend that a width (inches) holds, that of the page if none is given."""
+    letters = int(_LEGEND_LETTERS * (width or style.width()))
     return max(1, min(len(labels), letters // (8 + max(map(len, "\n".join(labels).split("\n"))))))
 
 

@@ -55,8 +55,8 @@ class Trace(PanelMark):
 class Dots(Trace):
     """Places, each with a marker; with intervals about them along x or y, shape (2, n), from the place."""
 
-    along_x: Floats | None = None
-    along_y: Floats | None = None
+    along_x: Floats | None = field(default=None, kw_only=True)
+    along_y: Floats | None = field(default=None, kw_only=True)
 
     def draw(self, axes: Axes) -> Any:
         look = {"marker": "o", "linestyle": "none"} | dict(self.look)
@@ -200,6 +200,17 @@ class Own(PanelMark):
         return self.function(axes)
 
 
+@dataclass(frozen=True, eq=False)
+class Coloured(Own):
+    """A map that a function draws: it returns what a bar of colours shows, which `bar` names, and options of that."""
+
+    bar: str = ""
+
+    def draw(self, axes: Axes) -> None:
+        drawn, options = self.function(axes)
+        color_bar(axes, drawn, self.bar, **options)
+
+
 def color_bar(axes: Axes, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:
     """A bar of colours beside a panel."""
     figure = axes.get_figure(root=True)
@@ -277,7 +288,7 @@ class Panel:
     @property
     def kind(self) -> Literal["bars", "map", "equal", ""]:
         """By which panels have room side by side."""
-        if any(isinstance(mark, Contours) for mark in self.marks):
+        if any(isinstance(mark, Contours | Coloured) for mark in self.marks):
             return "map"
         return "bars" if self.bars else "equal" if self.equal else ""
 

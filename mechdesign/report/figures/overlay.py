@@ -16,7 +16,8 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost
 from mechdesign.report.figures.framing import LEFT
-from mechdesign.report.figures.panels import fitting
+from mechdesign.report.figures.layout import fitting
+from mechdesign.report.figures.marks import Trace
 from mechdesign.report.figures.scene import Sweep, ranks
 
 COLOR = "#666666"
@@ -44,16 +45,21 @@ def draw_sweep(axes: Axes, sweep: Sweep) -> None:
         draw_pose(axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]))
 
 
+def both_named(before: Before) -> list[Trace]:
+    """What a legend shows of the study now and of that before."""
+    # As they are: a dollar would begin a formula.
+    names = [printable(name).replace("$", r"\$") for name in before.names]
+    looks: tuple[dict[str, Any], ...] = ({"color": style.INK}, {"color": COLOR, "linestyle": DASHES})
+    return [Trace([], [], label=f"{name} ({when})", look=look)
+            for name, when, look in zip(names, ("now", "before"), looks, strict=True)]  # fmt: skip
+
+
 def name_both(figure: Figure, before: Before | None) -> None:
     """A legend above all panels, for which the page is made higher; none without a study before."""
     if before is None:
         return
-    # As they are: a dollar would begin a formula.
-    names = [printable(name).replace("$", r"\$") for name in before.names]
-    labels = [f"{name} ({when})" for name, when in zip(names, ("now", "before"), strict=True)]
-    columns = fitting(labels)
-    looks: tuple[dict[str, Any], ...] = ({"color": style.INK}, {"color": COLOR, "linestyle": DASHES})
-    handles = [Line2D([], [], label=label, **look) for label, look in zip(labels, looks, strict=True)]
+    handles = [Line2D([], [], label=mark.label, **mark.look) for mark in both_named(before)]
+    columns = fitting([mark.label for mark in both_named(before)])
     style.grow(figure, above=0.1 + _LEGEND_ROW * (2 // columns))
     place = (LEFT / style.width() - 0.02, 1.0)
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=place, ncols=columns, borderaxespad=0.2)

@@ -218,7 +218,7 @@ def folded(words: str, size: float, room: float) -> str:
         return words  # no letter is wider than high
 
     def fits(line: str) -> bool:
-        return _length(line, size) <= 72 * room
+        return length(line, size) <= 72 * room
 
     def joined(equation: re.Match[str]) -> str:
         if fits(equation[0]):
@@ -241,7 +241,7 @@ def folded(words: str, size: float, room: float) -> str:
 
 
 @lru_cache(maxsize=1024)
-def _length(line: str, size: float) -> float:
+def length(line: str, size: float) -> float:
     """Points of a line of type of a size."""
     return float(text_to_path.get_text_width_height_descent(line, FontProperties(size=size), False)[0])
 

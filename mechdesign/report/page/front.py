@@ -18,10 +18,11 @@ from mechdesign.errors import MechdesignError
 from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize import pareto
-from mechdesign.questions.optimize.figures.front import front_figure, marked, pairs
+from mechdesign.questions.optimize.figures.front import front_picture, marked, pairs
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import parted
+from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.scene import Sweep, pose
 from mechdesign.report.page.frames import near_the_paths, paths_of
 from mechdesign.report.page.linkage import Sheet, Sketcher, add
@@ -70,7 +71,7 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     choices = [fitting[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
     knee = next((k for k, choice in enumerate(choices) if choice["mark"] == "knee"), 0)
     numbers, entries, fields = _numbers(drawn, table, rows, knee)
-    figure = front_figure(drawn, table)
+    figure = draw(front_picture(drawn, table))
     for line in figure.findobj(Line2D):
         assert isinstance(line, Line2D)
         line.set_rasterized(len(np.asarray(line.get_xdata())) > _CLOUD and line.get_linestyle() == "None")

@@ -15,12 +15,13 @@ from mechdesign.mechanism import Reason
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
 from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
-from mechdesign.questions.kinematics.figures.curves import curves_figure
+from mechdesign.questions.kinematics.figures.curves import motion_curves
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
+from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.axes import box
@@ -125,10 +126,11 @@ def _motion(
     which = numbers.add(own)
     data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
     data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
-    figure, beside, data["dots"] = None, "", []
+    curves, beside, data["dots"] = None, "", []
     if isinstance(drawn, DrawnMotion) and not plain:
-        figure = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before)
-    if figure is not None:
+        curves = motion_curves(study, {**result.tables, "motion": table}, sweep.poses, before)
+    if curves is not None:
+        figure = draw(curves)
         beside = inline(figure, name, described(figure))
         data["dots"] = _dots(figure, table, numbers)
     data["numbers"] = numbers.tracks

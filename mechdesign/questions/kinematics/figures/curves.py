@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.numerics.arrays import Flags, Floats
@@ -17,16 +14,10 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.overlay import DASHES, name_both
-from mechdesign.report.figures.panels import (
-    Along,
-    abscissa,
-    clear_of_ticks,
-    fitting,
-    moving_names,
-    tick_abscissa,
-    times,
-)
+from mechdesign.report.figures.layout import fitting, fitting_rows
+from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
+from mechdesign.report.figures.overlay import DASHES, both_named
+from mechdesign.report.figures.panels import Along, abscissa, moving_names, times
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import ranks
 from mechdesign.results import Column, Table
@@ -34,7 +25,6 @@ from mechdesign.study import Poses, Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12
-_MAX_TALL_PANELS = 7  # more panels are lower
 _COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _MARKS = 8  # along a curve, about
@@ -50,12 +40,6 @@ _HIDDEN = 0.015  # part of its range by which a curve differs from one that cove
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LEGEND_LETTERS = 26  # of the longest name in a legend
-# Inches.
-_LEFT = 1.0
-_BOTTOM = 0.5
-# Height of a panel: of few, of many, and on a page that holds no more.
-_TALL, _LOW, _LOWEST = 1.57, 1.23, 0.7
-_LEGEND_ROW = 0.19
 
 
 class _Curve(NamedTuple):
@@ -78,7 +62,7 @@ class _Curve(NamedTuple):
         return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
-class _Panel(NamedTuple):
+class _Group(NamedTuple):
     """Curves of one kind and unit, how many of them other panels have, and how many none has."""
 
     curves: list[_Curve]
@@ -86,66 +70,47 @@ class _Panel(NamedTuple):
     left_out: int
 
     @property
-    def columns(self) -> int:
-        """Columns of its legend where that stands above it."""
-        return fitting([curve.label for curve in self.curves], style.width() - _LEFT - 0.3)
-
-    @property
     def rows(self) -> int:
-        """Rows of that legend."""
-        return -(-len(self.curves) // self.columns) + bool(self.left_out)
+        """Rows of its legend where that stands above it, on a narrow page."""
+        names = [curve.label for curve in self.curves]
+        return -(-len(names) // fitting(names)) + bool(self.left_out) if style.narrow() else 0
 
 
 @picture(MotionView, "motion", order=20)
-def motion_figure(view: MotionView) -> Figure | None:
+def motion_picture(view: MotionView) -> Picture | None:
     """Every output of a motion."""
     poses = view.sweep.poses
-    return curves_figure(view.study, view.result.tables, poses, view.before) if poses.motion else None
+    return motion_curves(view.study, view.result.tables, poses, view.before) if poses.motion else None
 
 
-def curves_figure(
+def motion_curves(
     study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None
-) -> Figure | None:
+) -> Picture | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
     table = tables["motion"]
-    if not moving_names(poses):
+    over = abscissa(study, poses, _speed(study)) if moving_names(poses) else None
+    groups = _panels(study, table, over.name, over.values) if over is not None else []
+    if over is None or not groups:
         return None
-    over = abscissa(study, poses, _speed(study))
-    swept, x = over.name, over.values
-    panels = _panels(study, table, swept, x)
-    if not panels:
-        return None
-    marks = _marks(study, tables.get("limits"), poses, over)
-    invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
-    # A narrow page has no room for legends beside its panels: they stand above them.
-    above = style.narrow()
-    room = 0.1 + _LEGEND_ROW * max(panel.rows for panel in panels)
-    longest = max(len(curve.label) for panel in panels for curve in panel.curves)
-    top, down = (0.4 if marks else 0.15) + room * above, room if above else 0.2
     # What a page has no room for, the table has.
-    left_out = max(len(panels) - int(min((style.tallest() - top - _BOTTOM + down) / (_LOWEST + down), MAX_PANELS)), 0)
-    panels = panels[: len(panels) - left_out]
-    tall = _TALL if len(panels) <= _MAX_TALL_PANELS else _LOW
-    tall = min(tall, (style.tallest() - top - _BOTTOM + down) / len(panels) - down)
-    figure, axes = style.page(
-        len(panels), 1, tall, left=_LEFT, right=0.15 if above else 0.6 + 0.08 * longest, top=top, bottom=_BOTTOM,
-        down=down, sharex=True,
-    )  # fmt: skip
+    shown = groups[: fitting_rows(max(group.rows for group in groups), MAX_PANELS)]
+    left_out = len(groups) - len(shown)
+    axis = replace(over.axis, name=over.label + f"; {left_out} more panels in motion.csv" * bool(left_out))
+    marks, x = _marks(study, tables.get("limits"), poses, over), over.values
+    invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    common: list[PanelMark] = [
+        Zone(*ends, "x", label="not valid", look={"color": _SHADE, "zorder": 0}) for ends in invalid
+    ]
+    for k, kind in enumerate(dict.fromkeys(kind for _, kind in marks)):
+        look = {"color": _LIMIT_COLORS[k % len(_LIMIT_COLORS)], "linestyle": (0, (6, 2 + k)), "linewidth": 1.1}
+        common.append(
+            Lines([value for value, own in marks if own == kind], "x", label=kind, look=look | {"zorder": 1.5})
+        )
+    if before is not None:
+        common += both_named(before)
     colors: dict[tuple[str, str], str] = {}
-    for axis, panel in zip(axes, panels, strict=True):
-        for begin, end in invalid:
-            axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
-        _draw(axis, panel, x, study.units, colors)
-        if before is not None:
-            _draw_before(axis, panel, before, colors)
-    _draw_limits(figure, axes, marks, bool(invalid))
-    axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
-    axes[-1].margins(x=0.02)
-    axes[-1].set_xlabel(over.label + f"; {left_out} more panels in motion.csv" * bool(left_out))
-    tick_abscissa(axes[-1], over)
-    clear_of_ticks(figure, axes)
-    name_both(figure, before)
-    return figure
+    panels = [_panel(group, axis, x, study.units, colors, before, common) for group in shown]
+    return Picture("", panels, share="x")
 
 
 def _speed(study: Study) -> float | None:
@@ -172,7 +137,7 @@ def _rows(poses: Poses, swept: str, values: Floats) -> Floats:
     return np.interp(values, poses.values[swept][order], poses.numbers[order])
 
 
-def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
+def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Group]:
     """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section, mechanism, units = study.kinematics, study.mechanism, study.units
     outputs = section is not None and section.outputs
@@ -215,7 +180,7 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
     for own, count in zip(parts, shown, strict=True):
         for k, curves in enumerate(own[:count]):
             more = sum(map(len, own[count:])) if k == count - 1 else 0
-            panels.append(_Panel(curves, sum(map(len, own[:k])), more))
+            panels.append(_Group(curves, sum(map(len, own[:k])), more))
     return panels
 
 
@@ -280,13 +245,16 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
     return ranges
 
 
-def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
-    """Draw the curves of a panel, and note the colour of each."""
-    shown: list[Floats] = []
-    used: list[str] = []
-    for curve in panel.curves:
+def _panel(
+    group: _Group, over: Axis, x: Floats, units: Units, colors: dict[tuple[str, str], str], before: Before | None,
+    common: Sequence[PanelMark],
+) -> Panel:  # fmt: skip
+    """The curves of a group and those of the study before; notes the colour of each."""
+    marks, shown, used = [*common], list[Floats](), list[str]()
+    first, named = group.curves[0], len(group.curves) > 1 or group.curves[0].of != group.curves[0].order
+    for curve in group.curves:
         values = curve.column.values
-        color = colors.get(curve.color_key, _COLORS[(panel.before + len(shown)) % len(_COLORS)])
+        color = colors.get(curve.color_key, _COLORS[(group.before + len(shown)) % len(_COLORS)])
         if color in used:
             color = next(other for other in _COLORS if other not in used)
         used.append(color)
@@ -294,67 +262,30 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
         hidden = any(_coincide(values, other) for other in shown)
         # In grey the markers tell what the colours tell.
         which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
-        marker = _MARKERS[which] if len(panel.curves) > 1 else ""
-        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=curve.label,
-                  marker=marker, markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
+        marker = _MARKERS[which] if len(group.curves) > 1 else ""
+        look = {"color": color, "linestyle": (0, (3, 3)) if hidden else "-", "marker": marker, "markersize": 4,
+                "markevery": (which * every // len(_COLORS), every)}  # fmt: skip
+        marks.append(Trace(x, values, label=curve.label if named else "", look=look))
         shown.append(values)
-    first = panel.curves[0]
+    ends = _ends(group, np.concatenate([values[np.isfinite(values)] for values in shown]))
+    if before is not None:
+        earlier, was = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
+        places = abscissa(before.study, was, _speed(before.study)).values
+        for curve, color in zip(group.curves, used, strict=True):
+            if curve.column.name in earlier:
+                earlier_look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
+                marks.append(Trace(places, earlier[curve.column.name], look=earlier_look))
     title = first.order.replace("_", " ")
     if title == "position":
         kinds = {units.label("angle"): "angle", units.label("length"): "position"}
         title = kinds.get(first.column.unit, "value")
-    title = title.replace("inverse ", "inverse\n")
-    axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    finite = np.concatenate([values[np.isfinite(values)] for values in shown])
-    if _still(finite, 1.0):
-        # What stands still is drawn straight, not by its rounding.
-        middle = float(finite.mean())
-        axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
-    elif first.order != "position":
-        low, high = np.percentile(finite, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
-        if np.ptp(finite) > _PEAK_RATIO * (high - low) > 0:
-            # Near a dead centre rates grow without bound: what they are elsewhere stays legible.
-            axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
-    if len(panel.curves) > 1 or first.of != first.order:
-        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-        if style.narrow():
-            place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 0.97), "ncols": panel.columns, "borderaxespad": 0}
-        more = f"and {panel.left_out} more" if panel.left_out else None
-        axis.legend(title=more, title_fontsize=9, alignment="left", **place)
+    more = f"and {group.left_out} more" if group.left_out else ""
+    return Panel(marks, over, Axis(title, first.column.unit, ends=ends), legend="beside", heading=more)
 
 
-def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
-    """The curves of the study before, dashed, each in the colour of its name."""
-    table, poses = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
-    x = abscissa(before.study, poses, _speed(before.study)).values
-    low, high = axis.get_ylim()
-    for curve in panel.curves:
-        if curve.column.name in table:
-            values = table[curve.column.name]
-            axis.plot(x, values, color=colors[curve.color_key], linestyle=DASHES, linewidth=1.1, zorder=1.9)
-            if curve.order == "position" and np.isfinite(values).any():
-                low, high = min(low, float(np.nanmin(values))), max(high, float(np.nanmax(values)))
-    # Near a dead centre rates grow without bound: their axis stays that of the study now.
-    if (low, high) != axis.get_ylim():
-        margin = 0.04 * (high - low)
-        axis.set_ylim(low - margin, high + margin)
-
-
-def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
-    kinds = list(dict.fromkeys(kind for _, kind in marks))
-    looks: dict[str, dict[str, Any]] = {
-        kind: {"color": _LIMIT_COLORS[k % len(_LIMIT_COLORS)], "linestyle": (0, (6, 2 + k))}
-        for k, kind in enumerate(kinds)
-    }
-    for axis in axes:
-        for value, kind in marks:
-            axis.axvline(value, linewidth=1.1, zorder=1.5, **looks[kind])
-    handles: list[Line2D | Patch] = [Line2D([], [], linewidth=1.1, label=kind, **looks[kind]) for kind in kinds]
-    if shaded:
-        handles.append(Patch(color=_SHADE, label="not valid"))
-    if handles:
-        height = figure.get_figheight()
-        figure.legend(
-            handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.0,
-            bbox_to_anchor=(axes[0].get_position().x0, 1 - 0.34 / height),
-        )  # fmt: skip
+def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:
+    """Near a dead centre rates grow without bound: what they are elsewhere stays legible."""
+    low, high = np.percentile(values, (_TAIL_PERCENT, 100 - _TAIL_PERCENT)).tolist()
+    if group.curves[0].order == "position" or not np.ptp(values) > _PEAK_RATIO * (high - low) > 0:
+        return None, None
+    return low - 0.5 * (high - low), high + 0.5 * (high - low)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from mechdesign.mechanism.algebra import quiet
@@ -14,16 +12,8 @@ from mechdesign.mechanism.four_bars import FourBar, four_bars
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import (
-    BELOW_BARE,
-    Along,
-    abscissa,
-    fitting,
-    legend_below,
-    moving_names,
-    stack,
-    tick_abscissa,
-)
+from mechdesign.report.figures.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
+from mechdesign.report.figures.panels import Along, abscissa, moving_names
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Table
@@ -35,17 +25,15 @@ BEST = 90.0
 GOOD_WORDS = f"good: {GOOD[0]:g} to {GOOD[1]:g} deg"
 MOST_LOOPS = 5
 MOST_ADVANTAGES = 4
-_TALL = 2.5  # inches, a panel
-_LEGEND_LINE = 0.19
-_LEGEND_SYMBOL = 0.8  # inches, the line beside a name, and margins
 # Distances from where an advantage is infinite, as parts of that of the nearest pose, at which its curve is drawn.
 _SHRINKING = 2.0 ** -np.arange(1, 9)
 _BAND = "#E4EFE8"
 # Largest over smallest size of a mechanical advantage from which on its axis is logarithmic.
 _WIDE = 30.0
-_LOOKS = (
-    (style.BLUE, "-"), (style.ORANGE, (0, (6, 2))), (style.GREEN, (0, (1, 1))), (style.PURPLE, (0, (6, 2, 1, 2))),
-    (style.SKY, (0, (3, 1, 1, 1, 1, 1))),
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": style.BLUE, "linestyle": "-"}, {"color": style.ORANGE, "linestyle": (0, (6, 2))},
+    {"color": style.GREEN, "linestyle": (0, (1, 1))}, {"color": style.PURPLE, "linestyle": (0, (6, 2, 1, 2))},
+    {"color": style.SKY, "linestyle": (0, (3, 1, 1, 1, 1, 1))},
 )  # fmt: skip
 
 
@@ -60,47 +48,31 @@ class Transmission(NamedTuple):
 
 
 @picture(MotionView, "transmission", order=40)
-def transmission_figure(view: MotionView) -> Figure | None:
+def transmission_picture(view: MotionView) -> Picture | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
     study, tables, sweep = view.study, view.result.tables, view.sweep
     section = study.kinematics
     if not sweep.poses.motion or not moving_names(sweep.poses):
         return None
     over = abscissa(study, sweep.poses, section.speed if section is not None else None)
-    x = over.values[sweep.rows]
-    loops = transmissions(study, tables.get("loops"), sweep, over)
+    every = transmissions(study, tables.get("loops"), sweep, over)
+    loops = sorted(every, key=lambda loop: _off(loop.worst))[:MOST_LOOPS]
     advantages = list((section.mechanical_advantage if section is not None else {}).items())
     names = advantages[:MOST_ADVANTAGES]
     if not loops and not names:
         return None
-    notes = []
-    if len(loops) > MOST_LOOPS:
-        notes.append(f"the {MOST_LOOPS} of {len(loops)} loops that come nearest to a straight line")
-    if len(advantages) > len(names):
-        notes.append(f"{len(names)} of {len(advantages)} mechanical advantages")
+    notes = [f"the {MOST_LOOPS} of {len(every)} loops that come nearest to a straight line"] * (len(every) > MOST_LOOPS)
+    notes += [f"{len(names)} of {len(advantages)} mechanical advantages"] * (len(advantages) > len(names))
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names)).capitalize()
-    loops = sorted(loops, key=lambda loop: _off(loop.worst))[:MOST_LOOPS]
-    labels = [GOOD_WORDS, *map(_label, loops)] if loops else []
-    rows = -(-(len(labels) + 1) // fitting(labels)) if labels else 0  # with the worst of them
-    rows += sum(label.count("\n") for label in labels)
-    figure, axes = stack(bool(loops) + len(names), heading, over.label, note="; ".join(notes), tall=_TALL,
-                         bottom=BELOW_BARE + _LEGEND_LINE * rows)  # fmt: skip
-    if loops:
-        _draw_angles(axes[0], x, loops, over)
-        legend_below(figure, *axes[0].get_legend_handles_labels())
-    toggles = tables.get("toggles")
-    toggle_places = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
-    motion = tables["motion"]
-    for axis, (output, input_name) in zip(axes[bool(loops) :], names, strict=True):
+    panels = [_angles(over.values[sweep.rows], loops, over)] if loops else []
+    toggles, motion = tables.get("toggles"), tables["motion"]
+    places = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
+    for output, source in names:
         column = motion.column(f"{output}_advantage")
-        large = _draw_advantage(axis, over, column.values, toggle_places)
-        forces = ["moment" if study.mechanism.quantity(name) == "angle" else "force" for name in (output, input_name)]
-        axis.set_title(f"{forces[0]} of {output} over {forces[1]} put in at {input_name}", loc="left", fontsize=9.5)
-        words = "size of the\nmechanical advantage" if large else "mechanical advantage"
-        axis.set_ylabel(style.axis_label(words, column.unit))
-    axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
-    tick_abscissa(axes[-1], over)
-    return figure
+        forces = ["moment" if study.mechanism.quantity(name) == "angle" else "force" for name in (output, source)]
+        title = f"{forces[0]} of {output} over {forces[1]} put in at {source}"
+        panels.append(_advantage(over, column.values, column.unit, places, title))
+    return Picture(heading, panels, ("; ".join(notes),), share="x")
 
 
 def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) -> list[Transmission]:
@@ -128,58 +100,49 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
     return angles
 
 
-def _label(loop: Transmission) -> str:
-    """The name of a loop and its class, as wide as the page at most."""
-    return style.folded(f"{loop.loop.name}: {loop.kind}", 9, style.width() - _LEGEND_SYMBOL)
-
-
 def _off(angle: float) -> float:
     """The acute angle: how far the links are from a straight line."""
     return min(angle, 180 - angle)
 
 
-def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) -> None:
-    axis.axhspan(*GOOD, color=_BAND, linewidth=0, zorder=0, label=GOOD_WORDS)
-    for end in GOOD:
-        axis.axhline(end, color=style.GREEN, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
-    axis.axhline(BEST, color=style.GREEN, linewidth=1.4, zorder=1)
-    for loop, (color, dashes) in zip(loops, _LOOKS, strict=False):
-        axis.plot(x, loop.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(loop))
-    worst = loops[0]
+def _angles(x: Floats, loops: list[Transmission], over: Along) -> Panel:
+    """The transmission angles of loops, the worst first, with the band that is good."""
+    worst, green = loops[0], {"color": style.GREEN, "zorder": 1}
     words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {over.value(worst.at)}" if over.name else "")
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION
-    axis.plot([worst.at], [worst.worst], "o", color=color, markersize=7, zorder=5, clip_on=False, label=words)
-    axis.set_ylim(0, 180)
-    axis.set_yticks([0, GOOD[0], BEST, GOOD[1], 180])
-    axis.set_ylabel("angle between coupler\nand output [deg]")
-    axis.set_title(f"{BEST:g} deg is best; 0 and 180 deg pass no force", loc="left", fontsize=9.5)
+    marks: list[PanelMark] = [
+        Zone(*GOOD, label=GOOD_WORDS, look={"color": _BAND, "zorder": 0}),
+        Lines(GOOD, look=green | {"linewidth": 0.9, "linestyle": (0, (5, 3))}),
+        Lines([BEST], look=green | {"linewidth": 1.4}),
+        *(Trace(x, loop.angle, label=f"{loop.loop.name}: {loop.kind}", look=look | {"linewidth": 1.8})
+          for loop, look in zip(loops, _LOOKS, strict=False)),
+        Dots([worst.at], [worst.worst], label=words,
+             look={"color": color, "markersize": 7, "zorder": 5, "clip_on": False}),
+    ]  # fmt: skip
+    axis = Axis("angle between coupler and output", "deg", ends=(0, 180), ticks=(0, GOOD[0], BEST, GOOD[1], 180))
+    return Panel(marks, over.axis, axis, f"{BEST:g} deg is best; 0 and 180 deg pass no force", size=1.4)
 
 
 @quiet
-def _draw_advantage(axis: Axes, over: Along, values: Floats, toggles: Floats) -> bool:
-    """Draw its curve; on a logarithmic axis, which is returned, its size, where it is boundless or spans `_WIDE`."""
-    x, sizes = over.values, np.abs(values)
+def _advantage(over: Along, values: Floats, unit: str, toggles: Floats, title: str) -> Panel:
+    """A mechanical advantage; on a logarithmic axis its size, where it is boundless or spans `_WIDE`."""
+    x, sizes, blue = over.values, np.abs(values), {"color": style.BLUE, "linewidth": 1.8}
     finite = sizes[np.isfinite(sizes) & (sizes > 0)]
     if not len(finite):
-        axis.text(0.5, 0.5, "no finite value", transform=axis.transAxes, ha="center")
-        return False
+        return Panel([Words(0.5, 0.5, "no finite value", inside="xy", look={"ha": "center"})], over.axis, title=title)
     places = boundless(x, values, toggles)
-    large = len(places) > 0 or bool(finite.max() > _WIDE * finite.min())
-    if large:
-        every, above = _towards(x, sizes, places)
-        axis.set_yscale("log")
-        axis.plot(every, above, color=style.BLUE, linewidth=1.8)
-        axis.set_ylim(finite.min() / 1.5, finite.max() * 1.5)
-    else:
-        axis.plot(x, values, color=style.BLUE, linewidth=1.8)
-    for place in places:
-        axis.axvline(place, color=style.VERMILION, linestyle=(0, (6, 3)), linewidth=1.2)
+    if not len(places) and finite.max() <= _WIDE * finite.min():
+        return Panel([Trace(x, values, look=blue)], over.axis, Axis("mechanical advantage", unit), title, size=1.4)
+    marks: list[PanelMark] = [Trace(*_towards(x, sizes, places), look=blue)]
+    marks.append(Lines(places, "x", look={"color": style.VERMILION, "linestyle": (0, (6, 3)), "linewidth": 1.2}))
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    for place in places.tolist():
         right = place > float(np.mean([x.min(), x.max()]))
-        axis.annotate(f"beyond bounds at {over.value(place)}", (place, 0.96), xycoords=axis.get_xaxis_transform(),
-                      xytext=(-5 if right else 5, 0), textcoords="offset points", ha="right" if right else "left",
-                      va="top", fontsize=9, color=style.VERMILION,
-                      path_effects=[withStroke(linewidth=2.5, foreground="white")])  # fmt: skip
-    return large
+        look = {"ha": "right" if right else "left", "va": "top", "fontsize": 9, "color": style.VERMILION}
+        marks.append(Words(place, 0.96, f"beyond bounds at {over.value(place)}", (-5 if right else 5, 0), "y",
+                           look=look | {"path_effects": halo}))  # fmt: skip
+    axis = Axis("size of the mechanical advantage", unit, "log", (float(finite.min()) / 1.5, float(finite.max()) * 1.5))
+    return Panel(marks, over.axis, axis, title, size=1.4)
 
 
 def _towards(x: Floats, sizes: Floats, places: Floats) -> tuple[Floats, Floats]:

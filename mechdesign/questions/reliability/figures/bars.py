@@ -51,13 +51,13 @@ def contributions(study: Study, table: Table, poses: Poses, worst: int = 0) -> P
     across = min(3 if len(names) < 9 else 2, fitting_panels("bars", names))
     # Where a page does not hold all panels with a few bars each, the last are left out.
     rows = -(-min(len(errors), MAX_PANELS) // across)
-    while rows > 1 and fitting_names(rows, bars) < min(MIN_SOURCES, len(names)):
+    while rows > 1 and fitting_names(names, rows, bars) < min(MIN_SOURCES, len(names)):
         rows -= 1
     pairs = errors[: min(rows * across, MAX_PANELS)]
     blocks = [table.take(table.where(output=output, order=order)) for output, order in pairs]
     shares = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, per_pose) for block in blocks]
     largest = np.max([np.nan_to_num(share).mean(axis=0) for share in shares], axis=0)
-    most = int(max(MIN_SOURCES, min(MAX_SOURCES, fitting_names(rows, bars))))
+    most = int(max(MIN_SOURCES, min(MAX_SOURCES, fitting_names(names, rows, bars))))
     ranked = np.argsort(-largest, kind="stable")[:most]
     where, notes = "" if per_pose else f"average over {poses.count} poses", []
     if sobol is not None or poses.count == 1:
