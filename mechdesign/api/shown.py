@@ -112,9 +112,9 @@ class Answer(Result):
         MechdesignError
             If it could not be drawn.
         """
+        if (figure := self._drawn(name).get(name)) is not None:
+            return figure
         drawn = self._drawn()
-        if name in drawn:
-            return drawn[name]
         if name in drawn.failed:
             raise MechdesignError(f"picture {name} could not be drawn: {drawn.failed[name]}")
         there = f"there are {', '.join(drawn)}" if drawn else "there are none"
@@ -207,8 +207,8 @@ class Answer(Result):
                 _undrawn(name, explain(error)[1])
         return tuple(drawn), None
 
-    def _drawn(self) -> Gallery:
-        """All its pictures, and last the mechanism; none of an interrupted computation."""
+    def _drawn(self, name: str | None = None) -> Gallery:
+        """All its pictures, and last the mechanism, or that of one name; none of an interrupted computation."""
         from mechdesign.report.figures import style
         from mechdesign.report.figures.mechanism import mechanism_figure
         from mechdesign.report.figures.pictures import figures
@@ -217,8 +217,9 @@ class Answer(Result):
         if self.interrupted:
             return Gallery()
         with style.context():
-            drawn = figures(self.study, self)
-            drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
+            drawn = figures(self.study, self, name=name)
+            if name in (None, MECHANISM):
+                drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 
 

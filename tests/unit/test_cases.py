@@ -1,20 +1,15 @@
-"""Cases of a study: closed forms of a slider-crank, assembly modes that stay, and cases that fail."""
+"""Cases of a study: each as a study of its own, in their order, in the assembly of the sketch, and cases that fail."""
 
 from __future__ import annotations
 
 import math
-import pickle
+from typing import Any
 
 import numpy as np
 import pytest
 from helpers.studies import IN_LINE
 
 import mechdesign
-from mechdesign.errors import StudyError
-from mechdesign.experiments.case_numbers import CaseNumber
-from mechdesign.experiments.cases import answers, foresee
-from mechdesign.experiments.tally import Tally
-from mechdesign.study.variants import with_entries
 
 SLIDER_CRANK = (
     IN_LINE
@@ -32,83 +27,56 @@ mechanism:
   sketch: {A: [0, 30], B: [75, 55]}
 kinematics: {poses: [{crank: 90}], outputs: [B.y]}
 """
-STROKE = CaseNumber("kinematics.extremes.B.x.range")
-SWING = CaseNumber("kinematics.rod.angle.max")
+STROKE, SWING = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
+R = "mechanism.parameters.r"
 
 
-def asked(text: str, cases: list[dict[str, object]], *wanted: CaseNumber, jobs: int = 1) -> Tally:
-    study, given = mechdesign.load(text=text), [tuple(case.items()) for case in cases]
-    tally = Tally(given, len(wanted), len(study.requirements))
-    for answered in answers(study, given, wanted, jobs=jobs):
-        tally.add(answered)
-    return tally
-
-
-def test_stroke_and_swing_of_slider_cranks():
-    radii = np.array([20.0, 30.0, 35.0, 45.0])
-    found = asked(SLIDER_CRANK, [{"mechanism.parameters.r": r} for r in radii.tolist()], STROKE, SWING)
-    (stroke, unit), (swing, _) = found.result(0), found.result(1)
-    np.testing.assert_allclose(stroke, 2 * radii, rtol=1e-9)
-    np.testing.assert_allclose(swing, np.degrees(np.arcsin(radii / 100)), rtol=1e-9)
-    assert unit == "mm"
-    long, steep = found.required(0), found.required(1)
-    assert long[0].tolist() == stroke.tolist()
-    assert long[1].tolist() == (2 * radii >= 70).tolist()
-    np.testing.assert_allclose(steep[0], swing, rtol=1e-9)
-    assert steep[1].tolist() == (swing <= 25).tolist()
-    assert found.table[:, 0].tolist() == (1 - long[1] * steep[1]).tolist()
-    assert not found.failed
-    short, broad = found.verdicts
-    assert (short.worst, short.margin) == (pytest.approx(40), pytest.approx(-30))
-    assert short.place.startswith("case 1 (r 20)")
-    assert "case 4 (r 45), crank 90" in broad.place or "case 4 (r 45), crank 270" in broad.place
+def swept(text: str, vary: dict[str, Any], *results: str, jobs: int = 1) -> mechdesign.Answer:
+    study = mechdesign.load(text=text, overrides={"matrix": {"vary": vary, "results": list(results)}})
+    return mechdesign.sweep(study, jobs=jobs)
 
 
 @pytest.mark.slow
 def test_numbers_and_limits_that_follow_are_those_of_each_case_alone():
     text = SLIDER_CRANK.replace("at_least: 70", "at_least: 2*r - 5").replace("at_most: 25", "at_least: 3, at_most: r")
-    cases: list[dict[str, object]] = [{"mechanism.parameters.r": 20 + 0.5 * k} for k in range(20)]
-    found = asked(text, cases, STROKE, SWING)
-    for k, case in enumerate(cases):
-        study = mechdesign.load(text=text, overrides=case)
-        verdicts = mechdesign.requirements(study, mechdesign.kinematics(study))
-        for j, verdict in enumerate(verdicts):
-            worst, met, unit = (part[k] if isinstance(part, np.ndarray) else part for part in found.required(j))
-            assert (worst, bool(met), unit) == (pytest.approx(verdict.worst, rel=1e-12), verdict.met, verdict.unit)
-    assert [each.margin for each in found.verdicts] == [pytest.approx(5), pytest.approx(-3)]
+    radii = [20 + 0.5 * k for k in range(20)]
+    result = swept(text, {R: radii}, STROKE, SWING)
+    table = result.main
+    assert table[STROKE] == pytest.approx(2 * np.array(radii), rel=1e-9)
+    assert table[SWING] == pytest.approx(np.degrees(np.arcsin(np.array(radii) / 100)), rel=1e-9)
+    for k, radius in enumerate(radii):
+        study = mechdesign.load(text=text, overrides={R: radius})
+        for name, verdict in zip(
+            (STROKE, "|kinematics.rod.angle|"), mechdesign.kinematics(study).verdicts, strict=True
+        ):
+            assert table[name][k] == pytest.approx(verdict.worst, rel=1e-12)
+            assert table[f"{name}_met"][k] == verdict.met
+            assert table.column(name).unit == verdict.unit
+    assert [verdict.margin for verdict in result.verdicts] == pytest.approx([5, -3])
 
 
 @pytest.mark.slow
 def test_cases_come_in_their_order_whatever_the_workers():
-    cases: list[dict[str, object]] = [{"mechanism.parameters.l": 100 + k} for k in range(7)]
-    one, two = (asked(SLIDER_CRANK, cases, STROKE, jobs=jobs) for jobs in (1, 2))
-    assert one.table.tobytes() == two.table.tobytes()
+    lengths = [100 + k for k in range(7)]
+    one, two = (swept(SLIDER_CRANK, {"mechanism.parameters.l": lengths}, STROKE, jobs=jobs) for jobs in (1, 2))
+    assert one.main["mechanism.parameters.l"].tolist() == lengths
+    for name in one.main.names:
+        np.testing.assert_array_equal(one.main[name], two.main[name])
     assert one.verdicts == two.verdicts
 
 
 def test_a_case_that_fails_is_answered_with_its_reason():
-    cases: list[dict[str, object]] = [
-        {"mechanism.parameters.r": -1}, {"mechanism.parameters.rr": 1}, {"kinematics.poses": [{"B.x": 200}],
-        "kinematics.sweep": None}, {},
-    ]  # fmt: skip
-    found = asked(SLIDER_CRANK, cases, STROKE)
-    assert found.table[:, 0].tolist() == [3, 3, 3, 1]
-    assert found.reason(0) == "mechanism.links.crank.2: must be positive, not -1"
-    assert "did you mean 'r'?" in found.reason(1)
-    assert "cannot be assembled" in found.reason(2)
-    assert found.reason(3) == ""
-    assert np.isnan(found.result(0)[0]).tolist() == [True, True, True, False]
-    for k in (0, 1):
-        assert not found.required(k)[1][:3].any()
-        assert math.isnan(found.verdicts[k].worst)
-        assert found.verdicts[k].place.startswith("case 1 (r -1)")
+    found = swept(FOUR_BAR, {"kinematics.poses": [[{"B.x": 300}], [{"crank": 90}]]}, "kinematics.B.y").main
+    assert found["exit_code"].tolist() == [3, 0]
+    assert "cannot be assembled" in found["reason"][0]
+    assert found["reason"][1] == ""
+    assert np.isnan(found["kinematics.B.y"]).tolist() == [True, False]
 
 
 def test_the_assembly_stays_that_of_the_sketch_unless_that_is_changed():
     # With the crank this much shorter the sketched B would be nearer to the other side.
-    height = CaseNumber("kinematics.B.y")
-    moved = {"mechanism.links.ground.D": [100, 90]}
-    kept, mirrored = asked(FOUR_BAR, [moved, moved | {"mechanism.sketch.B": [75, -55]}], height).result(0)[0]
+    vary = {"mechanism.links.ground.D": [[100, 90]], "mechanism.sketch.B": [[75, 55], [75, -55]]}
+    kept, mirrored = swept(FOUR_BAR, vary, "kinematics.B.y").main["kinematics.B.y"]
 
     def height_of(side: int) -> float:
         a, d = 30j, 100 + 90j
@@ -121,26 +89,13 @@ def test_the_assembly_stays_that_of_the_sketch_unless_that_is_changed():
 
 
 def test_another_mechanism_is_assembled_anew():
-    study = mechdesign.load(text=FOUR_BAR)
-    other = with_entries(study, [("mechanism.drives", ["rocker"]), ("kinematics.poses", [{"rocker": 90}])])
-    assert other.mechanism.drives == ("rocker",)
-    assert float(other.mechanism.solve({"rocker": 90})["B.y"]) == pytest.approx(60)
+    vary = {"mechanism.drives": [["rocker"]], "kinematics.poses": [[{"rocker": 90}]]}
+    assert swept(FOUR_BAR, vary, "kinematics.B.y").main["kinematics.B.y"] == pytest.approx([60])
 
 
 def test_what_no_result_has_is_found_before_anything_is_computed():
-    study = mechdesign.load(text=SLIDER_CRANK)
-    wrong = [CaseNumber("kinematics.rod.angel.max"), CaseNumber("kinematics.B.x")]
-    with pytest.raises(StudyError) as error:
-        foresee(study, [STROKE, SWING, *wrong])
+    with pytest.raises(mechdesign.StudyError) as error:
+        swept(SLIDER_CRANK, {R: [20]}, STROKE, SWING, "kinematics.rod.angel.max", "kinematics.B.x")
     misspelt, several = map(str, error.value.problems)
     assert "did you mean 'rod.angle'?" in misspelt
     assert "13 rows; ask for kinematics.B.x.min" in several
-
-
-def test_the_answer_of_a_case_can_be_pickled():
-    (answer,) = answers(mechdesign.load(text=SLIDER_CRANK), [()], [STROKE])
-    again = pickle.loads(pickle.dumps(answer))
-    assert again.table.tobytes() == answer.table.tobytes()
-    assert (again.reasons, again.units, again.warned, again.worst) == (
-        answer.reasons, answer.units, answer.warned, answer.worst
-    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Evolution towards a front: directions, who survives, children; fronts by their definition; hypervolumes."""
+"""Evolution towards a front: directions, who survives, children; fronts, hypervolumes, the cube of variables."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from math import comb
 import numpy as np
 import pytest
 
+import mechdesign
 from mechdesign.numerics.evolution import MUTATION_INDEX, offspring, simplex, survivors
 from mechdesign.numerics.fronts import crowding, front, hypervolume
+from mechdesign.questions.optimize.variables import from_cube
 
 
 @pytest.mark.parametrize(("goals", "divisions"), [(2, 1), (2, 9), (3, 12), (4, 6), (5, 4)])
@@ -117,3 +119,36 @@ def test_points_of_a_sphere_are_all_on_the_front_and_nothing_outside_of_it_is(go
     found = front(np.concatenate([outside, sphere]))
     assert not found[: len(outside)].any()
     assert found[len(outside) :].all()
+
+
+def varied(variables: str) -> mechdesign.Study:
+    """An arm with these variables; d, l and r are lengths, n is a number."""
+    return mechdesign.load(
+        text=f"""
+mechanism:
+  parameters: {{r: 40, l: 110, d: 10, n: 5}}
+  links: {{ground: {{O: [0, 0]}}, upper: [O, A, r], fore: [A, B, l + d]}}
+  drives: [upper, fore]
+  sketch: {{A: [40, 0], B: [40, 120]}}
+kinematics: {{sweep: {{upper: {{from: 0, to: 90, number: n}}, fore: 0}}, outputs: [B]}}
+optimize: {{variables: {{{variables}}}, maximize: kinematics.B.x}}
+"""
+    )
+
+
+def test_whole_numbers_and_choices_have_equal_shares_of_the_cube() -> None:
+    study = varied("n: {from: 2, to: 5, integer: true}, r: {from: 30, to: 50, step: 1}, d: {choices: [8, 12, 10]}")
+    u = np.linspace(0, 1, 13)[:, None] * np.ones(3)
+    designs, given, points = from_cube(study, u)
+    assert given.all()
+    assert designs["n"].tolist() == [2, 2, 2, 3, 3, 3, 4, 4, 4, 5, 5, 5, 5]
+    assert designs["d"].tolist() == [8] * 4 + [12] * 4 + [10] * 5
+    assert points[:, 0] == pytest.approx(np.repeat([1, 3, 5, 7], [3, 3, 3, 4]) / 8)
+    assert points[:, 1].tolist() == u[:, 1].tolist()
+    for name, column in from_cube(study, points)[0].items():
+        assert column.tolist() == designs[name].tolist()
+
+
+def test_a_point_without_a_value_is_no_design() -> None:
+    study = varied("d: {choices: [8, 12]}, n: {from: d, to: 9, integer: true}")
+    assert from_cube(study, np.array([[0.2, 0.9], [0.8, 0.9]]))[1].tolist() == [True, False]

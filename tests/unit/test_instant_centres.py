@@ -6,7 +6,6 @@ from helpers.gallery import result_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import StudyError
 
 FOUR_BAR = """
 mechanism:
@@ -101,7 +100,7 @@ def test_with_several_drives_centres_follow_from_their_rates():
     # w_1 z(E) = w_2 (z(E) - z): the centre divides O E as the angular velocities do.
     elbow = 3 * np.exp(1j * np.radians([30, 80]))
     np.testing.assert_allclose(centre(result.tables["instant_centres"], "lower.ground"), elbow * (1 - 2 / 5))
-    with pytest.raises(StudyError, match="give 'rates' or a 'speed'"):
+    with pytest.raises(mechdesign.StudyError, match="give 'rates' or a 'speed'"):
         study_of(ARM, "kinematics.instant_centres=[[lower, ground]]")
 
 
@@ -113,7 +112,7 @@ def test_with_several_drives_centres_follow_from_their_rates():
     ("mechanical_advantage={B.x: B.x}", "is not moved by"),
 ])  # fmt: skip
 def test_what_is_no_pair_and_no_output_is_told(given, message):
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(mechdesign.StudyError, match=message):
         study_of(FOUR_BAR, f"kinematics.{given}")
 
 

@@ -92,11 +92,16 @@ def pictures(command: str) -> list[NamedPicture[View]]:
     return sorted(dict.fromkeys(declared), key=lambda declared: (declared.order, declared.names))
 
 
-def figures(study: Study, result: Result, before: Before | None = None) -> Gallery:
-    """Figures of a result by their names, and why others could not be made; use inside `style.context`."""
+def figures(study: Study, result: Result, before: Before | None = None, name: str | None = None) -> Gallery:
+    """Figures of a result by their names, or that of one name, and why others could not be made.
+
+    Use inside `style.context`.
+    """
     gallery = Gallery()
     views: dict[type[View], View] = {}
     for picture in pictures(result.command):
+        if name is not None and name not in picture.names:
+            continue
         if picture.view not in views:
             views[picture.view] = picture.view(study, result.seen, before)
         gallery.add(picture.names[0], picture, views[picture.view])
