@@ -321,8 +321,7 @@ def test_goals_of_many_designs_are_those_of_each_alone() -> None:
     ]  # fmt: skip
     assert found[2, : len(expected)] == pytest.approx(expected, rel=5e-6)
     # And those of the command, of that design.
-    bounded = [goal.replace("}", ", at_most: 0}") if goal.count("}") == 1 else goal[:-1] + ", at_most: 0}"
-               for goal in GOALS]  # fmt: skip
+    bounded = [goal[:-1] + ", at_most: 0}" for goal in GOALS]
     verdicts = required(FOUR_BAR.replace("a: 30", f"a: {lengths[2]}"), *bounded)
     assert [verdict.worst for verdict in verdicts] == pytest.approx(found[2], rel=1e-10)
 
