@@ -1,4 +1,4 @@
-"""Numerics by themselves: groups of equations, changes of sign, slopes by differences."""
+"""Numerics by themselves: groups of equations, changes of sign, roots, slopes by differences."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from mechdesign.expressions import Expression
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.numerics.graphs import components
+from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.numerics.sign_changes import Resolved
 
 
@@ -124,3 +125,25 @@ def test_counts_of_samples_are_not_taken_for_a_smooth_result():
         assert found.error[0] > 0.01
         covered += abs(found.value[0] - 1.0) <= found.error[0]
     assert covered >= 40
+
+
+def test_roots_of_many_functions() -> None:
+    """Quadratics in one step; a kink, a step and a function that ends (nan) by halving."""
+    functions = [
+        lambda x: x * x - 2, lambda x: np.cos(x) - x, lambda x: np.where(x < 1.1, 1.0, -1.0),
+        lambda x: np.where(x < 1.3, 2 - x, np.nan), lambda x: np.abs(x - 1.5) - 0.4,
+    ]  # fmt: skip
+    calls = np.zeros(5, dtype=int)
+
+    def evaluate(which: np.ndarray, x: np.ndarray) -> np.ndarray:
+        np.add.at(calls, which, 1)
+        return np.array([functions[k](v) for k, v in zip(which, x, strict=True)])
+
+    low, high = np.array([0.0, 0, 0, 0, 0]), np.array([2.0, 2, 2, 2, 1.5])
+    third = np.array([1.0, 1, 1, 1, 1])
+    every = np.arange(5)
+    at = [evaluate(every, v) for v in (low, high, third)]
+    calls[:] = 0
+    found = bracketed_roots(evaluate, low, at[0], high, at[1], third, at[2], np.full(5, 1e-13))
+    assert found == pytest.approx([np.sqrt(2), 0.7390851332151607, 1.1, 1.3, 1.1], abs=1e-12)
+    assert calls[0] <= 2

@@ -42,9 +42,8 @@ reliability:
 """
 # With the option by which a pin's model may differ from another's: where errors are linear, and where pins are drawn.
 METHODS = {
-    "analytic": "analytic", "second_order": "analytic", "monte_carlo": "monte_carlo",
-    "quasi_monte_carlo": "monte_carlo", "form": "monte_carlo", "importance_sampling": "monte_carlo",
-    "auto": "monte_carlo",
+    "analytic": "analytic", "second_order": "analytic", "monte_carlo": "monte_carlo", "form": "monte_carlo",
+    "importance_sampling": "monte_carlo", "auto": "monte_carlo",
 }  # fmt: skip
 # Sigmas of the errors of B.x and its rates are about 0.3, 0.3 and 0.8.
 LIMITS = {

@@ -9,11 +9,6 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.numerics.roots import bracketed_roots
-from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.question import questions
-from mechdesign.region.panels import find_panels
-from mechdesign.region.rays import BATCH, Designs, trace
 
 ARM = """
 units: {length: dimensionless}
@@ -89,63 +84,48 @@ def test_a_margin_is_left_out_of_the_means_only() -> None:
     assert cut["GII"][0] > whole["GII"][0] + 0.005
 
 
-def test_ends_of_intervals_lie_on_the_limits() -> None:
-    study = study_of(LEGS)
-    question = questions(study)[0]
-    theta = np.linspace(0.05, 3.1, 57)
-    zero = np.zeros(len(theta), dtype=int)
-    found = trace(Designs(question.field, {}, 1, 0j, question.scan, BATCH), zero, theta, np.full(len(theta), 7.0))
-    for radius in (found.inner, found.outer):
-        place = radius * np.exp(1j * theta[found.ray])
-        lengths = np.abs(place[:, None] - np.array([1, -1]))
-        assert np.abs(lengths[:, :, None] - [1, 3]).min(axis=(1, 2)) == pytest.approx(np.zeros(len(place)), abs=1e-14)
+def boundary(*changes: str) -> tuple[mechdesign.Table, np.ndarray]:
+    """The outline of a region of two legs, and its places."""
+    table = mechdesign.workspace(study_of(LEGS, *changes)).tables["boundary"]
+    return table, table["x"] + 1j * table["y"]
 
 
-def test_panels_end_where_the_active_limits_change() -> None:
-    question = questions(study_of(LEGS, UPPER))[0]
-    panels = find_panels(Designs(question.field, {}, 1, 0j, (0.0, np.pi), BATCH))
-    assert panels.high == pytest.approx([np.pi / 2, np.pi], abs=1e-8)
-    # A base that is not symmetric: the corners are where two circles meet.
-    moved = {"ground.B1.x": np.array([1.3])}
-    panels = find_panels(Designs(question.field, moved, 1, 0j, (0.0, np.pi), BATCH))
-    corner = (1.3**2 - 1) / (2 * 2.3) + 0j
+@pytest.mark.slow
+def test_the_boundary_lies_on_the_limits() -> None:
+    table, place = boundary("workspace.indices=[]")
+    limited = table["kind"] == "limit"
+    assert limited.sum() > 50
+    lengths = np.abs(place[limited, None] - np.array([1, -1]))
+    assert np.abs(lengths[:, :, None] - [1, 3]).min(axis=(1, 2)) == pytest.approx(np.zeros(limited.sum()), abs=1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("base", "tolerance"), [(1.0, 1e-8), (1.3, 1e-11)])
+def test_smooth_curves_of_the_boundary_end_where_the_active_limits_change(base: float, tolerance: float) -> None:
+    """The corners are where two circles meet, above the middle of the bases or beside it."""
+    table, place = boundary(UPPER, f"mechanism.links.ground.B1.0={base}", "workspace.indices=[]")
+    corner = (base**2 - 1) / (2 * (base + 1)) + 0j
     corner += 1j * np.sqrt(9 - (corner.real + 1) ** 2)
-    assert np.abs(panels.high - np.angle(corner)).min() < 1e-12
+    ends = np.flatnonzero(np.diff(table["curve"]))
+    assert np.abs(place[ends] - corner).min() < tolerance
 
 
 @pytest.mark.nightly
-def test_batch_of_designs_equals_one_by_one() -> None:
-    study = study_of(LEGS, UPPER)
-    question = questions(study)[0]
-    lows = np.array([1.0, 1.2, 1.7, 2.5])
-    places = study.parameters.places({"low": lows, "high": lows + 2})
-    together = answer(question, places, 4, BATCH).values
+def test_designs_together_are_as_one_by_one() -> None:
+    goals = ("area", "GII", "GRI", "SUI")
+
+    def asked(low: float, count: int) -> mechdesign.Table:
+        variables = f"variables: {{low: {{from: {low}, to: {low + 0.5 * (count - 1)}, number: {count}}}}}"
+        optimize = f"optimize={{{variables}, maximize: [{', '.join(goals)}]}}"
+        return mechdesign.optimize(study_of(LEGS, UPPER, "mechanism.parameters.high=low + 2", optimize)).tables[
+            "designs"
+        ]
+
+    together = asked(1.0, 4)
     for k in range(4):
-        alone = answer(question, {name: value[k : k + 1] for name, value in places.items()}, 1, BATCH).values
-        for name, values in together.items():
-            assert alone[name][0] == pytest.approx(values[k], rel=1e-10), name
-
-
-def test_roots_of_many_functions() -> None:
-    """Quadratics in one step; a kink, a step and a function that ends (nan) by halving."""
-    functions = [
-        lambda x: x * x - 2, lambda x: np.cos(x) - x, lambda x: np.where(x < 1.1, 1.0, -1.0),
-        lambda x: np.where(x < 1.3, 2 - x, np.nan), lambda x: np.abs(x - 1.5) - 0.4,
-    ]  # fmt: skip
-    calls = np.zeros(5, dtype=int)
-
-    def evaluate(which: np.ndarray, x: np.ndarray) -> np.ndarray:
-        np.add.at(calls, which, 1)
-        return np.array([functions[k](v) for k, v in zip(which, x, strict=True)])
-
-    low, high = np.array([0.0, 0, 0, 0, 0]), np.array([2.0, 2, 2, 2, 1.5])
-    third = np.array([1.0, 1, 1, 1, 1])
-    every = np.arange(5)
-    at = [evaluate(every, v) for v in (low, high, third)]
-    calls[:] = 0
-    found = bracketed_roots(evaluate, low, at[0], high, at[1], third, at[2], np.full(5, 1e-13))
-    assert found == pytest.approx([np.sqrt(2), 0.7390851332151607, 1.1, 1.3, 1.1], abs=1e-12)
-    assert calls[0] <= 2
+        alone = asked(1.0 + 0.5 * k, 1)
+        for name in goals:
+            assert alone[name][0] == pytest.approx(together[name][k], rel=1e-10), name
 
 
 @pytest.mark.parametrize(
