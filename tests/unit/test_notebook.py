@@ -267,6 +267,7 @@ def test_answers_know_their_study_and_its_seed() -> None:
     assert pickle.loads(pickle.dumps(mechdesign.kinematics)) is mechdesign.kinematics
 
 
+@pytest.mark.slow
 def test_what_an_interrupted_question_found_is_an_answer(tmp_path: Path) -> None:
     class Impatient:
         """Ctrl-C at the first report."""

@@ -35,6 +35,7 @@ def grid(variables: str) -> mechdesign.Table:
     return mechdesign.optimize(study_of(ARM.replace("FORMULA", "P.x"), asked)).tables["designs"]
 
 
+@pytest.mark.slow
 def test_grid_with_bounds_that_depend_on_variables_above() -> None:
     variables = "{{a: {{from: R, to: {}, step: {step}}}, b: {{from: R, to: (a + R)/2, step: {step}}}}}"
     found = grid(variables.format("1.1*R", step=0.03))

@@ -81,6 +81,7 @@ def test_a_file_that_needs_its_override_is_read_with_it():
     assert mechdesign.kinematics(study).main["valid"].all()
 
 
+@pytest.mark.slow
 def test_a_manifest_repeats_what_was_set(tmp_path):
 
     mechdesign.kinematics(mechdesign.load(text=FIVE_BAR, overrides=[WIDE])).save(tmp_path, plots=False)

@@ -58,6 +58,7 @@ def made(text, **options):
     return model.decode(), told
 
 
+@pytest.mark.slow
 def test_the_tree_of_mjcf_puts_every_site_where_its_point_is():
     for text, closures in ((FOUR_BAR, 1), (JOINTS, 3)):
         study = mechdesign.load(text=text)

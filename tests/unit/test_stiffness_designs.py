@@ -173,7 +173,7 @@ def test_every_design_is_answered_as_if_it_were_asked_alone(text: str, names: Se
     designs = designs_of(text, *names)
     found = assert_as_alone(designs, answers, mechdesign.stiffness)
     # Something of each differs.
-    assert all(isinstance(answer, mechdesign.Answer) for answer in found)
+    assert all(not isinstance(answer, Exception) for answer in found)
     columns = [np.concatenate([c.values for table in answer.tables.values() for c in table.columns if c.numeric])
                for answer in found]  # fmt: skip
     assert len(np.unique([np.nansum(np.where(np.isfinite(values), values, 0.0)) for values in columns])) == COUNT
@@ -185,7 +185,7 @@ def test_designs_that_fail_are_loose_or_nearly_so_say_it_in_their_own_words() ->
     t = np.array([0.1, 0.25, 0.25 - 2e-5, 0.25, 0.2])
     designs = Designs(study_of(PLATFORM), {"t": t, "k": np.linspace(4e7, 6e7, 5), "h": np.linspace(0.03, 0.05, 5)})
     found = assert_as_alone(designs, answers, mechdesign.stiffness)
-    said = ["; ".join(map(str, answer.warnings)) for answer in found if isinstance(answer, mechdesign.Answer)]
+    said = ["; ".join(map(str, answer.warnings)) for answer in found if not isinstance(answer, Exception)]
     assert ["nearly" in text for text in said] == [False, False, True, False, False]
     assert ["1 of 2 poses are under-constrained" in text for text in said] == [False, True, False, True, False]
     designs = Designs(study_of(FIVE_BAR), {"b": np.array([0.4, 0.35, 0.1, 0.4]), "k": np.linspace(900, 1200, 4)})
@@ -227,7 +227,7 @@ def test_points_of_an_elastic_link_lie_in_another_order_in_each_design() -> None
     for answer, x, e, h in zip(
         assert_as_alone(designs, answers, mechdesign.stiffness), place, modulus, height, strict=True
     ):
-        assert isinstance(answer, mechdesign.Answer)
+        assert not isinstance(answer, Exception)
         table = answer.tables["displacements"]
         moved = table["dy"][(table["link"] == "girder") & (table["point"] == "T")]
         for a, dy in zip((100.0, 200.0, 350.0), moved, strict=True):
@@ -268,7 +268,7 @@ def test_a_lever_on_a_prop_before_or_behind_the_asked_point_is_that_of_finite_el
     values |= {name: value * rng.uniform(0.5, 2, 5) for name, value in nominal.items()}
     designs = Designs(study, values)
     for k, answer in enumerate(assert_as_alone(designs, answers, mechdesign.stiffness)):
-        assert isinstance(answer, mechdesign.Answer)
+        assert not isinstance(answer, Exception)
         m, x, e, a, i, motor, pin = (float(values[name][k]) for name in ("m", "x", "e", "a", "i", "k", "pin"))
         frame = Frame()
         feet = {name: frame.node(complex(place, 0)) for name, place in (("Q", 0), ("M", m), ("X", x), ("T", 1))}
@@ -311,7 +311,7 @@ stiffness:
     bent = arm**3 / (3 * number["e"] * area * number["h"] ** 2 / 12) + arm / (number["kappa"] * number["g"] * area)
     expected = bent + arm**2 * (1 / number["k"] + 1 / number["gear"]) + 1 / number["pin"]
     for answer, soft in zip(assert_as_alone(designs, answers, mechdesign.stiffness), expected, strict=True):
-        assert isinstance(answer, mechdesign.Answer)
+        assert not isinstance(answer, Exception)
         assert matrix(answer, "C")[1, 1] == pytest.approx(soft, rel=1e-12)
 
 
@@ -354,7 +354,7 @@ def test_a_leg_that_has_a_spring_in_one_design_only() -> None:
     study = study_of(text.replace("beam}", "beam, near: beam}"), f"optimize={section}")
     designs = Designs(study, {"q": np.array([0.45, 0.4, 0.42]), "k": np.array([4e7, 5e7, 6e7])})
     found = assert_as_alone(designs, answers, mechdesign.stiffness)
-    springs = [answer.tables["springs"] for answer in found if isinstance(answer, mechdesign.Answer)]
+    springs = [answer.tables["springs"] for answer in found if not isinstance(answer, Exception)]
     assert [len(table) for table in springs] == [3, 4, 3]
     for text, tables in (("leg_1", springs), ("near+far", springs[1:2])):
         asked = goal("stiffness.springs.stiffness", where={"leg": text})

@@ -91,6 +91,7 @@ def test_paths(poses, tmp_path):
     np.testing.assert_array_equal(mixed["fore"], [7, 7, 7])
 
 
+@pytest.mark.slow
 def test_defaults(poses):
     np.testing.assert_array_equal(poses(CRANK)["crank"], np.arange(0, 361, 5))
     assert len(poses(CRANK + "stiffness: {at: B, actuators: {crank: 1e6}}", "stiffness")) == 73

@@ -76,6 +76,7 @@ def test_the_schema_refuses_what_the_loader_refuses(text, validator, tmp_path):
     assert list(validator.iter_errors(yaml.safe_load(text)))
 
 
+@pytest.mark.slow
 def test_the_committed_schema_is_current():
     committed = Path(__file__).parents[2] / "configs" / "mechdesign.schema.json"
     assert json.loads(committed.read_text(encoding="utf-8")) == schema(), (

@@ -59,6 +59,7 @@ def test_a_case_that_fails_is_a_row():
     assert [verdict.met for verdict in result.verdicts] == [False, False]
 
 
+@pytest.mark.slow
 def test_latin_hypercube_has_one_sample_in_each_stratum():
     matrix = {"vary": {R: "20:40", L: {"from": 90, "to": 120}}, "method": "latin_hypercube", "samples": 25}
     r, length = columns_of(matrix).T
@@ -76,6 +77,7 @@ def test_sobol_has_one_sample_in_each_elementary_rectangle():
         assert len(boxes) == 16
 
 
+@pytest.mark.slow
 def test_words_of_a_random_design_come_equally_often():
     matrix = {"vary": {"mechanism.branch": ["side", "follow"], R: "20:30"}, "method": "latin_hypercube", "samples": 10}
     words = mechdesign.sweep(study_of(matrix)).main["mechanism.branch"].tolist()

@@ -198,6 +198,7 @@ def to_polyline(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return table["P.x_error"] + 1j * table["P.y_error"]
 
 
+@pytest.mark.slow
 def test_a_path_is_met_at_the_nearest_point_of_its_pieces() -> None:
     corners = 10 + 3j + np.array([0, 0.5, 1, 1, 1 + 1j])  # with a corner twice
     points = 10 + 3j + np.array([0.5 + 0.2j, -1 - 1j, 2 + 0.5j, 2 + 3j])
