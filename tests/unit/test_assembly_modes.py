@@ -82,6 +82,7 @@ def test_every_assembly_of_a_group_without_a_closed_form_has_the_legs_that_are_g
     assert f"{len(found)} found" in line
 
 
+@pytest.mark.slow
 def test_too_many_assemblies_are_refused() -> None:
     links = "".join(f"    a{k}: [P{k}, P{k + 1}, 1]\n    b{k}: [Q{k}, P{k + 1}, 1]\n" for k in range(9))
     ground = ", ".join(["O: [-1, 0]", *(f"Q{k}: [{k + 1}, {-1 + 0.3 * (k % 2)}]" for k in range(9))])

@@ -122,6 +122,7 @@ def values_of(name: str, variables: str) -> list[float]:
     return mechdesign.optimize(press(variables)).tables["designs"][name].tolist()
 
 
+@pytest.mark.slow
 def test_a_range_of_whole_numbers_begins_and_ends_between_its_bounds() -> None:
     assert values_of("n", "n: {from: d/4, to: 2*d - 10.1, integer: true}") == [3, 4, 5, 6, 7, 8, 9]
     assert values_of("n", "n: {from: 3*0.1*10, to: 10, integer: true, step: 4}") == [3, 7]

@@ -307,3 +307,22 @@ stiffness: {at: P, actuators: {arm: 1000 N*m/rad}, poses: [{arm: 0}]}
 optimize: {variables: {r: {from: 80, to: 120, step: 20}}, maximize: [stiffness.k_y.min]}
 """)
     assert moving(study, mechdesign.optimize(study)) is None
+
+
+def test_a_page_runs_over_the_time_of_the_motion() -> None:
+    for factor, seconds in ((1, 5.0), (4, 3.2)):
+        cycle = f"{{to: 90, time: {0.3 * factor}}}, {{dwell: {0.1 * factor}}}, {{to: 0, time: {0.4 * factor}}}"
+        study = mechdesign.load(
+            text=f"""
+mechanism:
+  links: {{ground: {{O: [0, 0], D: [100, 0]}}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}}
+  drives: {{theta: {{angle: crank}}}}
+  sketch: {{A: [0, 30], B: [75, 55]}}
+kinematics: {{motion: {{theta: [{cycle}]}}, outputs: [B]}}
+"""
+        )
+        page = moving(study, mechdesign.kinematics(study))
+        assert page is not None
+        assert "in the study's motion" in page.data["pace"]
+        # A motion too short to be watched is slowed down, and the page says so.
+        assert page.data["seconds"] == seconds
