@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True)
-class Kind:
+class WarningKind:
     """A kind of warning: its meaning, and the page of the documentation that explains it, without ``.md``."""
 
     meaning: str
@@ -15,40 +15,42 @@ class Kind:
 
 
 KINDS = {
-    "unassembled": Kind(
+    "unassembled": WarningKind(
         "poses, samples or designs that cannot be assembled, or that a limit of motion forbids", "theory/limits"
     ),
-    "singular": Kind(
+    "singular": WarningKind(
         "the mechanism is at, near or passes a singularity, dead centre or change point, where rates and forces lose "
         "digits or have no bound; nothing is wrong with a dead centre where the output shall turn back",
         "theory/kinematics",
     ),
-    "jammed": Kind("poses that friction lets no effort of the drives move on", "howto/friction"),
-    "self_locking": Kind(
+    "jammed": WarningKind("poses that friction lets no effort of the drives move on", "howto/friction"),
+    "self_locking": WarningKind(
         "poses in which friction holds what the loads would move, as it shall in a screw, a wedge or a clamp",
         "howto/friction",
     ),
-    "cam": Kind(
+    "cam": WarningKind(
         "a cam that is undercut, does not close or has a large pressure angle, or whose follower lifts off",
         "howto/gears_and_cams",
     ),
-    "disagree": Kind(
+    "disagree": WarningKind(
         "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
     ),
-    "unconverged": Kind(
+    "unconverged": WarningKind(
         "a number is known less exactly than asked, or a search or simulation ended too early; more samples, rays or "
         "evaluations help, or a wider tolerance",
         "theory/limits",
     ),
-    "undefined": Kind("numbers that have no value where they are asked", "theory/conventions"),
-    "incomplete": Kind("a part of what was asked is left out", "theory/limits"),
-    "infeasible": Kind("designs or cases that do not meet what is required of them", "theory/optimize"),
-    "ignored": Kind("the study gives what has no effect", "reference/study/index"),
-    "assumed": Kind("the study can be understood in several ways, and this one was taken", "reference/study/index"),
-    "suspect": Kind("what is asked is likely a mistake", "reference/study/index"),
-    "allocated": Kind("what an allocation of tolerances has chosen", "theory/reliability"),
-    "stale": Kind("results of a question that the study no longer asks stand beside the others", "howto/batch"),
-    "undrawn": Kind("pictures that could not be drawn", "howto/report"),
+    "undefined": WarningKind("numbers that have no value where they are asked", "theory/conventions"),
+    "incomplete": WarningKind("a part of what was asked is left out", "theory/limits"),
+    "infeasible": WarningKind("designs or cases that do not meet what is required of them", "theory/optimize"),
+    "ignored": WarningKind("the study gives what has no effect", "reference/study/index"),
+    "assumed": WarningKind(
+        "the study can be understood in several ways, and this one was taken", "reference/study/index"
+    ),
+    "suspect": WarningKind("what is asked is likely a mistake", "reference/study/index"),
+    "allocated": WarningKind("what an allocation of tolerances has chosen", "theory/reliability"),
+    "stale": WarningKind("results of a question that the study no longer asks stand beside the others", "howto/batch"),
+    "undrawn": WarningKind("pictures that could not be drawn", "howto/report"),
 }
 ALL = "all"  # in place of the kinds: each of them
 

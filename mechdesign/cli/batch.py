@@ -41,7 +41,7 @@ from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
 from mechdesign.study import Study
-from mechdesign.study.loading import Source
+from mechdesign.study.loading import StudySource
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK
@@ -49,7 +49,7 @@ from mechdesign.work.processes import TaskProcess, Tell, Work
 from mechdesign.work.threads import one_thread
 
 if TYPE_CHECKING:
-    from mechdesign.report.page.page import Entry
+    from mechdesign.report.page.page import IndexEntry
 
 _SUFFIXES = (".yaml", ".yml")  # of study files in a folder
 _NUMBERS = 4  # key numbers of a study in the index
@@ -85,7 +85,7 @@ def study_files(paths: Sequence[Path] | None) -> list[Path | None]:
     return [*files.values()]
 
 
-def source_of(path: Path | None, options: Options) -> Source:
+def source_of(path: Path | None, options: Options) -> StudySource:
     """Read one of the studies that `study_files` gives; see `source`.
 
     Raises
@@ -342,7 +342,7 @@ def _stale(study: Study, task: Task) -> int:
     return code
 
 
-def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:
+def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> IndexEntry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
     pages.remove(task.root / pages.PRINTED)
@@ -353,10 +353,10 @@ def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: boo
     numbers = write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
-    from mechdesign.report.page.page import Entry, thumbnail
+    from mechdesign.report.page.page import IndexEntry, thumbnail
 
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
-    return Entry(
+    return IndexEntry(
         study.name,
         study.label,
         [(outcome.command, outcome.word, outcome.exit_code) for outcome in outcomes],

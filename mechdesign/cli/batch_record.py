@@ -23,11 +23,11 @@ from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
 from mechdesign.study import Study
-from mechdesign.study.loading import Source
+from mechdesign.study.loading import StudySource
 from mechdesign.work.pool import LostWorkerError
 
 if TYPE_CHECKING:
-    from mechdesign.report.page.page import Entry
+    from mechdesign.report.page.page import IndexEntry
 
 _LOST = "run"  # in place of the commands of a study whose process was killed
 _LEFT = "the run ended before it"
@@ -39,7 +39,7 @@ class Task:
     """A study that was read without mistakes; a worker reads it again and answers its questions."""
 
     number: int  # index among the studies
-    source: Source
+    source: StudySource
     label: str
     root: Path  # folder that contains those of its questions
     questions: tuple[tuple[str, Path], ...]  # commands and folders of results
@@ -58,7 +58,7 @@ class Said:
 class End:
     """The end of a study: its line of the index, the exit code of its report, whether it was interrupted."""
 
-    entry: Entry | None = None
+    entry: IndexEntry | None = None
     exit_code: int = 0
     interrupted: bool = False
 
@@ -76,7 +76,7 @@ class BatchRecord:
         self._root = options.out or RESULTS
         self.check(())
         self._outcomes: list[list[Outcome]] = [[] for _ in studies]
-        self._entries: dict[int, Entry] = {}
+        self._entries: dict[int, IndexEntry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
@@ -97,9 +97,11 @@ class BatchRecord:
         self._left -= 1
         self.stopped |= self.options.fail_fast
         if self.options.report and self.several:
-            from mechdesign.report.page.page import Entry
+            from mechdesign.report.page.page import IndexEntry
 
-            self._entries[number] = Entry(outcome.study, outcome.study, failed=outcome.failed, outcome=outcome.word)
+            self._entries[number] = IndexEntry(
+                outcome.study, outcome.study, failed=outcome.failed, outcome=outcome.word
+            )
 
     def begin(self, tasks: Sequence[Task]) -> None:
         """Start with the tasks."""
@@ -190,12 +192,12 @@ class BatchRecord:
 
     def _index(self) -> bytes:
         """The page of all studies, also of those that the run did not come to."""
-        from mechdesign.report.page.page import Entry, index
+        from mechdesign.report.page.page import IndexEntry, index
 
         labels = {number: name_of(path) for number, path in enumerate(self._studies)}
         labels |= {task.number: task.label for task in self._tasks}
         return index([
-            self._entries.get(number) or Entry(label, label, failed=_LEFT, outcome="not answered")
+            self._entries.get(number) or IndexEntry(label, label, failed=_LEFT, outcome="not answered")
             for number, label in labels.items()
         ])  # fmt: skip
 

@@ -34,7 +34,7 @@ from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
-from mechdesign.study.loading import Source, load_bytes, read_file
+from mechdesign.study.loading import StudySource, load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES, leaves, read
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import ahead, shards
@@ -91,7 +91,7 @@ class Outcome:
         return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
-def source(path: Path | None, options: Options) -> Source:
+def source(path: Path | None, options: Options) -> StudySource:
     """Read the text of a study: ``-`` is standard input; without a path, say which is taken.
 
     Raises
@@ -104,11 +104,11 @@ def source(path: Path | None, options: Options) -> Source:
         label = str(HERE) if HERE.exists() else f"the built-in two-link arm (no {HERE} here)"
         terminal.say(f"study: {label}", quiet=options.quiet)
     if path == STANDARD_INPUT:
-        return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
-    return Source(path, Folder(path.parent, options.allow_files), read_file(path))
+        return StudySource(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
+    return StudySource(path, Folder(path.parent, options.allow_files), read_file(path))
 
 
-def load_source(source: Source, options: Options) -> Study:
+def load_source(source: StudySource, options: Options) -> Study:
     """Load a study with the options' overrides and seed; where they are strict, every warning fails.
 
     Raises
@@ -360,9 +360,11 @@ def write_report(
         path = outcome.directory / pages.SECTION
         part = json.loads(path.read_text(encoding="utf-8")) if outcome.written and path.exists() else None
         answers.append(
-            page.Answered(outcome.command, outcome.word, outcome.exit_code, outcome.failed, outcome.verdicts, part)
+            page.AnsweredQuestion(
+                outcome.command, outcome.word, outcome.exit_code, outcome.failed, outcome.verdicts, part
+            )
         )
-    answers += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
+    answers += [page.AnsweredQuestion(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots))

@@ -10,7 +10,7 @@ from mechdesign.cli.execution import load_study
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import RESULTS
 from mechdesign.exporting.exports import export_named
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.files import check_writable
 from mechdesign.records import check_replaceable
 from mechdesign.report.manifest import read_by
@@ -21,7 +21,7 @@ from mechdesign.work.threads import one_thread
 
 @one_thread()
 def export(path: Path | None, to: str, said: tuple[str | None, str | None, str | None], options: Options) -> int:
-    """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `View`."""
+    """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `PosedStudy`."""
     declared = export_named(to)
     study = load_study(path, options)
     target = options.out or RESULTS / study.label / "export"
@@ -29,7 +29,7 @@ def export(path: Path | None, to: str, said: tuple[str | None, str | None, str |
         target /= to
     check_writable(target.parent)
     check_replaceable(target, read_by(study))
-    view = View(study, *said)
+    view = PosedStudy(study, *said)
     content = declared.make(view)
     warnings = content.warnings + declared.ignored(view)
     for warning in warnings:

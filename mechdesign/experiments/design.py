@@ -88,7 +88,7 @@ class Grid(Design):
 
 
 @dataclass(frozen=True, eq=False)
-class Spread(Design):
+class SpreadDesign(Design):
     """Values at points of the unit cube, shape (cases, entries)."""
 
     names: tuple[str, ...]
@@ -145,7 +145,7 @@ def cases_of(study: Study) -> Design:
         else:
             assert matrix.samples is not None
             cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
-            design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube, written)
+            design = SpreadDesign(tuple(matrix.vary), tuple(matrix.vary.values()), cube, written)
     keys = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     problems = [
         study.problem(f"{name}={in_yaml(value)}: {message}", *keys, *([name] if matrix.vary is not None else []))

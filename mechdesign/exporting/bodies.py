@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
@@ -53,7 +53,7 @@ class Scales:
     time: float
 
     @classmethod
-    def of(cls, view: View) -> Scales:
+    def of(cls, view: PosedStudy) -> Scales:
         """Those of a study; a dimensionless length counts as a metre."""
         units = view.study.units
         names = (units.length, units.mass, units.force, units.time)
@@ -61,7 +61,7 @@ class Scales:
 
 
 @dataclass(frozen=True)
-class Joint:
+class BodyJoint:
     """A joint of two bodies in the pose that is shown; with `parent` and `child` of the tree, or those it closes.
 
     `place` is where it is in the world (m), `along` the direction of a slide there, in which it moves its `child`
@@ -78,7 +78,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Body:
+class RigidBody:
     """A body in the pose that is shown: its frame, points and centre of mass in this, and its inertia about the centre.
 
     `link` is the link that it is a part of, `weighed` says that the study gives its mass. All in m, rad and kg.
@@ -131,10 +131,10 @@ class Components:
         return item
 
 
-class Bodies:
+class RigidBodies:
     """The rigid bodies of a view's mechanism and their joints; `left_out` tells what a simulator does not get."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: PosedStudy) -> None:
         self.view, self.mechanism, self.scales = view, view.mechanism, Scales.of(view)
         self.graph, self.description = self.mechanism.graph, self.mechanism.description
         self.left_out: list[Caution] = []
@@ -175,7 +175,7 @@ class Bodies:
         given = [float(places.term(mass.mass, {})) for mass in self.description.masses.values()]
         return SMALL_MASS * min((self.scales.mass * mass for mass in given if mass > 0), default=1.0)
 
-    def children(self, parent: str) -> list[Joint]:
+    def children(self, parent: str) -> list[BodyJoint]:
         """Joints of the tree by which a body carries others."""
         return [joint for joint in self.joints.values() if joint.parent == parent]
 
@@ -265,7 +265,7 @@ class Bodies:
         """Place of a node in the world (m)."""
         return self.scales.length * complex(self.view.pose.nodes[node])
 
-    def _body(self, name: str) -> Body:
+    def _body(self, name: str) -> RigidBody:
         length, mass, pose = self.scales.length, self.scales.mass, self.view.pose
         geometry, graph = self.mechanism.geometry, self.graph
         body, point = self._blocks.get(name, (name, ""))
@@ -273,7 +273,7 @@ class Bodies:
         gyration = (GYRATION * self.size) ** 2
         if point:
             origin = self.place(graph.node(point))
-            return Body(name, body, origin, turn, {}, self.small_mass, 0j, self.small_mass * gyration, False)
+            return RigidBody(name, body, origin, turn, {}, self.small_mass, 0j, self.small_mass * gyration, False)
         local = {at: length * complex(geometry.local(body, at, {})) for owner, at in graph.points if owner == body}
         base = next(iter(local))
         origin = self.place(graph.node(base)) - turn * local[base]
@@ -288,18 +288,18 @@ class Bodies:
         if weight and not moment:
             inertia = min(inertia, SMALL_MASS * weight * gyration)
         link = body.removesuffix(":rod")
-        return Body(name, link, origin, turn, points, weight or self.small_mass, middle, inertia, weight > 0)
+        return RigidBody(name, link, origin, turn, points, weight or self.small_mass, middle, inertia, weight > 0)
 
-    def _joints(self) -> list[tuple[Joint, bool]]:
+    def _joints(self) -> list[tuple[BodyJoint, bool]]:
         """Every joint, and whether it closes a loop; those of the tree have no direction yet."""
         description, graph, whole = self.description, self.graph, Components()
-        joints: list[tuple[Joint, bool]] = []
+        joints: list[tuple[BodyJoint, bool]] = []
         at_nodes: dict[int, list[str]] = {}
         for body, point in graph.points:
             at_nodes.setdefault(graph.node(point), []).append(body)
         clamped: dict[int, Components] = {node: Components() for node in at_nodes}
 
-        def add(joint: Joint) -> bool:
+        def add(joint: BodyJoint) -> bool:
             closing = not whole.join(joint.parent, joint.child)
             joints.append((joint, closing))
             return closing
@@ -309,17 +309,17 @@ class Bodies:
                 node = graph.node(clamp.point)
                 one, other = (graph.holder(link, clamp.point) for link in clamp.links)
                 clamped[node].join(one, other)
-                add(Joint(f"fixed.{clamp.name}", "fixed", one, other, self.place(node)))
+                add(BodyJoint(f"fixed.{clamp.name}", "fixed", one, other, self.place(node)))
         for number, name in enumerate(graph.slides):
             guide, slider, node = self._sliding(number, at_nodes)
             along = complex(self.view.pose.direction(graph.edge_of(number)))
             value = self.scales.length * float(self.view.pose.slides[number])
-            slide = Joint(slide_name(name), "slide", guide, slider, self.place(node), along, value)
+            slide = BodyJoint(slide_name(name), "slide", guide, slider, self.place(node), along, value)
             if not whole.join(guide, slider):
                 block = self._block(name, guide, node)
                 whole.join(guide, block)
-                slide = Joint(slide.name, "slide", guide, block, slide.place, along, value)
-                joints.append((Joint(f"fixed.{name}", "fixed", block, slider, slide.place), True))
+                slide = BodyJoint(slide.name, "slide", guide, block, slide.place, along, value)
+                joints.append((BodyJoint(f"fixed.{name}", "fixed", block, slider, slide.place), True))
             joints.append((slide, False))
         driven = {frozenset((drive.target, drive.reference)) for drive in description.drives.values()}
         pins = [(node, pair) for node, bodies in at_nodes.items() for pair in combinations(bodies, 2)]
@@ -330,7 +330,7 @@ class Bodies:
             if clamped[node].join(one, other):
                 several = len(at_nodes[node]) > 2
                 name = f"pin.{graph.nodes[node]}" + f".{other if one == GROUND else f'{one}.{other}'}" * several
-                add(Joint(name.replace(":", "."), "hinge", one, other, self.place(node)))
+                add(BodyJoint(name.replace(":", "."), "hinge", one, other, self.place(node)))
         return joints
 
     def _sliding(self, number: int, at_nodes: Mapping[int, list[str]]) -> tuple[str, str, int]:
@@ -355,27 +355,29 @@ class Bodies:
         self._blocks[name] = (guide, self.graph.nodes[node])
         return name
 
-    def _tree(self, joints: Iterable[Joint]) -> dict[str, Joint]:
+    def _tree(self, joints: Iterable[BodyJoint]) -> dict[str, BodyJoint]:
         """Joints of the tree by name, each with its parent nearer to the ground, and the value of its coordinate."""
-        left, tree, reached = [*joints], dict[str, Joint](), [GROUND]
+        left, tree, reached = [*joints], dict[str, BodyJoint](), [GROUND]
         for body in reached:
             for joint in [joint for joint in left if body in (joint.parent, joint.child)]:
                 left.remove(joint)
                 child = joint.child if joint.parent == body else joint.parent
                 along = joint.along if child == joint.child else -joint.along
-                tree[joint.name] = Joint(joint.name, joint.kind, body, child, joint.place, along, joint.value)
+                tree[joint.name] = BodyJoint(joint.name, joint.kind, body, child, joint.place, along, joint.value)
                 reached.append(child)
         return self._valued(tree)
 
-    def _valued(self, tree: dict[str, Joint]) -> dict[str, Joint]:
+    def _valued(self, tree: dict[str, BodyJoint]) -> dict[str, BodyJoint]:
         """Give pins the angles that they have, in the turns in which sums of them are the values of the drives."""
         self.joints, pose, fixed = tree, self.view.pose, set[str]()
 
         def rotation(body: str) -> complex:
             return complex(pose.body_rotation(self._blocks.get(body, (body, ""))[0]))
 
-        def put(joint: Joint, value: float) -> None:
-            tree[joint.name] = Joint(joint.name, joint.kind, joint.parent, joint.child, joint.place, joint.along, value)
+        def put(joint: BodyJoint, value: float) -> None:
+            tree[joint.name] = BodyJoint(
+                joint.name, joint.kind, joint.parent, joint.child, joint.place, joint.along, value
+            )
 
         for joint in [*tree.values()]:
             if joint.kind == "hinge":

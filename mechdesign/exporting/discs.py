@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.exporting.drawing import Circle, Path, Shape, around
-from mechdesign.exporting.view import View
+from mechdesign.exporting.drawing import DrawnCircle, Path, Shape, around
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.algebra import cross
 from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.plates import hull, joined
@@ -22,7 +22,7 @@ SIDES = 360
 
 
 @dataclass(frozen=True)
-class Disc:
+class CamDisc:
     """A cam in the frame of its link, in millimetres: the closed curves that bound it, the outermost first.
 
     Between the first and the second there is material, between the second and the third a groove.
@@ -42,30 +42,30 @@ class Disc:
         return around_it % 2 == 1
 
 
-def discs_of(view: View, link: str, kerf: float) -> list[Disc]:
+def discs_of(view: PosedStudy, link: str, kerf: float) -> list[CamDisc]:
     """The cams of a link, with half of a kerf (mm) around the material; see `_disc`."""
     discs = (_disc(view, cam, kerf) for cam in _cams(view, link))
     return [disc for disc in discs if disc is not None]
 
 
-def replace_plate(discs: Sequence[Disc], holes: Iterable[tuple[complex, float]]) -> bool:
+def replace_plate(discs: Sequence[CamDisc], holes: Iterable[tuple[complex, float]]) -> bool:
     """Whether the cams of a link are all of it: every hole, by centre and radius, lies in each of them."""
     return bool(discs) and all(disc.holds(*hole) for hole in holes for disc in discs)
 
 
-def open_profiles(view: View, link: str) -> list[Path]:
+def open_profiles(view: PosedStudy, link: str) -> list[Path]:
     """The profiles of a link that bound no part, as lines to engrave."""
     cams = [cam for cam in _cams(view, link) if _disc(view, cam, 0.0) is None]
     profiles = [_profile(view, cam, side, 0.0) for cam in cams for side in cam.sides]
     return [Path.line("engrave", profile[np.isfinite(profile)].tolist()) for profile in profiles]
 
 
-def followers(view: View) -> dict[str, list[Shape]]:
+def followers(view: PosedStudy) -> dict[str, list[Shape]]:
     """The rollers and flat faces on the cams of a mechanism in the pose that is shown, in millimetres."""
     shapes: dict[str, list[Shape]] = {}
     for cam in view.mechanism.cams:
         center, scale = complex(view.pose.nodes[cam.node]), view.millimetres
-        shape: Shape = Circle("links", scale * center, scale * float(cam.roller(view.pose)))
+        shape: Shape = DrawnCircle("links", scale * center, scale * float(cam.roller(view.pose)))
         if cam.flat:
             shape = Path.line(
                 "links", [scale * (center + end * complex(cam.along_face(view.pose))) for end in cam.face]
@@ -74,12 +74,12 @@ def followers(view: View) -> dict[str, list[Shape]]:
     return shapes
 
 
-def cautions(view: View) -> tuple[Caution, ...]:
+def cautions(view: PosedStudy) -> tuple[Caution, ...]:
     """Warnings of cams that cannot be cut as they should."""
     return tuple(_cautions(view))
 
 
-def _cautions(view: View) -> Iterator[Caution]:
+def _cautions(view: PosedStudy) -> Iterator[Caution]:
     for cam in view.mechanism.cams:
         if _disc(view, cam, 0.0) is None:
             message = f"cam {cam.coupling}: its profile bounds no part: it is engraved on '{cam.links[1]}', and not cut"
@@ -88,11 +88,11 @@ def _cautions(view: View) -> Iterator[Caution]:
             yield Caution("cam", f"cam {cam.coupling}: its profile is undercut, and the line of the cut crosses itself")
 
 
-def _cams(view: View, link: str) -> list[Cam]:
+def _cams(view: PosedStudy, link: str) -> list[Cam]:
     return [cam for cam in view.mechanism.cams if cam.links[1] == link]
 
 
-def _disc(view: View, cam: Cam, kerf: float) -> Disc | None:
+def _disc(view: PosedStudy, cam: Cam, kerf: float) -> CamDisc | None:
     """A cam to cut; None where its profile bounds no part.
 
     A ring and a cam with a groove have a rim as wide as the link. The ends of a profile of a part of a turn are joined
@@ -106,12 +106,14 @@ def _disc(view: View, cam: Cam, kerf: float) -> Disc | None:
     if cam.closed:
         curves = [Path.line(layer, profile[:-1]).close() for profile in (outer, *inner)]
         rim = around("cut", outer, 2 * radius + kerf)
-        return Disc(cam.coupling, curves if cam.sides == ("outer",) or isinstance(rim, Circle) else [rim, *curves])
+        return CamDisc(
+            cam.coupling, curves if cam.sides == ("outer",) or isinstance(rim, DrawnCircle) else [rim, *curves]
+        )
     points, pins = view.points(link), joined(view.mechanism.description)
     holes = [(scale * points[point], scale * float(view.sizes.pin(point))) for point in points if point in pins]
     for places in ([scale * place for place in points.values()], [place for place, _ in holes]):
         for outline in _joined_to_plate(outer, places, radius + kerf / 2):
-            disc = Disc(cam.coupling, [Path.line("cut", outline).close()])
+            disc = CamDisc(cam.coupling, [Path.line("cut", outline).close()])
             if layer == "cut" and holes and replace_plate([disc], holes):
                 return disc
     return None
@@ -140,6 +142,6 @@ def _crosses(one: Complexes, other: Complexes) -> bool:
     return bool(np.any(apart & (cross(d - c, a - c) * cross(d - c, b - c) < 0)))
 
 
-def _profile(view: View, cam: Cam, side: str, kerf: float) -> Complexes:
+def _profile(view: PosedStudy, cam: Cam, side: str, kerf: float) -> Complexes:
     scale = view.millimetres
     return scale * cam.cut(side, kerf / 2 / scale, DEVIATION / scale)

@@ -95,7 +95,7 @@ class _Placed:
 
 
 @dataclass(frozen=True)
-class Circle(_Placed):
+class DrawnCircle(_Placed):
     """A circle about its place."""
 
     radius: float
@@ -107,7 +107,7 @@ class Circle(_Placed):
 
 
 @dataclass(frozen=True)
-class Mark(_Placed):
+class CentreMark(_Placed):
     """A place that is marked, such as the centre of a hole."""
 
     @property
@@ -136,7 +136,7 @@ class Text(_Placed):
         return iter((begin, begin + complex(self.width, self.height)))
 
 
-Shape = Path | Circle | Mark | Text
+Shape = Path | DrawnCircle | CentreMark | Text
 
 
 @dataclass(frozen=True)
@@ -194,11 +194,11 @@ def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], 
     return place, room(place)
 
 
-def around(layer: str, places: Iterable[complex], radius: float) -> Path | Circle:
+def around(layer: str, places: Iterable[complex], radius: float) -> Path | DrawnCircle:
     """The outline at a distance around the convex hull of some places: lines, and arcs about its corners."""
     corners = hull(places)
     if len(corners) == 1:
-        return Circle(layer, corners[0], radius)
+        return DrawnCircle(layer, corners[0], radius)
     sides = [b - a for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
     outwards = [-1j * side / abs(side) for side in sides]
     outline: list[complex] = []

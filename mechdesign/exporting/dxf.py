@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from textwrap import wrap
 
 from mechdesign.errors import printable
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text
+from mechdesign.exporting.drawing import CentreMark, Drawing, DrawnCircle, Path, Shape, Text
 
 LONGEST = 240  # letters of a line
 Pair = tuple[int, str | float | int]
@@ -47,10 +47,10 @@ def _pairs(drawing: Drawing) -> Iterator[Pair]:
 
 
 def _entity(shape: Shape) -> Iterator[Pair]:
-    if isinstance(shape, Circle):
+    if isinstance(shape, DrawnCircle):
         yield from _headed("CIRCLE", shape, shape.place)
         yield 40, shape.radius
-    elif isinstance(shape, Mark):
+    elif isinstance(shape, CentreMark):
         yield from _headed("POINT", shape, shape.place)
     elif isinstance(shape, Text):
         yield from _headed("TEXT", shape, shape.place)

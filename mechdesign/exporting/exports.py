@@ -14,7 +14,7 @@ from mechdesign.errors import StudyError, suggestion
 from mechdesign.exporting.drawing import Drawing
 from mechdesign.exporting.dxf import to_dxf
 from mechdesign.exporting.svg import to_svg
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class Export:
     name: str
     meaning: str
     order: int
-    make: Callable[[View], Content]
+    make: Callable[[PosedStudy], Content]
     options: tuple[str, ...] = ()
 
-    def ignored(self, view: View) -> tuple[Caution, ...]:
+    def ignored(self, view: PosedStudy) -> tuple[Caution, ...]:
         """A warning for each option that is given and that the file does not take."""
         given = [name for name in ("at", "rate", "paper") if getattr(view, name) is not None]
         return tuple(
@@ -59,18 +59,18 @@ class Export:
 
 def export(
     name: str, meaning: str, order: int = 100, options: tuple[str, ...] = ()
-) -> Callable[[Callable[[View], Content]], Export]:
+) -> Callable[[Callable[[PosedStudy], Content]], Export]:
     """Declare that a function makes the file of this name from a view; see `Export` for the arguments."""
     return lambda make: Export(name, meaning, order, make, options)
 
 
 def drawings(
-    name: str, meaning: str, order: int, make: Callable[[View], Drawing],
-    cautions: Callable[[View], tuple[Caution, ...]] = lambda _: (), options: tuple[str, ...] = (),
+    name: str, meaning: str, order: int, make: Callable[[PosedStudy], Drawing],
+    cautions: Callable[[PosedStudy], tuple[Caution, ...]] = lambda _: (), options: tuple[str, ...] = (),
 ) -> tuple[Export, Export]:  # fmt: skip
     """The exports of a drawing: as DXF, and behind it as SVG; `cautions` are warnings of its own."""
 
-    def written(to_text: Callable[[Drawing], str], view: View) -> Content:
+    def written(to_text: Callable[[Drawing], str], view: PosedStudy) -> Content:
         return Content(to_text(make(view)), view.assumed + view.unmoved + cautions(view))
 
     return (

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.exporting.discs import discs_of, followers, open_profiles, replace_plate
-from mechdesign.exporting.drawing import Circle, Drawing, Path, Shape, Text, around, roomiest
+from mechdesign.exporting.drawing import Drawing, DrawnCircle, Path, Shape, Text, around, roomiest
 from mechdesign.exporting.exports import drawings
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.plates import joined
 from mechdesign.report.figures.scene import ranks
 
@@ -17,7 +17,7 @@ from mechdesign.report.figures.scene import ranks
 LETTERS, SMALLEST = 0.04, 1.0
 
 
-def mechanism_drawing(view: View) -> Drawing:
+def mechanism_drawing(view: PosedStudy) -> Drawing:
     """Plates of all links in the pose, their pins, and the paths of moving points over the motion."""
     mechanism, scale = view.mechanism, view.millimetres
     description, sizes = mechanism.description, view.sizes
@@ -44,7 +44,7 @@ def mechanism_drawing(view: View) -> Drawing:
     for point in pinned:
         place = scale * complex(view.pose.point(point))
         groups[f"pin {point}"] = [
-            Circle("links", place, scale * float(sizes.pin(point))),
+            DrawnCircle("links", place, scale * float(sizes.pin(point))),
             Text("notes", place + 1.4 * scale * float(sizes.pin(point)) * (1 + 1j), letters, point),
         ]
     for point, rank in ranks(view.study).items():

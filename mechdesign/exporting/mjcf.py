@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, indent, tostring
 
 from mechdesign.errors import printable
-from mechdesign.exporting.bodies import OPEN, Bodies, Body, Joint, Sum
+from mechdesign.exporting.bodies import OPEN, BodyJoint, RigidBodies, RigidBody, Sum
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.model_text import add, comment, name_of, numbers, outlines, paint, planar, words
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.graph import GROUND
 
 # Step of integration (s), and time constant with which constraints are held, in seconds.
@@ -22,17 +22,17 @@ IMPEDANCE = 0.9999
 @export(
     "model.xml", "the mechanism for MuJoCo (MJCF): bodies, joints, masses, springs, drives", order=50, options=("at",)
 )
-def model_xml(view: View) -> Content:
+def model_xml(view: PosedStudy) -> Content:
     """The mechanism as MJCF, and what MuJoCo does not get."""
-    bodies = Bodies(view)
-    text = Model(bodies).text()
+    bodies = RigidBodies(view)
+    text = MjcfModel(bodies).text()
     return Content(text, (*view.assumed, *bodies.left_out))
 
 
-class Model:
+class MjcfModel:
     """The model of a mechanism's bodies."""
 
-    def __init__(self, bodies: Bodies) -> None:
+    def __init__(self, bodies: RigidBodies) -> None:
         self.bodies, self.view = bodies, bodies.view
         self.root = Element("mujoco", model=printable(self.view.study.name))
         self.colors = paint(bodies.mechanism)
@@ -88,7 +88,7 @@ class Model:
             )  # fmt: skip
             self._shown(element, body.name)
 
-    def _joint(self, element: Element, joint: Joint, body: Body) -> None:
+    def _joint(self, element: Element, joint: BodyJoint, body: RigidBody) -> None:
         slides = joint.kind == "slide"
         axis = joint.along * body.turn.conjugate()
         add(

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Comment, Element, SubElement
 
 from mechdesign import __version__
 from mechdesign.errors import printable
-from mechdesign.exporting.bodies import Bodies, Body
+from mechdesign.exporting.bodies import RigidBodies, RigidBody
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plates import hull
@@ -45,7 +45,7 @@ def comment(words: Iterable[str]) -> Any:
     return Comment("".join(f"\n  {printable(line).replace('--', '- -')}" for line in words) + "\n")
 
 
-def outlines(bodies: Bodies, body: Body) -> tuple[list[tuple[complex, complex]], float]:
+def outlines(bodies: RigidBodies, body: RigidBody) -> tuple[list[tuple[complex, complex]], float]:
     """Straight parts of a body's plate in its frame, and half of its width (m); blocks and rods are smaller."""
     view, length = bodies.view, bodies.scales.length
     radius = length * float(view.sizes.radius(body.link))
@@ -61,7 +61,7 @@ def outlines(bodies: Bodies, body: Body) -> tuple[list[tuple[complex, complex]],
     return list(zip(corners, [*corners[1:], corners[0]], strict=True)), radius
 
 
-def words(bodies: Bodies) -> list[str]:
+def words(bodies: RigidBodies) -> list[str]:
     """What a file says at its head: what it is of, its units, and bodies whose mass is a stand-in."""
     view = bodies.view
     light = [body.name for body in bodies.bodies.values() if not body.weighed and body.name != GROUND]

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.curve.corners import curve_of
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED
@@ -40,7 +40,7 @@ ORDERS = ("velocity", "acceleration")
 
 
 @export("curve.csv", "places of points and outputs, closely along the motion", order=60)
-def curve_csv(view: View) -> Content:
+def curve_csv(view: PosedStudy) -> Content:
     """A row a pose: the part of the motion, what the poses give, and outputs and coupler points."""
     study, mechanism, track = view.study, view.mechanism, view.track
     parts = np.concatenate([[1], 1 + np.cumsum(~track.follows)]) if len(track.places) else np.empty(0)
@@ -62,7 +62,7 @@ def curve_csv(view: View) -> Content:
 
 
 @export("motion.csv", "drives over time at the rate of a controller", order=61, options=("rate",))
-def motion_csv(view: View) -> Content:
+def motion_csv(view: PosedStudy) -> Content:
     """A row an instant: time, and position, velocity and acceleration of each drive."""
     step = step_of(view.rate or RATE, view.study.units)
     section = next((part for part in _sections(view.study) if part.rated), None)

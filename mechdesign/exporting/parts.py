@@ -9,10 +9,10 @@ from itertools import combinations
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.exporting.discs import DEVIATION, Disc, cautions, discs_of, open_profiles, replace_plate
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Shape, Text, around, box, roomiest
+from mechdesign.exporting.discs import DEVIATION, CamDisc, cautions, discs_of, open_profiles, replace_plate
+from mechdesign.exporting.drawing import CentreMark, Drawing, DrawnCircle, Shape, Text, around, box, roomiest
 from mechdesign.exporting.exports import drawings
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import gap, hull, joined
 from mechdesign.questions.reliability.schema.section import in_words
@@ -36,7 +36,7 @@ class Hole:
 
 
 @dataclass(frozen=True)
-class Part:
+class FlatPart:
     """A part in a frame of its own, in millimetres: places that its outline goes around, and its holes.
 
     `marks` are places without a hole, and `engraved` pitch circles and profiles. A cam has the outline of its `disc`
@@ -49,7 +49,7 @@ class Part:
     holes: Sequence[Hole]
     marks: dict[str, complex]
     engraved: Sequence[Shape] = ()
-    disc: Disc | None = None
+    disc: CamDisc | None = None
 
     def faults(self) -> Iterator[str]:
         """What cannot be cut, in words: holes of different points that overlap, and one that leaves no rim."""
@@ -75,8 +75,8 @@ class Part:
         outline = [around("cut", self.places, self.radius + kerf / 2)]
         cut: list[Shape] = [*outline] if self.disc is None else [*self.disc.curves]
         cut += [around("cut", hole.ends, max(hole.radius - kerf / 2, 0.0)) for hole in self.holes]
-        drilled = [Mark("drill", hole.ends[0]) for hole in self.holes if len(hole.ends) == 1]
-        marked = [Mark("engrave", place) for place in self.marks.values()]
+        drilled = [CentreMark("drill", hole.ends[0]) for hole in self.holes if len(hole.ends) == 1]
+        marked = [CentreMark("engrave", place) for place in self.marks.values()]
         turned = [shape.moved(0j, turn) for shape in (*cut, *drilled, *marked, *self.engraved)]
         return [*turned, *self._name(turn)]
 
@@ -100,7 +100,7 @@ def _along(ends: tuple[complex, ...]) -> list[complex]:
     return [ends[0] + (ends[-1] - ends[0]) * k / 8 for k in range(9 if len(ends) > 1 else 1)]
 
 
-def parts_of(view: View) -> list[Part]:
+def parts_of(view: PosedStudy) -> list[FlatPart]:
     """Every link as a part, the ground too; of a telescopic link its body, and its rod.
 
     A cam in which all holes of its link lie is the link, others are parts of their own.
@@ -120,7 +120,7 @@ def parts_of(view: View) -> list[Part]:
         marks = {point: place for point, place in points.items() if point not in pins}
         places = [scale * place for place in view.outline(name)]
         engraved: list[Shape] = [*_pitch_circles(view, name), *open_profiles(view, name)]
-        plate = Part(name, places, radius, holes, marks, engraved)
+        plate = FlatPart(name, places, radius, holes, marks, engraved)
         discs = discs_of(view, name, scale * float(sizes.kerf))
         whole = replace_plate(discs, [(end, hole.radius) for hole in holes for end in hole.ends])
         parts += [] if whole else [plate]
@@ -129,20 +129,20 @@ def parts_of(view: View) -> list[Part]:
             parts.append(_cam_part(title, plate, disc))
         if link.tip is not None:
             tip = Hole(link.tip, (0j,), scale * float(sizes.pin(link.tip)))
-            parts.append(Part(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
+            parts.append(FlatPart(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
     return parts
 
 
-def _cam_part(name: str, plate: Part, disc: Disc) -> Part:
+def _cam_part(name: str, plate: FlatPart, disc: CamDisc) -> FlatPart:
     """A cam of a link, with those of its holes and marks that lie in it."""
     holes = [hole for hole in plate.holes if all(disc.holds(end, hole.radius) for end in hole.ends)]
     marks = {point: place for point, place in plate.marks.items() if disc.holds(place, 0.0)}
     profile = disc.curves[-1].corners
     places = [*(end for hole in holes for end in hole.ends), *profile[:: max(len(profile) // 12, 1)]]
-    return Part(name, places, plate.radius, holes, marks, disc=disc)
+    return FlatPart(name, places, plate.radius, holes, marks, disc=disc)
 
 
-def _pitch_circles(view: View, link: str) -> list[Circle]:
+def _pitch_circles(view: PosedStudy, link: str) -> list[DrawnCircle]:
     """The pitch circles of a link's wheels, in its frame."""
     mechanism, circles = view.mechanism, []
     for mesh in mechanism.meshes:
@@ -150,11 +150,11 @@ def _pitch_circles(view: View, link: str) -> list[Circle]:
             size, point = float(radius), mechanism.graph.nodes[mesh.axes[k]]
             if mesh.links[k] == link and size > 0 and point in view.points(link):
                 center = view.millimetres * view.points(link)[point]
-                circles.append(Circle("engrave", center, round(view.millimetres * size, 9)))
+                circles.append(DrawnCircle("engrave", center, round(view.millimetres * size, 9)))
     return [*dict.fromkeys(circles)]
 
 
-def parts_drawing(view: View) -> Drawing:
+def parts_drawing(view: PosedStudy) -> Drawing:
     """All parts on a sheet, each with its name under it."""
     scale, sizes = view.millimetres, view.sizes
     parts, kerf = parts_of(view), scale * float(sizes.kerf)
@@ -183,7 +183,7 @@ def nested(parts: Iterable[tuple[str, Sequence[Shape]]], width: float) -> dict[s
     return groups
 
 
-def remarks(view: View, parts: Sequence[Part]) -> list[str]:
+def remarks(view: PosedStudy, parts: Sequence[FlatPart]) -> list[str]:
     """What stands in the file in words: each part with its points, and the tolerances and fits of the study."""
     study, sizes, scale = view.study, view.sizes, view.millimetres
     lines = [f"thickness {scale * float(sizes.thickness):.6g} mm, kerf {scale * float(sizes.kerf):.6g} mm"]
@@ -205,7 +205,7 @@ def remarks(view: View, parts: Sequence[Part]) -> list[str]:
     return lines
 
 
-def parts_cautions(view: View) -> tuple[Caution, ...]:
+def parts_cautions(view: PosedStudy) -> tuple[Caution, ...]:
     """Warnings of parts that cannot be cut as they are, or do not fit on the sheet, and of cams."""
     parts, sheet, kerf = parts_of(view), view.sizes.sheet, view.millimetres * float(view.sizes.kerf)
     faults = [fault for part in parts for fault in part.faults()]

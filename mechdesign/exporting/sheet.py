@@ -20,7 +20,7 @@ from mechdesign import __version__
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechdesignError, StudyError, printable
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.plates import pins_of
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.report.figures import style
@@ -63,7 +63,7 @@ Rows = Sequence[Sequence[str]]
     order=40,
     options=("at", "paper"),
 )
-def sheet_pdf(view: View) -> Content:
+def sheet_pdf(view: PosedStudy) -> Content:
     """The sheet as a PDF, and a warning where numbers of the motion are not on it."""
     mechanism = view.mechanism
     scene = pose(mechanism, view.pose)
@@ -72,12 +72,12 @@ def sheet_pdf(view: View) -> Content:
     tables = [_shortened(name, rows) for name, rows in _tables(view, scene, result) if rows]
     with style.context():
         bands = _bands(tables)
-        sheet = Sheet.of(view, scene, sum(band.height for band in bands))
+        sheet = PaperSheet.of(view, scene, sum(band.height for band in bands))
         figure = sheet.draw(view, scene, bands)
         return Content(style.encoded(figure, "pdf", f"mechdesign {__version__}"), warnings)
 
 
-def _motion(view: View) -> tuple[Result | None, tuple[Caution, ...]]:
+def _motion(view: PosedStudy) -> tuple[Result | None, tuple[Caution, ...]]:
     """The answer of kinematics; none where the study gives no motion that can be assembled."""
     try:
         return kinematics(view.study), ()
@@ -85,7 +85,7 @@ def _motion(view: View) -> tuple[Result | None, tuple[Caution, ...]]:
         return None, (Caution("incomplete", f"numbers of the motion are not on the sheet: {error}"),)
 
 
-def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[str, Rows]]:
+def _tables(view: PosedStudy, scene: Scene, result: Result | None) -> Iterator[tuple[str, Rows]]:
     """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
     study, label = view.study, view.study.units.label
     scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
@@ -122,7 +122,7 @@ def _tables(view: View, scene: Scene, result: Result | None) -> Iterator[tuple[s
     yield "requirements", [("requirement", "", "worst"), *verdicts] if verdicts else []
 
 
-def _pins(view: View) -> list[tuple[str, ...]]:
+def _pins(view: PosedStudy) -> list[tuple[str, ...]]:
     """Pins of plates, with fits and clearances of the study."""
     study, description = view.study, view.mechanism.description
     clearances = study.reliability.clearances if study.reliability is not None else {}
@@ -150,7 +150,7 @@ def _shortened(name: str, rows: Rows) -> Rows:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class PaperSheet:
     """A sheet of paper, the drawing's region on it (left, low, width, height; mm), and its scale."""
 
     paper: str
@@ -158,7 +158,7 @@ class Sheet:
     scale: float
 
     @classmethod
-    def of(cls, view: View, scene: Scene, tables: float) -> Sheet:
+    def of(cls, view: PosedStudy, scene: Scene, tables: float) -> PaperSheet:
         """The paper that is asked for, or the smallest with room, and the largest standard scale on it.
 
         `tables` is the height of the tables (mm).
@@ -186,7 +186,9 @@ class Sheet:
         return sheets[view.paper or ("A4" if fits and not crowded else "A3")]
 
     @classmethod
-    def _scaled(cls, paper: str, region: tuple[float, float, float, float], view: View, scene: Scene) -> Sheet:
+    def _scaled(
+        cls, paper: str, region: tuple[float, float, float, float], view: PosedStudy, scene: Scene
+    ) -> PaperSheet:
         """A sheet at the largest standard scale at which the mechanism fits into the region."""
         _, across, up = extent(scene.places({}))
         most = min((region[2] - 2 * PAD) / across, (region[3] - 2 * PAD) / up) / view.millimetres
@@ -197,7 +199,7 @@ class Sheet:
         """The scale as ISO 5455 writes it."""
         return f"{self.scale:g} : 1" if self.scale >= 1 else f"1 : {1 / self.scale:g}"
 
-    def draw(self, view: View, scene: Scene, bands: Sequence[Band]) -> Figure:
+    def draw(self, view: PosedStudy, scene: Scene, bands: Sequence[TableColumns]) -> Figure:
         """The whole sheet."""
         wide, tall = PAPERS[self.paper]
         figure = Figure(figsize=(wide / INCH, tall / INCH))
@@ -223,7 +225,7 @@ class Sheet:
                     y -= _height(rows)
         return figure
 
-    def _mechanism(self, figure: Figure, page: Axes, view: View, scene: Scene) -> None:
+    def _mechanism(self, figure: Figure, page: Axes, view: PosedStudy, scene: Scene) -> None:
         wide, tall = PAPERS[self.paper]
         left, low, across, up = self.region
         axes = figure.add_axes((left / wide, low / tall, across / wide, up / tall))
@@ -239,7 +241,7 @@ class Sheet:
         words += "; lengths of guides are not to scale" * bool(scene.guides)
         page.text(left + 4, low + up - 6, words, fontsize=CELL, color=style.INK)
 
-    def _title(self, page: Axes, view: View, left: float) -> None:
+    def _title(self, page: Axes, view: PosedStudy, left: float) -> None:
         study = view.study
         unit = study.units.label("length") or "none (as mm)"
         rows = (
@@ -296,7 +298,7 @@ def _widths(rows: Rows) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Band:
+class TableColumns:
     """Tables beside each other, in columns of tables below each other, each `room` wide (mm)."""
 
     columns: Sequence[Sequence[Rows]]
@@ -308,17 +310,17 @@ class Band:
         return max(sum(map(_height, column)) for column in self.columns)
 
 
-def _bands(tables: Sequence[Rows]) -> list[Band]:
+def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
     """Tables in two columns where they are narrow enough, in their order; what is wider has its own band."""
     room = WIDTH - 4.0
     half = room / 2 - COLUMN
     narrow = [rows for rows in tables if REDUCED * sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
-    bands = [Band([[rows]], room) for rows in tables if rows not in narrow]
+    bands = [TableColumns([[rows]], room) for rows in tables if rows not in narrow]
     if len(narrow) < 2:
-        return [Band([[rows]], room) for rows in tables]
+        return [TableColumns([[rows]], room) for rows in tables]
     # Split where the taller column is lowest.
     splits = [[narrow[:k], narrow[k:]] for k in range(1, len(narrow))]
-    return [min((Band(split, half) for split in splits), key=lambda band: band.height), *bands]
+    return [min((TableColumns(split, half) for split in splits), key=lambda band: band.height), *bands]
 
 
 def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 
@@ -32,7 +32,7 @@ HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 
 @export("layers.csv", "the layer of each link in which nothing meets over the motion", order=20)
-def layers_csv(view: View) -> Content:
+def layers_csv(view: PosedStudy) -> Content:
     """A row for each plate, rod and pin: its layers, and where it begins and ends above the lowest layer.
 
     The rod of a telescopic link lies in the layer of its body.
@@ -96,7 +96,7 @@ def _span(item: Item, layers: Mapping[str, int], *, whole: bool) -> tuple[float,
 
 
 @dataclass(frozen=True)
-class Stack:
+class Layering:
     """The layer of each link, from 1 at the bottom, what meets in it, and whether all stacks were tried."""
 
     layers: Mapping[str, int]
@@ -116,13 +116,13 @@ class Stack:
         return (Caution("infeasible", f"{head}; here {named}{more}"),)
 
 
-def stack_of(view: View) -> Stack:
+def stack_of(view: PosedStudy) -> Layering:
     """The best stack of a study's plates over its motion; layers that the study gives are kept."""
     description = view.mechanism.description
     return stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
 
 
-def meetings_of(view: View) -> list[Meeting]:
+def meetings_of(view: PosedStudy) -> list[Meeting]:
     """What meets in the plane over the motion.
 
     Between two poses a distance changes by no more than the fastest corners move: what could meet there counts.
@@ -148,7 +148,7 @@ def meetings_of(view: View) -> list[Meeting]:
     return meetings
 
 
-def _first(view: View, clearances: Clearances, one: Item, other: Item, link: str | None) -> str:
+def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, link: str | None) -> str:
     """The first pose of the motion at which two items meet, in words; empty if they never do.
 
     How far they move is counted in the frame of a `link`, where one is given.
@@ -164,19 +164,19 @@ def _first(view: View, clearances: Clearances, one: Item, other: Item, link: str
 
 def stacked(
     links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
-) -> Stack:  # fmt: skip
+) -> Layering:  # fmt: skip
     """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
     avoidable = [meeting for meeting in meetings if not meeting.certain]
     search, most = _Search(links, pins, avoidable, given), max([len(links), *given.values()])
     for count in range(max([1, *given.values()]), most + 1):
         layers = search.best(count)
         if layers is not None:
-            return Stack(layers, [meeting for meeting in meetings if meeting.certain], not search.spent)
+            return Layering(layers, [meeting for meeting in meetings if meeting.certain], not search.spent)
         if search.spent:
             break
     layers = _Search(links, pins, avoidable, given, strict=False).best(most)
     assert layers is not None
-    return Stack(layers, [meeting for meeting in meetings if meeting.broken(layers)], not search.spent)
+    return Layering(layers, [meeting for meeting in meetings if meeting.broken(layers)], not search.spent)
 
 
 class _Search:

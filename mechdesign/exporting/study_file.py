@@ -9,13 +9,13 @@ from typing import Any
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import View
+from mechdesign.exporting.view import PosedStudy
 
 _NOT_IN_YAML = re.compile(r"[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 @export("study.json", "the study with its overrides, for programs; mechdesign reads it too", order=70)
-def study_json(view: View) -> Content:
+def study_json(view: PosedStudy) -> Content:
     """The study as plain data, and a warning that names the files it needs."""
     study = view.study
     data: dict[str, Any] = {**study.resolved}
@@ -30,7 +30,7 @@ def study_json(view: View) -> Content:
     return Content(text + "\n", (Caution("incomplete", named),) * bool(files))
 
 
-def _drawn(view: View) -> dict[str, list[float]]:
+def _drawn(view: PosedStudy) -> dict[str, list[float]]:
     """Places of the points that the sketch has, as they are assembled."""
     drawn, sketch = view.mechanism.sketch_configuration, view.study.resolved["mechanism"].get("sketch") or {}
     places = {point: complex(drawn.point(point)) for point in sketch}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from mechdesign.errors import printable, printable_lines
-from mechdesign.exporting.drawing import Circle, Drawing, Mark, Path, Shape, Text, arc
+from mechdesign.exporting.drawing import CentreMark, Drawing, DrawnCircle, Path, Shape, Text, arc
 
 MARGIN = 5.0  # around the drawing
 STROKE, LINES = 0.2, 3000  # least width of lines, and their number side by side in a large drawing
@@ -43,10 +43,10 @@ def _group(name: str, shapes: Sequence[Shape], color: str) -> list[str]:
 
 
 def _element(shape: Shape, color: str) -> str:
-    if isinstance(shape, Circle):
+    if isinstance(shape, DrawnCircle):
         x, y = shape.place.real, -shape.place.imag
         return f'<circle cx="{_n(x)}" cy="{_n(y)}" r="{_n(shape.radius)}"/>'
-    if isinstance(shape, Mark):
+    if isinstance(shape, CentreMark):
         x, y = shape.place.real, -shape.place.imag
         return f'<path d="M {_n(x - CROSS)} {_n(y)} h {2 * CROSS:g} M {_n(x)} {_n(y - CROSS)} v {2 * CROSS:g}"/>'
     if isinstance(shape, Text):

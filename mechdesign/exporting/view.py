@@ -47,7 +47,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Slot:
+class LinkSlot:
     """A slot in a link, in which the pin at a point slides, between two ends in the frame of the link."""
 
     link: str
@@ -56,7 +56,7 @@ class Slot:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PosedStudy:
     """A study, and the pose in which it is shown: coordinates and values as the study writes them, or None.
 
     `rate` is that of a controller, or a step of time, and `paper` the size of a drawing sheet; None: not said.
@@ -100,7 +100,7 @@ class View:
         return Sizes(self.mechanism, self.plates, {})
 
     @cached_property
-    def slots(self) -> list[Slot]:
+    def slots(self) -> list[LinkSlot]:
         """The slots of slides and telescopic links, as long as the travel over the motion."""
         description, slots = self.mechanism.description, []
         slides = {
@@ -111,7 +111,7 @@ class View:
         for name, (link, point) in slides.items():
             travel = self.track.configuration.slides[self.mechanism.graph.slides.index(name)]
             ends = [self.in_frame(link, point, int(index(travel))) for index in (np.argmin, np.argmax)]
-            slots.append(Slot(link, point, (ends[0], ends[1])))
+            slots.append(LinkSlot(link, point, (ends[0], ends[1])))
         return slots
 
     def in_frame(self, link: str, point: str, row: int) -> complex:

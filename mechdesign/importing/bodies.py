@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import StudyError
-from mechdesign.importing.sketch import GROUND, Sketch
+from mechdesign.importing.sketch import GROUND, FileSketch
 
 
-class Bodies:
+class MergedLinks:
     """The body to which each link of a sketch belongs, the ground among them, and the points of each body.
 
     Links that are fastened to each other, and links that share two points, are one body, with the name of its first
     link. `points` leaves out bodies that nothing joins to the ground, and those of a single pin that carry nothing.
     """
 
-    def __init__(self, sketch: Sketch) -> None:
+    def __init__(self, sketch: FileSketch) -> None:
         self.sketch = sketch
         self._groups = {GROUND: {GROUND}} | {name: {name} for name in sketch.links}
         self._order = {name: k for k, name in enumerate(self._groups)}

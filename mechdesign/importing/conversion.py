@@ -12,8 +12,8 @@ from mechdesign import study as studies
 from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
 from mechdesign.importing.draft import Draft
 from mechdesign.importing.formats import FORMATS
-from mechdesign.importing.sketch import Drive, Sketch
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import FileDrive, FileSketch
+from mechdesign.importing.source import ImportedText
 from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
 
@@ -75,7 +75,7 @@ def conversion(
     scale: float | None,
 ) -> tuple[str, tuple[str, ...]]:  # fmt: skip
     """A study as `convert` makes it, and what is to be moved in its sketch before it runs, such as at a dead centre."""
-    origin = Source.of(os.fspath(source)) if source is not None else Source.of_text(text or "")
+    origin = ImportedText.of(os.fspath(source)) if source is not None else ImportedText.of_text(text or "")
     if not origin.text.strip():
         raise StudyError(f"{cut(origin.name)} is empty")
     for kind in FORMATS:
@@ -101,7 +101,7 @@ def conversion(
     return _settled(draft, cut(origin.name))
 
 
-def _scale(sketch: Sketch, factor: float) -> None:
+def _scale(sketch: FileSketch, factor: float) -> None:
     if not 0 < factor < 1e6:
         raise StudyError(f"a scale of {factor:g}; it is a positive number")
     sketch.points = {name: factor * place for name, place in sketch.points.items()}
@@ -120,7 +120,7 @@ def _scale(sketch: Sketch, factor: float) -> None:
     sketch.choices.append(f"all lengths are multiplied by {factor:g}")
 
 
-def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
+def _choose(sketch: FileSketch, chosen: Sequence[str]) -> None:
     """Take what `drives` names in place of the file's inputs; ask where neither says anything."""
     if chosen:
         sketch.drives = [_named(sketch, name) for name in chosen]
@@ -134,7 +134,7 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
             choices = {"links": [*sketch.links]}
         named = "; ".join(f"{noun}: {', '.join(map(repr, names[:12]))}" for noun, names in choices.items() if names)
         raise StudyError(f"the file says of no joint that it is driven: choose with --drive; {named}")
-    kept: dict[tuple[str, str], Drive] = {}
+    kept: dict[tuple[str, str], FileDrive] = {}
     for drive in sketch.drives:
         kept.setdefault((drive.kind, drive.of), drive)
     sketch.drives = list(kept.values())
@@ -143,14 +143,14 @@ def _choose(sketch: Sketch, chosen: Sequence[str]) -> None:
         sketch.choices += [f"input {name} is moved by hand there, and held here" for name in by_hand]
 
 
-def _named(sketch: Sketch, name: str) -> Drive:
+def _named(sketch: FileSketch, name: str) -> FileDrive:
     """The drive that a name stands for, with the speed that the file has for it."""
     if name in sketch.fixed:
         chosen = sketch.drive_at(name)
     elif name in sketch.links:
-        chosen = Drive("length" if sketch.links[name].telescopic else "angle", name)
+        chosen = FileDrive("length" if sketch.links[name].telescopic else "angle", name)
     elif name in sketch.slides:
-        chosen = Drive("slide", name)
+        chosen = FileDrive("slide", name)
     elif name in sketch.points:
         chosen = sketch.drive_at(name)
     else:

@@ -6,9 +6,9 @@ import cmath
 import math
 
 from mechdesign.errors import StudyError
-from mechdesign.importing.bodies import Bodies
+from mechdesign.importing.bodies import MergedLinks
 from mechdesign.importing.names import Names, distinct
-from mechdesign.importing.sketch import GROUND, Drive, Force, Sketch, Slide
+from mechdesign.importing.sketch import GROUND, FileDrive, FileSketch, Force, Slide
 
 Span = tuple[float, float]
 """First and last value of a drive, in degrees or the unit of length."""
@@ -23,9 +23,9 @@ class Draft:
         If an input moves nothing.
     """
 
-    def __init__(self, sketch: Sketch) -> None:
+    def __init__(self, sketch: FileSketch) -> None:
         self.sketch = sketch
-        self.bodies = Bodies(sketch)
+        self.bodies = MergedLinks(sketch)
         self.names = Names()
         self.places = dict(sketch.points)
         self.points = {body: self._from_pivot(body) for body in self.bodies.points}
@@ -133,7 +133,7 @@ class Draft:
         way = self.places[slide.point] - self.places[slide.through[0]]
         return (way * cmath.rect(1.0, -self.direction(slide))).real
 
-    def _drives(self) -> dict[str, Drive]:
+    def _drives(self) -> dict[str, FileDrive]:
         drives = {}
         for drive in self.sketch.drives:
             if drive.kind == "slide":

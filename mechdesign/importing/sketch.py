@@ -23,7 +23,7 @@ LARGEST = 1e12
 
 
 @dataclass
-class Link:
+class FileLink:
     """A rigid body by its points, or a telescopic link of two points, whose length is driven."""
 
     points: list[str]
@@ -50,7 +50,7 @@ class Slide:
 
 
 @dataclass(frozen=True)
-class Drive:
+class FileDrive:
     """A driven link's angle from another link, the length of a telescopic link, or a slide."""
 
     kind: Literal["angle", "length", "slide"]
@@ -98,7 +98,7 @@ class Force:
 
 
 @dataclass
-class Sketch:
+class FileSketch:
     """The mechanism of a file. `choices` say how the file was read, `omitted` what the study leaves out.
 
     The paths of `traced` points are what the file asks for.
@@ -110,13 +110,13 @@ class Sketch:
     inertia_unit: str = ""
     points: dict[str, complex] = field(default_factory=dict)
     traced: set[str] = field(default_factory=set)
-    links: dict[str, Link] = field(default_factory=dict)
+    links: dict[str, FileLink] = field(default_factory=dict)
     fixed: list[str] = field(default_factory=list)
     welds: list[tuple[str, ...]] = field(default_factory=list)
     slides: dict[str, Slide] = field(default_factory=dict)
     # Points that go no farther from a second one than a third is: on an arc from its middle.
     reaches: list[tuple[str, str, str]] = field(default_factory=list)
-    drives: list[Drive] = field(default_factory=list)
+    drives: list[FileDrive] = field(default_factory=list)
     gears: list[Gears] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
     dynamic: bool = False  # whether masses and forces are asked about
@@ -139,7 +139,7 @@ class Sketch:
         if fixed:
             self.fixed.append(name)
 
-    def add_link(self, name: str, points: Iterable[str], *, telescopic: bool = False) -> Link:
+    def add_link(self, name: str, points: Iterable[str], *, telescopic: bool = False) -> FileLink:
         """Add a link through points that the sketch has.
 
         Raises
@@ -152,7 +152,7 @@ class Sketch:
         for point in listed:
             if point not in self.points:
                 raise StudyError(f"link {cut(name)!r} has the joint {cut(point)!r}, which the file does not have")
-        self.links[name] = Link(listed, telescopic)
+        self.links[name] = FileLink(listed, telescopic)
         if sum(len(link.points) for link in self.links.values()) > MOST_ENDS:
             raise StudyError(f"the links of the file have more than {MOST_ENDS} joints together; take a part of it")
         return self.links[name]
@@ -231,7 +231,7 @@ class Sketch:
         """The moving links that a pin joins, after the ground where it is fixed there."""
         return [GROUND] * (point in self.fixed) + self.moving_at(point)
 
-    def drive_at(self, point: str, speed: float | None = None) -> Drive:
+    def drive_at(self, point: str, speed: float | None = None) -> FileDrive:
         """The drive that moves a point along its slide, or turns the two links that a pin joins.
 
         Raises
@@ -241,14 +241,14 @@ class Sketch:
         """
         for name, slide in self.slides.items():
             if slide.point == point:
-                return Drive("slide", name)
+                return FileDrive("slide", name)
         links = self.turned_at(point)
         if len(links) != 2:
             raise StudyError(
                 f"the drive at joint {point!r} turns one link against another, or against the ground; {len(links)} "
                 "meet there: name the link that is driven"
             )
-        return Drive("angle", links[1], links[0], speed)
+        return FileDrive("angle", links[1], links[0], speed)
 
     def distance(self, one: str, other: str) -> float:
         """Distance of two points."""

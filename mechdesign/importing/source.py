@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import Sketch
+from mechdesign.importing.sketch import FileSketch
 from mechdesign.study.text.inputs import Folder
 
 # Most characters of a source.
@@ -24,7 +24,7 @@ JOINTS, LINKS = "joints.csv", "links.csv"
 
 
 @dataclass(frozen=True)
-class Source:
+class ImportedText:
     """The text that is imported, what it is called, and the texts of tables of a folder."""
 
     name: str
@@ -32,7 +32,7 @@ class Source:
     tables: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, source: str) -> Source:
+    def of(cls, source: str) -> ImportedText:
         """An address, a folder with tables, or a file.
 
         Raises
@@ -54,7 +54,7 @@ class Source:
         return cls(path.name, _read(path))
 
     @classmethod
-    def of_text(cls, text: str, name: str = "a text") -> Source:
+    def of_text(cls, text: str, name: str = "a text") -> ImportedText:
         """A text."""
         return cls(name, _address(_bounded(text, name)))
 
@@ -63,9 +63,9 @@ class Source:
         """The name without its ending."""
         return self.name.partition(".")[0]
 
-    def started(self, tool: str) -> Sketch:
+    def started(self, tool: str) -> FileSketch:
         """The empty sketch of a tool's file."""
-        return Sketch(tool, "" if self.name.startswith("a ") else self.stem)
+        return FileSketch(tool, "" if self.name.startswith("a ") else self.stem)
 
     @cached_property
     def data(self) -> Any:

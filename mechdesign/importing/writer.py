@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from mechdesign.errors import StudyError, cut, printable
 from mechdesign.importing.draft import Draft, Span
-from mechdesign.importing.sketch import GROUND, Drive, Gears, Link, Slide
+from mechdesign.importing.sketch import GROUND, FileDrive, FileLink, Gears, Slide
 
 _WIDTH = 116
 # Steps of a sweep, least instants of a motion in time, and instants for each turn of a drive.
@@ -103,7 +103,7 @@ class Writer:
             entries["inertia"] = f"{digits(heavy[0][2])} {self._sketch.inertia_unit}"
         return entries
 
-    def _center(self, link: Link) -> complex:
+    def _center(self, link: FileLink) -> complex:
         """Centre of mass of a link; where the file gives none, the middle of its points."""
         places = [self._sketch.points[point] for point in link.points]
         return link.center if link.center is not None else sum(places) / len(places)
@@ -120,7 +120,7 @@ class Writer:
         angle = degrees(draft.turn(riders[0]) - draft.direction(slide))
         return {"prismatic": [draft.link(guide), draft.link(riders[0])], **line, "angle": angle}
 
-    def _driven(self, name: str, drive: Drive) -> Flow:
+    def _driven(self, name: str, drive: FileDrive) -> Flow:
         base = self._draft.bodies.of(drive.base)
         return {drive.kind: name, **({} if base == GROUND else {"from": self._draft.link(base)})}
 
@@ -161,7 +161,7 @@ class Writer:
         traced = [draft.point(name) for name in self._sketch.points if name in self._sketch.traced & on_bodies]
         return [*lines, *([f"  outputs: {flow(traced)}"] if traced else [])]
 
-    def _rate(self, drive: Drive) -> str:
+    def _rate(self, drive: FileDrive) -> str:
         speed, unit = drive.speed or 0.0, self._sketch.units["length"]
         if drive.kind != "angle":
             return digits(speed) if unit == "dimensionless" else f"{digits(speed)} {unit}/s"

@@ -175,7 +175,7 @@ def regularity(linear: Linearization) -> Floats:
     return least
 
 
-class Atlas:
+class Charts:
     """Charts of a mechanism, compiled where they are wanted."""
 
     def __init__(self, positions: Positions) -> None:

@@ -18,7 +18,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.model import Description, Limit, Term
-from mechdesign.mechanism.rigidity import Equations
+from mechdesign.mechanism.rigidity import LoopEquations
 from mechdesign.mechanism.sketch import Sketch, locate
 from mechdesign.mechanism.wheels import Mesh, meshes
 
@@ -183,9 +183,9 @@ class Core:
         return {name: angle + TURN * (angle < ON_THE_CUT - np.pi) for name, angle in drawn.items()}
 
     @property
-    def equations(self) -> Equations:
+    def equations(self) -> LoopEquations:
         """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size, tuple(c.gap for c in self.couplings))
+        return LoopEquations(self.graph, self.geometry, self.size, tuple(c.gap for c in self.couplings))
 
     def coordinate(self, name: str) -> Coordinate:
         """Look a coordinate up by name.

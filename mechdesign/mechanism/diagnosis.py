@@ -13,7 +13,7 @@ from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Prismatic
-from mechdesign.mechanism.rigidity import Equations, null_space, separated
+from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.numerics.arrays import Floats
 
@@ -65,7 +65,7 @@ def near_singular(regularity: float) -> list[Caution]:
 
 
 def wrong_count(
-    description: Description, equations: Equations, sketch: Sketch, count: int, drives: Sequence[Coordinate]
+    description: Description, equations: LoopEquations, sketch: Sketch, count: int, drives: Sequence[Coordinate]
 ) -> MechanismError:
     """The error for a number of drives other than the mobility by counting: why, and what mends it."""
     still = _still(description, equations.graph, drives)
@@ -120,7 +120,7 @@ def _still(description: Description, graph: Graph, given: Sequence[Coordinate]) 
     return None
 
 
-def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], missing: int) -> str:
+def _too_free(equations: LoopEquations, jacobian: Floats, drives: Sequence[str], missing: int) -> str:
     """Too few drives: which links still move while the drives are held, and which drives would hold them."""
     graph = equations.graph
     free = [_motion(graph, motion) for motion in _motions(equations, jacobian)]
@@ -167,7 +167,7 @@ def _alike(a: str, b: str) -> bool:
 
 
 def over_constrained(
-    description: Description, equations: Equations, x: Floats, count: int, real: int, given: int
+    description: Description, equations: LoopEquations, x: Floats, count: int, real: int, given: int
 ) -> MechanismError:
     """The error for a chain that moves although by counting it cannot: which links or joints are redundant."""
     start = (
@@ -196,7 +196,7 @@ def over_constrained(
 
 
 def undetermined(
-    description: Description, equations: Equations, sketch: Sketch, given: Sequence[Coordinate], reason: str
+    description: Description, equations: LoopEquations, sketch: Sketch, given: Sequence[Coordinate], reason: str
 ) -> MechanismError:
     """The error for given coordinates that fix some links twice and leave others free; else it has the `reason`."""
     graph = equations.graph
@@ -216,7 +216,7 @@ def undetermined(
     return MechanismError(f"{subject} {verb} not determine the mechanism: {why}", where)
 
 
-def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: bool) -> str:
+def _twice_and_free(equations: LoopEquations, given: Sequence[Coordinate], driven: bool) -> str:
     graph = equations.graph
     jacobian = equations.generic(given)
     edges, used = doubled(equations, jacobian)
@@ -241,14 +241,14 @@ def _links(names: Sequence[str]) -> str:
     return f"link{'s' if len(names) > 1 else ''} {listed(names)}"
 
 
-def _named(equations: Equations, jacobian: Floats, held: Sequence[Coordinate] = ()) -> list[str]:
+def _named(equations: LoopEquations, jacobian: Floats, held: Sequence[Coordinate] = ()) -> list[str]:
     """Links, joints, couplings and held coordinates whose equations depend on each other."""
     edges, used = doubled(equations, jacobian)
     conditions = zip([*equations.couplings, *held], used, strict=True)
     return [*owners_of(equations.graph, edges), *(condition.name for condition, says in conditions if says)]
 
 
-def _parts(equations: Equations, names: Sequence[str]) -> str:
+def _parts(equations: LoopEquations, names: Sequence[str]) -> str:
     """Names of links, joints and couplings as a phrase: ``links 'a' and 'b' and joint 'c'``."""
     bodies, couplings = equations.graph.bodies, {coupling.name for coupling in equations.couplings}
     kinds = {name: "link" if name in bodies else "coupling" if name in couplings else "joint" for name in names}
@@ -259,7 +259,7 @@ def _parts(equations: Equations, names: Sequence[str]) -> str:
     return " and ".join(named) or "the same part"
 
 
-def _rigid(equations: Equations, count: int, drives: Sequence[Coordinate]) -> str:
+def _rigid(equations: LoopEquations, count: int, drives: Sequence[Coordinate]) -> str:
     """Which links hold each other in a mechanism that cannot move, and what to leave out."""
     graph = equations.graph
     if count == 0:
@@ -284,13 +284,13 @@ def _rigid(equations: Equations, count: int, drives: Sequence[Coordinate]) -> st
     return "Free a joint or a link"
 
 
-def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
+def _motions(equations: LoopEquations, jacobian: Floats) -> list[Floats]:
     """Independent motions in the null space of a Jacobian, in the order of the links that move."""
     motions = separated(null_space(jacobian), equations.inner)
     return sorted(motions, key=lambda motion: np.flatnonzero(motion).tolist())
 
 
-def motions_in_words(equations: Equations, jacobian: Floats) -> str:
+def motions_in_words(equations: LoopEquations, jacobian: Floats) -> str:
     """The motions in the null space of a Jacobian as a phrase; empty where there are none."""
     words = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
     more = [f"and {len(words) - MAX_MOTIONS} more motions"] if len(words) > MAX_MOTIONS else []
@@ -326,7 +326,7 @@ def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
     return " and ".join(part for part in (move, slide) if part) or "points move", None, drive
 
 
-def doubled(equations: Equations, jacobian: Floats) -> tuple[list[int], list[bool]]:
+def doubled(equations: LoopEquations, jacobian: Floats) -> tuple[list[int], list[bool]]:
     """Edges and held coordinates whose equations depend on each other: those in the left null space."""
     stress = null_space(jacobian.T)
     count = len(equations.graph.edges)
@@ -346,7 +346,7 @@ def owners_of(graph: Graph, edges: Iterable[int]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def repeating(description: Description, equations: Equations, x: Floats, excess: int) -> list[str]:
+def repeating(description: Description, equations: LoopEquations, x: Floats, excess: int) -> list[str]:
     """Redundant links or joints: those that can be left out without changing the motion.
 
     `x` is a configuration within the motion, `excess` the number of degrees of freedom beyond the mobility by counting.

@@ -33,7 +33,7 @@ EQUAL_LENGTHS = 1e-9
 
 
 @dataclass(frozen=True)
-class Joint:
+class LoopJoint:
     """A revolute joint at a node (`edge` -1), or a slide along an edge of the graph (`node` -1)."""
 
     name: str
@@ -46,7 +46,7 @@ class FourBar:
     """A closed chain of four bodies."""
 
     links: tuple[str, ...]  # frame, input, coupler and output
-    joints: tuple[Joint, ...]  # between frame and input, input and coupler, coupler and output, output and frame
+    joints: tuple[LoopJoint, ...]  # between frame and input, input and coupler, coupler and output, output and frame
     lengths: tuple[float, ...]  # of the links, between their two revolute joints; nan for a link with the slide
     # Of a slider-crank: distance of the slide's line from the pin of the body that carries the line, measured at the
     # pin of the body that slides; nan for a four-bar.
@@ -231,7 +231,7 @@ class _Bodies:
 
         for body, point in graph.points:
             hold(self.owner[body], graph.node(point))
-        self.joints: list[tuple[str, str, Joint]] = []
+        self.joints: list[tuple[str, str, LoopJoint]] = []
         edges = {edge.slide: k for k, edge in enumerate(graph.edges) if edge.slide is not None}
         for name, link in description.links.items():
             if link.telescopic:
@@ -246,13 +246,13 @@ class _Bodies:
                 hold(block, graph.node(joint.point))
         for node, bodies in holders.items():
             for k, one in enumerate(bodies):
-                self.joints += [(one, other, Joint(graph.nodes[node], node=node)) for other in bodies[k + 1 :]]
+                self.joints += [(one, other, LoopJoint(graph.nodes[node], node=node)) for other in bodies[k + 1 :]]
 
     def _slide(self, one: str, other: str, name: str, edges: Mapping[int, int]) -> None:
         slide = self.mechanism.graph.slides.index(name)
-        self.joints.append((one, other, Joint(name, edge=edges[slide])))
+        self.joints.append((one, other, LoopJoint(name, edge=edges[slide])))
 
-    def four_bar(self, links: Sequence[str], joints: Sequence[Joint]) -> FourBar:
+    def four_bar(self, links: Sequence[str], joints: Sequence[LoopJoint]) -> FourBar:
         """Order a ring (joint k between links k and k + 1): frame, input, coupler, output."""
         k = self._frame(links)
         links, joints = [*links[k:], *links[:k]], [*joints[k:], *joints[:k]]
@@ -263,7 +263,7 @@ class _Bodies:
         names = tuple(link.replace(":", " ") for link in links)
         return FourBar(names, tuple(joints), (math.nan,) * 4, math.nan, driven=cylinder > 0)
 
-    def _drives(self, joint: Joint) -> bool:
+    def _drives(self, joint: LoopJoint) -> bool:
         """Whether a slide is given by the drives."""
         slide = self.mechanism.graph.edges[joint.edge].slide
         return not any(slide in group.slides for group in self.mechanism.forward.structure.groups)
@@ -278,7 +278,7 @@ class _Bodies:
                 return links.index(reference)
         return min(range(4), key=lambda k: list(self.frames).index(links[k]))
 
-    def _placing_group(self, link: str, joint: Joint) -> int:
+    def _placing_group(self, link: str, joint: LoopJoint) -> int:
         """Index of the group that places a link against the frame; -1 if the drives do."""
         structure, edges = self.mechanism.forward.structure, self.mechanism.graph.edges
         root = structure.ties[self.frames[link]].root
@@ -288,16 +288,16 @@ class _Bodies:
         return -1
 
 
-def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[Joint]]]:
+def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[LoopJoint]]]:
     """All rings of four bodies with four different joints, at most one of them a slide; each at least once."""
     # By joint, as a pin may hold many bodies.
-    near: dict[str, dict[Joint, list[str]]] = {}
+    near: dict[str, dict[LoopJoint, list[str]]] = {}
     for pair in bodies.joints:
         for one, other, joint in (pair, (pair[1], pair[0], pair[2])):
             near.setdefault(one, {}).setdefault(joint, []).append(other)
     order = {body: k for k, body in enumerate(near)}
 
-    def onwards(ring: list[str], joints: list[Joint]) -> Iterator[tuple[list[str], list[Joint]]]:
+    def onwards(ring: list[str], joints: list[LoopJoint]) -> Iterator[tuple[list[str], list[LoopJoint]]]:
         for joint, others in near[ring[-1]].items():
             if joint in joints or (joint.edge >= 0 and any(before.edge >= 0 for before in joints)):
                 continue

@@ -16,7 +16,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
-from mechdesign.mechanism.friction_equations import Equations
+from mechdesign.mechanism.friction_equations import FrictionSystem
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.joint_contacts import PIN, Joints
 from mechdesign.mechanism.model import Friction
@@ -174,7 +174,7 @@ class Rubs:
         friction = np.zeros_like(relative)
         borne, slopes = self._free
         for _ in range(ROUNDS):
-            system = Equations(borne - np.einsum("jwkn,kn->jwn", slopes, friction), slopes, strength, self.weights)
+            system = FrictionSystem(borne - np.einsum("jwkn,kn->jwn", slopes, friction), slopes, strength, self.weights)
             friction, jams, apart = system.solve(relative)
             held = self._with(friction)
             borne, expected = self.borne(held), system.borne(friction)

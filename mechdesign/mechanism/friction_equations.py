@@ -28,7 +28,7 @@ STEPS = 200
 FOLLOWING_STEPS, LONGEST, SHORTEST = 12, 1 / 16, 1e-6
 
 
-class Equations:
+class FrictionSystem:
     """The equations of friction m + strength size(V + A m) = 0 at a flat batch of poses."""
 
     def __init__(self, borne: Complexes, slopes: Complexes, strength: Floats, weights: Floats) -> None:
@@ -39,9 +39,11 @@ class Equations:
         self.start, self.slopes, self.strength, self.weights = borne, slopes, strength, weights
         self.count, self.poses = strength.shape
 
-    def take(self, rows: Ints) -> Equations:
+    def take(self, rows: Ints) -> FrictionSystem:
         """Some of the poses."""
-        return Equations(self.start[..., rows], self.slopes[..., rows], self.strength[:, rows], self.weights[..., rows])
+        return FrictionSystem(
+            self.start[..., rows], self.slopes[..., rows], self.strength[:, rows], self.weights[..., rows]
+        )
 
     def borne(self, friction: Floats) -> Complexes:
         """What the contacts bear with some friction."""

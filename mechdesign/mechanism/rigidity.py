@@ -40,7 +40,7 @@ DRAWS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class LoopEquations:
     """The equations of all edges and couplings, whose gaps are zero.
 
     Unknowns are angles of classes, slides and nodes, lengths as fractions of `size`.
@@ -278,7 +278,7 @@ def separated(basis: Floats, pivots: int) -> list[Floats]:
     return [np.where(np.abs(row) > 10 * RANK * size, row, 0.0) for row, size in zip(rows, sizes, strict=True)]
 
 
-def check_independent(equations: Equations, structure: Structure) -> None:
+def check_independent(equations: LoopEquations, structure: Structure) -> None:
     """Check that the equations of groups without a closed form are independent.
 
     A perfect matching of equations and unknowns is necessary but not sufficient: one part may be over-constrained while

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.mechanism.friction import ROUNDS, Rubs
-from mechdesign.mechanism.friction_equations import Equations
+from mechdesign.mechanism.friction_equations import FrictionSystem
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats, Ints
 
@@ -97,9 +97,9 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
         changes = changes[:, :, count:] + np.einsum("jwnp,nkp->jwkp", changes[:, :, :count], gains)
         if signs.all():
             strength = signs[:, None] * rubs.coefficients
-            friction, jams, _ = Equations(start, changes, strength, rubs.weights).solve(rates)
+            friction, jams, _ = FrictionSystem(start, changes, strength, rubs.weights).solve(rates)
         else:
-            limits = Equations(start, changes, rubs.coefficients, rubs.weights)
+            limits = FrictionSystem(start, changes, rubs.coefficients, rubs.weights)
             friction, jams, slack = _resting(limits, signs, mobility, freely)
         parts = gains * friction
         values = free + parts.sum(axis=1)
@@ -128,7 +128,7 @@ def _along(effort: object, accelerations: Floats, friction: Floats, cases: int) 
     return total
 
 
-def _resting(limits: Equations, signs: Floats, mobility: Floats, freely: Floats) -> tuple[Floats, Ints, Floats]:
+def _resting(limits: FrictionSystem, signs: Floats, mobility: Floats, freely: Floats) -> tuple[Floats, Ints, Floats]:
     """Friction where some contacts rest, nan where there is none, the contact with most of it there, and slack."""
     whole, slack, poses = np.zeros_like(freely), np.ones_like(freely), freely.shape[1]
     jams = np.full(poses, -1)

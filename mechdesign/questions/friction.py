@@ -50,7 +50,7 @@ class Slipping:
         return self.balance.efforts
 
 
-class Friction:
+class JointFriction:
     """Friction in the joints of a mechanism, compiled once."""
 
     def __init__(self, mechanism: Mechanism, joints: Joints) -> None:

@@ -28,7 +28,7 @@ INSET = 1e-6
 FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 
 
-class Edge(NamedTuple):
+class Border(NamedTuple):
     """A curve of a region's boundary: radii and places of shape (rays,), and the margin that is zero on it."""
 
     side: str  # of the patch: ``inner`` or ``outer``
@@ -63,11 +63,13 @@ class Patch:
     piece: int = 1
 
     @property
-    def edges(self) -> list[Edge]:
+    def edges(self) -> list[Border]:
         """Its curves that bound the region: not the centre of the rays, nor the ends of the scan."""
         turn = np.exp(1j * self.theta)
         both = (("inner", self.enters, self.inner), ("outer", self.leaves, self.outer))
-        return [Edge(side, margin, radius, self.about + radius * turn) for side, margin, radius in both if margin >= 0]
+        return [
+            Border(side, margin, radius, self.about + radius * turn) for side, margin, radius in both if margin >= 0
+        ]
 
     @property
     def grid(self) -> Complexes:

@@ -63,7 +63,7 @@ _TEXT = "<study>"
 
 
 @dataclass(frozen=True)
-class Source:
+class StudySource:
     """What a study is read from: its file and text, empty of a mapping, and the folder of the files that it names."""
 
     path: pathlib.Path | None
@@ -131,9 +131,9 @@ class Study:
         return tuple(command for command in COMMANDS if self.sections.get(command) is not None)
 
     @property
-    def source(self) -> Source:
+    def source(self) -> StudySource:
         """What it was read from."""
-        return Source(self.path, self.folder, self.text, self.text_sha256)
+        return StudySource(self.path, self.folder, self.text, self.text_sha256)
 
     @property
     def barred(self) -> tuple[str, ...]:
@@ -244,7 +244,7 @@ def load_data(
     folder. See `load`.
     """
     data = _plain_data(mapping, "the study")
-    source = Source(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
+    source = StudySource(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
     return _load_changed(Document.of(data), source, _texts(overrides), seed, drawn)
 
 
@@ -258,7 +258,7 @@ def load_bytes(
 ) -> Study:
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
-    source = Source(path, folder, content, hashlib.sha256(content).hexdigest())
+    source = StudySource(path, folder, content, hashlib.sha256(content).hexdigest())
     return _load_changed(read(content, str(path or _TEXT)), source, _texts(overrides), seed)
 
 
@@ -269,7 +269,7 @@ def _drawing(document: Document) -> dict[str, Any]:
 
 
 def _load_changed(
-    document: Document, source: Source, changes: tuple[str, ...], seed: int | None,
+    document: Document, source: StudySource, changes: tuple[str, ...], seed: int | None,
     drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
     """Load a study with overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
@@ -279,7 +279,7 @@ def _load_changed(
         return load_document(document, source, changes, seed)
     original = None
     with contextlib.suppress(StudyError):
-        original = load_document(Document.of(plain(drawn)), Source(source.path, source.folder)).mechanism
+        original = load_document(Document.of(plain(drawn)), StudySource(source.path, source.folder)).mechanism
     study = load_document(document, source, changes, seed, original)
     if not isinstance(study.mechanism, Variant):
         return study
@@ -332,7 +332,7 @@ def _plain_data(value: Any, name: str) -> Any:
 @few_comparisons()
 def load_document(
     document: Document,
-    source: Source,
+    source: StudySource,
     changes: tuple[str, ...] = (),
     seed: int | None = None,
     original: Mechanism | None = None,

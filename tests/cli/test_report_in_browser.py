@@ -19,7 +19,7 @@ from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.figures import style
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.headlines import headlines
-from mechdesign.report.page.page import Answered, report
+from mechdesign.report.page.page import AnsweredQuestion, report
 from mechdesign.report.page.printing import pdf
 from mechdesign.report.page.section import section
 from mechdesign.report.page.vector import picture
@@ -74,7 +74,7 @@ def reports(answers, tmp_path_factory):
         assert warnings == ()
         verdicts = requirements(study, result)
         (folder / f"{name}.html").write_bytes(
-            report(study, [Answered(result.command, "done", 0, verdicts=verdicts, section=part)], below=False)
+            report(study, [AnsweredQuestion(result.command, "done", 0, verdicts=verdicts, section=part)], below=False)
         )
     return folder
 
@@ -200,7 +200,7 @@ def test_a_pose_of_another_question_is_a_link_where_the_motion_passes_it(opened,
     sweep = f"kinematics.sweep={{crank: {{from: 0, to: {end}, step: 8}}}}"
     study = load(CONFIGS / "gallery" / "slider_crank_tolerances.yaml", [sweep, "reliability.methods=[analytic]"])
     parts = [section(study, ask(study), {}, "", (), plots=True)[0] for ask in (kinematics, reliability)]
-    told = [Answered(part["command"], "done", 0, section=part) for part in parts]
+    told = [AnsweredQuestion(part["command"], "done", 0, section=part) for part in parts]
     (reports / "both.html").write_bytes(report(study, told, below=True))
     page = opened("both")
     link = page.locator("dl.numbers div", has_text="failure probability").locator("a")

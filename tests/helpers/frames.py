@@ -21,13 +21,13 @@ import numpy as np
 from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.model import Coupling, Fixed, Link, Prismatic
-from mechdesign.questions.stiffness.schema import CouplingStiffness, Profile
+from mechdesign.questions.stiffness.schema import CouplingStiffness, CrossSection
 from mechdesign.study import Study
 
 GROUND = "ground"
 
 
-def stiffnesses(profile: Profile) -> tuple[float, float, float]:
+def stiffnesses(profile: CrossSection) -> tuple[float, float, float]:
     """EA, EI and the shear stiffness of a section, by the formulas of textbooks."""
     if profile.width is not None and profile.height is not None:
         area, inertia, factor = profile.width * profile.height, profile.width * profile.height**3 / 12, 5 / 6

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import gammaincc, ndtr, ndtri
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.reliability.engine.problem import Problem
-from mechdesign.questions.reliability.laws import Measured
+from mechdesign.questions.reliability.engine.problem import LimitStates
+from mechdesign.questions.reliability.laws import MeasuredLaw
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Case:
     exact: float
 
     @property
-    def problem(self) -> Problem:
-        return Problem(self.dimension, self.margins)
+    def problem(self) -> LimitStates:
+        return LimitStates(self.dimension, self.margins)
 
 
 def over_the_normal(function: Callable[[Floats], Floats], low: float = -12, high: float = 12) -> float:
@@ -103,7 +103,7 @@ def ends(beta: float) -> Case:
 def measured(count: int, limit: float) -> Case:
     """The sum of dimensions measured at 100 parts, two of them outliers by 0.1, beyond a limit, by convolution."""
     rng, step = np.random.default_rng(0), 1e-4
-    laws = [Measured.of(np.r_[rng.normal(0, 0.002, 98), rng.normal(0.1, 0.002, 2)], 0.0, 0.0) for _ in range(count)]
+    laws = [MeasuredLaw.of(np.r_[rng.normal(0, 0.002, 98), rng.normal(0.1, 0.002, 2)], 0.0, 0.0) for _ in range(count)]
     grid = step * np.arange(-2000, 2000)
     # Each law in a cell about every node; sums of cells are as far off as half of them on the average.
     below, ranks = grid - 0.5 * step, (np.arange(100) + 0.5) / 100

@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull
 import mechdesign
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plates import gap
-from mechdesign.mechanism.rigidity import Equations, null_space, separated
+from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # Four pins with all six bars between them, on two links of a four-bar; and a link that nothing holds.
@@ -58,9 +58,9 @@ def train(count: int, order: Random) -> Mechanism:
 
 def spoil(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the draws of dimensions the first is useless."""
-    drawn = Equations.drawn
+    drawn = LoopEquations.drawn
     monkeypatch.setattr(
-        Equations, "drawn", lambda self, held, seed: drawn(self, held, seed) * (value if seed == 0 else 1.0)
+        LoopEquations, "drawn", lambda self, held, seed: drawn(self, held, seed) * (value if seed == 0 else 1.0)
     )
 
 

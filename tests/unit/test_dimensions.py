@@ -11,8 +11,8 @@ from helpers.studies import study_of
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.exporting.sheet import BLOCK, PAPERS, Sheet
-from mechdesign.exporting.view import View
+from mechdesign.exporting.sheet import BLOCK, PAPERS, PaperSheet
+from mechdesign.exporting.view import PosedStudy
 from mechdesign.report.figures import style
 from mechdesign.report.figures.dimensions import dimensions_figure, table_rows
 from mechdesign.report.figures.scene import pose
@@ -129,9 +129,9 @@ def test_a_sheet_is_at_a_standard_scale():
         ("units: {length: m}\n" + SHEET, None, 1 / 1000, "1 : 1000"),
         ("units: {length: cm}\n" + SHEET, None, 0.1, "1 : 10"),
     ):
-        view = View(mechdesign.load(text=text), paper=paper)
+        view = PosedStudy(mechdesign.load(text=text), paper=paper)
         scene = pose(view.mechanism, view.pose)
-        sheet = Sheet.of(view, scene, 40.0)
+        sheet = PaperSheet.of(view, scene, 40.0)
         assert (sheet.scale, sheet.words) == (pytest.approx(scale), words)
         with style.context():
             figure = sheet.draw(view, scene, [])

@@ -9,7 +9,7 @@ from helpers.limit_states import Case
 from scipy.special import ndtr
 
 from mechdesign.questions.reliability.engine.design_points import find
-from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, Problem, reached
+from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, LimitStates, reached
 from mechdesign.questions.reliability.methods.form import form
 from mechdesign.questions.reliability.methods.importance_sampling import importance_sampling
 from mechdesign.questions.reliability.schema.section import Precision
@@ -45,12 +45,12 @@ def generator(seed: int) -> np.random.Generator:
     return np.random.Generator(np.random.SFC64(seed))
 
 
-def sampled(problem: Problem, seed: int = 1, most: int = 100_000) -> Estimate:
+def sampled(problem: LimitStates, seed: int = 1, most: int = 100_000) -> Estimate:
     rng = generator(seed)
     return importance_sampling(problem, find(problem, rng), rng, most, PRECISION)
 
 
-def tangents(problem: Problem, seed: int = 1) -> float:
+def tangents(problem: LimitStates, seed: int = 1) -> float:
     return form(problem, find(problem, generator(seed))).failure
 
 
@@ -104,7 +104,7 @@ def test_closed_derivatives_count_as_one_evaluation_each() -> None:
     def gradients(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return case.margins(u), np.repeat(slope[None, :, None], u.shape[1], axis=2)
 
-    closed, differenced = Problem(30, case.margins, gradients), case.problem
+    closed, differenced = LimitStates(30, case.margins, gradients), case.problem
     assert tangents(closed) == pytest.approx(tangents(differenced), rel=1e-6)
     assert closed.evaluations < differenced.evaluations
 
@@ -115,7 +115,7 @@ def test_what_cannot_be_assembled_is_counted_among_the_failures() -> None:
 
 
 def test_nothing_fails() -> None:
-    problem = Problem(3, lambda u: np.ones((2, u.shape[1])))
+    problem = LimitStates(3, lambda u: np.ones((2, u.shape[1])))
     points = find(problem, generator(1))
     assert len(points.u) == 0
     assert form(problem, points).failure == 0.0
@@ -125,20 +125,20 @@ def test_nothing_fails() -> None:
 
 @pytest.mark.parametrize("dead", [-1.0, np.nan])
 def test_everything_fails(dead: float) -> None:
-    problem = Problem(3, lambda u: np.full((1, u.shape[1]), dead))
+    problem = LimitStates(3, lambda u: np.full((1, u.shape[1]), dead))
     found = sampled(problem, most=10_000)
     assert found.failure <= 1.0
     assert found.high == pytest.approx(1.0, abs=0.05)
 
 
 def test_form_does_not_know_what_breaks_a_limit_without_a_design_point() -> None:
-    assert np.isnan(tangents(Problem(3, lambda u: np.full((1, u.shape[1]), -1.0))))
+    assert np.isnan(tangents(LimitStates(3, lambda u: np.full((1, u.shape[1]), -1.0))))
     # Nor where another limit has one.
-    assert np.isnan(tangents(Problem(3, lambda u: np.stack([3.0 - u[0], np.full(u.shape[1], -1.0)]))))
+    assert np.isnan(tangents(LimitStates(3, lambda u: np.stack([3.0 - u[0], np.full(u.shape[1], -1.0)]))))
 
 
 def test_a_band_without_width_is_always_left() -> None:
-    problem = Problem(3, lambda u: np.stack([u[0], -u[0]]))
+    problem = LimitStates(3, lambda u: np.stack([u[0], -u[0]]))
     assert tangents(problem) == pytest.approx(1.0, abs=1e-6)
     assert max(tangents(problem, seed) for seed in range(1, 6)) <= 1.0
     found = sampled(problem, most=10_000)

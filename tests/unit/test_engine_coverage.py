@@ -12,7 +12,7 @@ from mechdesign.questions.reliability.engine.problem import (
     CONFIDENCE,
     WIDTH,
     Estimate,
-    Problem,
+    LimitStates,
     binomial,
     failed,
     weighted,
@@ -50,7 +50,7 @@ def check(intervals: list[tuple[float, float]], exact: float) -> None:
     assert covered >= CONFIDENCE - 4 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / len(intervals))
 
 
-def plain(problem: Problem, seed: int, count: int) -> Estimate:
+def plain(problem: LimitStates, seed: int, count: int) -> Estimate:
     """Plain Monte Carlo; more samples go on with the same ones."""
     broken = int(failed(problem.margins(generator(seed).standard_normal((count, problem.dimension)).T)).sum())
     return Estimate(broken / count, *binomial(broken, count), count, count, broken)

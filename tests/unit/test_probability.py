@@ -190,7 +190,10 @@ def test_a_circle_beside_another_output_is_the_sum_over_the_disc_however_it_is_t
         turned = np.eye(3)
         turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         found, doubt = estimated_failure(
-            turned @ covariance @ turned.T, [Band(2, -limit, limit)], [Disc(0, 1, radius, least)], turned @ mean
+            turned @ covariance @ turned.T,
+            [Band(2, -limit, limit)],
+            [Disc(0, 1, radius, least)],
+            turned @ mean,
         )
         assert found == pytest.approx(1 - kept, rel=1e-8, abs=1e-12)
         assert doubt == 0

@@ -12,7 +12,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.questions.reliability.engine.design_points import DesignPoints
-from mechdesign.questions.reliability.engine.problem import Estimate, Problem
+from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates
 from mechdesign.questions.reliability.methods import normal
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.questions.reliability.schema.section import Precision
@@ -40,7 +40,7 @@ def run(task: Task) -> MethodResult:
 
 
 def rung(
-    problem: Problem, points: DesignPoints, rng: np.random.Generator, most: int, precision: Precision
+    problem: LimitStates, points: DesignPoints, rng: np.random.Generator, most: int, precision: Precision
 ) -> Estimate | None:
     return Estimate(0.5, 0.5, 0.5, problem.evaluations)
 

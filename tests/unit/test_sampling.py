@@ -15,7 +15,7 @@ from mechdesign.questions.reliability.laws import (
     Beta,
     Lognormal,
     Marginal,
-    Measured,
+    MeasuredLaw,
     Normal,
     Triangular,
     TruncatedNormal,
@@ -92,7 +92,7 @@ def test_a_beta_law_is_that_of_scipy() -> None:
 
 def test_measured_values_have_their_mean_and_deviation_and_interpolated_quantiles() -> None:
     values = np.random.default_rng(3).gamma(2.0, 0.1, 25)
-    law = Measured.of(values, 0.0, 10.0)
+    law = MeasuredLaw.of(values, 0.0, 10.0)
     mean, *central = law.moments
     assert (mean, central[0]) == pytest.approx((values.mean(), values.var(ddof=1)), rel=1e-12)
     # Quantiles are straight between the shares of the values, whose middle rule is exact to the cell's square.
@@ -201,14 +201,14 @@ def test_correlations_that_no_laws_have() -> None:
         Correlation.of([Lognormal(-6, 6, 1), Lognormal(-6, 6, 1)], {(0, 1): -0.9})
 
 
-def two_values(low: int, high: int) -> Measured:
-    return Measured.of(np.array([0.0] * low + [1.0] * high), 0.0, 0.0)
+def two_values(low: int, high: int) -> MeasuredLaw:
+    return MeasuredLaw.of(np.array([0.0] * low + [1.0] * high), 0.0, 0.0)
 
 
-def with_outliers(seed: int, count: int) -> Measured:
+def with_outliers(seed: int, count: int) -> MeasuredLaw:
     """Nineteen parts in twenty near 0, the others near 0.1."""
     rng, many = np.random.default_rng(seed), count - count // 20
-    return Measured.of(np.concatenate([rng.normal(0, 0.002, many), rng.normal(0.1, 0.002, count // 20)]), 0.0, 0.0)
+    return MeasuredLaw.of(np.concatenate([rng.normal(0, 0.002, many), rng.normal(0.1, 0.002, count // 20)]), 0.0, 0.0)
 
 
 @pytest.mark.nightly
@@ -220,8 +220,8 @@ def with_outliers(seed: int, count: int) -> Measured:
         (with_outliers(1, 3000), with_outliers(2, 100), 0.9),
         (with_outliers(1, 100), Uniform(-1.0, 1.0), 0.4),
         (
-            Measured.of(np.array([0.0] * 40 + [1.0] * 40), 0.0, 0.0),
-            Measured.of(np.array([0.0] * 70 + [1.0] * 9), 0.0, 0.0),
+            MeasuredLaw.of(np.array([0.0] * 40 + [1.0] * 40), 0.0, 0.0),
+            MeasuredLaw.of(np.array([0.0] * 70 + [1.0] * 9), 0.0, 0.0),
             0.3,
         ),
         (Triangular(0.0, 1.0), with_outliers(2, 100), -0.25),

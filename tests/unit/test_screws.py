@@ -14,7 +14,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.stiffness.bodies import NetworkEdge
 from mechdesign.questions.stiffness.body import ask
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches
-from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge
+from mechdesign.questions.stiffness.elements import Beam, Hinge, SlideElement
 from mechdesign.questions.stiffness.force_method import Twists, load, twists_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import (
@@ -305,12 +305,12 @@ def test_leg_elements_in_order_from_the_base() -> None:
     crank, guide = ask(study_of(SLIDER)).legs
     assert (crank.name, guide.name) == ("crank+rod", "guide")
     assert crank.elements == (Hinge("O", "crank"), upper, Hinge("A"), lower, Hinge("B"))
-    assert [type(element) for element in guide.elements] == [Guide]
+    assert [type(element) for element in guide.elements] == [SlideElement]
     # A rigid drive is no element.
     crank, _ = ask(study_of(SLIDER, "stiffness.actuators={}")).legs
     assert crank.elements[0] == upper
     _, lever = sorted(ask(study_of(SLOTTED)).legs, key=lambda leg: leg.name == "lever")
-    assert [type(element) for element in lever.elements] == [Hinge, Beam, Guide, Hinge]
+    assert [type(element) for element in lever.elements] == [Hinge, Beam, SlideElement, Hinge]
 
 
 def test_a_link_of_several_points_is_one_beam_along_them() -> None:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mechdesign.importing.formats import dxf, linkage, pmks, pmks_desktop, pylinkage, tables
-from mechdesign.importing.sketch import Sketch
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import FileSketch
+from mechdesign.importing.source import ImportedText
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,8 @@ class Format:
     """A format: its name, whether a text is of it, by what the text says, and what reads it."""
 
     name: str
-    recognises: Callable[[Source], bool]
-    read: Callable[[Source], Sketch]
+    recognises: Callable[[ImportedText], bool]
+    read: Callable[[ImportedText], FileSketch]
 
 
 FORMATS = tuple(

@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import GROUND, MOST, Sketch, Slide, number
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import GROUND, MOST, FileSketch, Slide, number
+from mechdesign.importing.source import ImportedText
 
 NAME = "DXF sketch (ASCII)"
 _TOOL = "DXF"
@@ -43,13 +43,13 @@ class _Shape:
         return word in self.layer
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether it begins with a section, or is the binary form, which `read` refuses."""
     head = source.text[:2000].split()
     return source.text.startswith("AutoCAD Binary DXF") or head[:2] == ["0", "SECTION"] or head[:1] == ["999"]
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read a drawing.
 
     Raises
@@ -144,7 +144,7 @@ def _mirrored(kind: str, groups: list[tuple[int, str]]) -> bool:
 class _Drawing:
     """The links and pins that shapes stand for."""
 
-    def __init__(self, sketch: Sketch, shapes: list[_Shape]) -> None:
+    def __init__(self, sketch: FileSketch, shapes: list[_Shape]) -> None:
         self.sketch = sketch
         of_links = [shape for shape in shapes if shape.kind in ("LINE", "LWPOLYLINE", "POLYLINE")]
         self.circles = [shape for shape in shapes if shape.kind in ("CIRCLE", "POINT")]

@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from mechdesign.errors import StudyError
 from mechdesign.importing.names import distinct
-from mechdesign.importing.sketch import GROUND, Drive, Gears, Sketch, number
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import GROUND, FileDrive, FileSketch, Gears, number
+from mechdesign.importing.source import ImportedText
 
 NAME = "Linkage (.linkage2)"
 _TOOL = "Linkage"
@@ -30,12 +30,12 @@ _UNITS = {"Millimeters": ("mm", 24.5 / 96), "Inches": ("in", 1 / 96)}
 _DRAWING = "1"
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether its first element is `linkage2`."""
     return f"<{_ROOT}" in source.text[:2000]
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read a file.
 
     Raises
@@ -99,7 +99,7 @@ def _ids(element: Element, tag: str) -> list[str]:
 
 
 class _Reader:
-    def __init__(self, sketch: Sketch, root: Element, scale: float) -> None:
+    def __init__(self, sketch: FileSketch, root: Element, scale: float) -> None:
         self.sketch, self._root, self._scale = sketch, root, scale
         self._connectors = {c.get("id", ""): c for c in root.findall("connector") if not _drawn(c)}
         # Files may give several links one number, which then stands for the first.
@@ -107,7 +107,7 @@ class _Reader:
         self._points: dict[str, str] = {}
         self._names: dict[str, str] = {}
 
-    def finish(self) -> Sketch:
+    def finish(self) -> FileSketch:
         """Take over all that is not drawn only."""
         drawn = sum(_drawn(part) for part in self._root if part.tag in ("connector", "Link", "element"))
         if drawn:
@@ -157,7 +157,7 @@ class _Reader:
             raise StudyError(f"actuator {name!r} is {length:.6g} long and has a throw of {throw:.6g}")
         speed = math.copysign(2 * throw * abs(cycles) / 60, cycles)
         self.sketch.drives.append(
-            Drive("length", name, speed=speed, span=(low, high), held=_is_true(link, "alwaysmanual"))
+            FileDrive("length", name, speed=speed, span=(low, high), held=_is_true(link, "alwaysmanual"))
         )
 
     def _fasten(self, names: list[str]) -> None:
@@ -225,7 +225,7 @@ class _Reader:
             raise StudyError(f"input {name!r} is no anchor and has one link alone")
         # Positive turns are clockwise.
         speed = -_number(connector, "rpm") * math.pi / 30
-        self.sketch.drives.append(Drive("angle", links[0], base, speed, held=_is_true(connector, "alwaysmanual")))
+        self.sketch.drives.append(FileDrive("angle", links[0], base, speed, held=_is_true(connector, "alwaysmanual")))
 
 
 def _drawn(element: Element) -> bool:

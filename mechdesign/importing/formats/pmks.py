@@ -15,8 +15,8 @@ from urllib.parse import unquote
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean, distinct
-from mechdesign.importing.sketch import GROUND, Drive, Force, Link, Sketch, Slide, number
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import GROUND, FileDrive, FileLink, FileSketch, Force, Slide, number
+from mechdesign.importing.source import ImportedText
 
 NAME = "PMKS+ share address or file"
 _TOOL = "PMKS+"
@@ -36,13 +36,13 @@ _NEWER = "pmks2:"
 _LINEAR = 5.0
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether it is an address of PMKS+, or what follows its question mark, or a file of the first generation."""
     query = _query(source)
     return query.startswith(("j=", _NEWER)) or _is_file(source) or _is_encoded(query)
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read an address or file.
 
     Raises
@@ -63,13 +63,13 @@ def read(source: Source) -> Sketch:
     return sketch
 
 
-def _query(source: Source) -> str:
+def _query(source: ImportedText) -> str:
     text = source.text.strip()
     address = text.partition("?")[2] if "://" in text.partition("?")[0] or text.startswith("?") else text
     return unquote(address)
 
 
-def _is_file(source: Source) -> bool:
+def _is_file(source: ImportedText) -> bool:
     lines = source.text.split("\n", 2)
     return lines[0].strip() == "joints" and len(lines) > 1 and lines[1].startswith("id,x,y")
 
@@ -122,7 +122,7 @@ class _Record:
         return self._fields
 
 
-def _read_encoded(sketch: Sketch, query: str) -> None:
+def _read_encoded(sketch: FileSketch, query: str) -> None:
     body, count = query[:-1], query[-1:]
     if count != _COUNTED[len(body) % 62]:
         raise StudyError("the address is not complete: its last character counts its length; copy it whole")
@@ -148,7 +148,7 @@ def _read_encoded(sketch: Sketch, query: str) -> None:
         if record.flags[:1] not in tuple(_WHOLE + _PARTS):
             raise StudyError(f"the address has a link of the kind {cut(record.flags[:1])!r}, which is not known")
         name, title = record.text(), record.text()
-        link = Link([], mass=record.decimal(), inertia=record.decimal(), center=record.place())
+        link = FileLink([], mass=record.decimal(), inertia=record.decimal(), center=record.place())
         record.text()
         fields = record.rest()
         link.points = fields[: fields.index("")] if "" in fields else fields
@@ -194,7 +194,7 @@ def _tables_of_file(text: str) -> tuple[list[list[str]], list[list[str]], list[l
 
 
 def _read_tables(
-    sketch: Sketch, joints: list[list[str]], links: list[list[str]], forces: list[list[str]], settings: list[str]
+    sketch: FileSketch, joints: list[list[str]], links: list[list[str]], forces: list[list[str]], settings: list[str]
 ) -> None:
     units = {"in": 0, "cm": 1, "m": 2}
     unit = settings[3].strip() if len(settings) > 3 else ""
@@ -214,7 +214,7 @@ def _read_tables(
             None if cell == "Null" else number(cell, f"mass of link {row[0]!r}") for cell in row[2:6]
         )  # fmt: skip
         center = None if x is None or y is None else complex(x, y)
-        link = Link([name for name in row[6].split("|") if name], mass=mass, inertia=inertia, center=center)
+        link = FileLink([name for name in row[6].split("|") if name], mass=mass, inertia=inertia, center=center)
         table.link(row[0], row[0], link, block=row[1] == "P")
     for row in forces:
         _check_length(row, 9, "force")
@@ -238,7 +238,7 @@ def _check_length(row: list[str], least: int, noun: str) -> None:
 # Both.
 
 
-def _use_units(sketch: Sketch, unit: int) -> None:
+def _use_units(sketch: FileSketch, unit: int) -> None:
     if unit not in _UNITS:
         raise StudyError(f"the address has no unit of length with the number {unit}")
     sketch.units, sketch.inertia_unit = _UNITS[unit]
@@ -247,7 +247,7 @@ def _use_units(sketch: Sketch, unit: int) -> None:
 class _Joints:
     """Joints as PMKS+ has them, where a slide is a second joint at the place of a pin, and a block joins the two."""
 
-    def __init__(self, sketch: Sketch) -> None:
+    def __init__(self, sketch: FileSketch) -> None:
         self.sketch = sketch
         self._sliding: dict[str, tuple[float, str, tuple[str, ...]]] = {}
         self._blocks: dict[str, list[str]] = {}
@@ -269,7 +269,7 @@ class _Joints:
         if driven:
             self._driven[name] = speed
 
-    def link(self, name: str, title: str, link: Link, *, block: bool) -> None:
+    def link(self, name: str, title: str, link: FileLink, *, block: bool) -> None:
         """Add a link, by its title if that is one of its own, or a block."""
         if block:
             if any(point not in self.sketch.points for point in link.points):
@@ -300,7 +300,7 @@ class _Joints:
         slides = {name: self._add_slide(name) for name in self._sliding}
         for name, speed in self._driven.items():
             if name in slides:
-                sketch.drives.append(Drive("slide", slides[name], speed=speed or slide))
+                sketch.drives.append(FileDrive("slide", slides[name], speed=speed or slide))
                 continue
             links = sketch.turned_at(name)
             if len(links) < 2:
@@ -308,7 +308,7 @@ class _Joints:
             if len(links) > 2:
                 text = f"the input at {name!r} turns {links[1]!r} from {links[0]!r}, of {len(links)} links"
                 sketch.choices.append(text)
-            sketch.drives.append(Drive("angle", links[1], links[0], speed or turns))
+            sketch.drives.append(FileDrive("angle", links[1], links[0], speed or turns))
         weighed = any(link.mass not in (None, 0.0, 1.0) for link in sketch.links.values())
         sketch.dynamic = bool(sketch.forces) or weighed
         if not sketch.dynamic:

@@ -12,8 +12,8 @@ import re
 from urllib.parse import unquote
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import GROUND, Drive, Sketch, Slide, number
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import GROUND, FileDrive, FileSketch, Slide, number
+from mechdesign.importing.source import ImportedText
 
 NAME = "PMKS (mech=)"
 _TOOL = "PMKS"
@@ -22,12 +22,12 @@ _TYPES = ("R", "P", "RP")
 _GROUND = ("ground", "gnd", "grnd", "0", "1")
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether the text of its joints begins near the start."""
     return _START.search(source.text[:2000]) is not None
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read a text of joints.
 
     Raises
@@ -66,8 +66,8 @@ def read(source: Source) -> Sketch:
     for joint in driven:
         if len(joint.links) < 2:
             raise StudyError(f"{joint.words} is driven and has one link alone")
-        turned = Drive("angle", joint.links[1], joint.links[0])
-        sketch.drives.append(turned if joint.type == "R" else Drive("slide", f"{joint.name}_slide"))
+        turned = FileDrive("angle", joint.links[1], joint.links[0])
+        sketch.drives.append(turned if joint.type == "R" else FileDrive("slide", f"{joint.name}_slide"))
     return sketch
 
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from mechdesign.errors import StudyError, cut
 from mechdesign.importing.names import clean
-from mechdesign.importing.sketch import Drive, Sketch, listed, mapping, number
-from mechdesign.importing.source import Source
+from mechdesign.importing.sketch import FileDrive, FileSketch, listed, mapping, number
+from mechdesign.importing.source import ImportedText
 
 NAME = "pylinkage (JSON)"
 _TOOL = "pylinkage"
@@ -22,7 +22,7 @@ _OLD = ("Static", "Crank", "Revolute", "Pivot", "Fixed", "Prismatic", "Linear")
 _NEW = ("ground", "revolute", "prismatic", "tracker")
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether its joints have the types of pylinkage."""
     data = source.data
     joints = data.get("joints") if isinstance(data, dict) else None
@@ -30,7 +30,7 @@ def recognises(source: Source) -> bool:
     return isinstance(first, dict) and first.get("type") in (*_OLD, *_NEW)
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read a mechanism or a linkage.
 
     Raises
@@ -63,7 +63,7 @@ def _place(raw: Any, meaning: str) -> complex:
     return complex(number(raw[0], meaning), number(raw[1], meaning))
 
 
-def _read_mechanism(sketch: Sketch, joints: list[dict[str, Any]], links: list[dict[str, Any]]) -> None:
+def _read_mechanism(sketch: FileSketch, joints: list[dict[str, Any]], links: list[dict[str, Any]]) -> None:
     trackers, prismatic = [], []
     for joint in joints:
         name, kind = _name(joint.get("id"), "joint"), joint.get("type", "revolute")
@@ -86,7 +86,7 @@ def _read_mechanism(sketch: Sketch, joints: list[dict[str, Any]], links: list[di
         _add_tracker(sketch, joint)
 
 
-def _add_link(sketch: Sketch, link: dict[str, Any]) -> None:
+def _add_link(sketch: FileSketch, link: dict[str, Any]) -> None:
     name, kind = _name(link.get("id"), "link"), link.get("type", "link")
     points = [_name(joint, "joint") for joint in listed(link.get("joints", []), f"the joints of {name!r}")]
     motor = link.get("motor_joint")
@@ -101,10 +101,10 @@ def _add_link(sketch: Sketch, link: dict[str, Any]) -> None:
     arc = f"the arc of {name!r}"
     low, high = number(link.get("arc_start", 0), arc), number(link.get("arc_end", 0), arc)
     span = (low, high) if kind == "arc_driver" else None
-    sketch.drives.append(Drive("angle", name, speed=speed, span=span))
+    sketch.drives.append(FileDrive("angle", name, speed=speed, span=span))
 
 
-def _add_tracker(sketch: Sketch, joint: dict[str, Any]) -> None:
+def _add_tracker(sketch: FileSketch, joint: dict[str, Any]) -> None:
     """A point at a distance and an angle from two joints of a link."""
     name, one, other = joint["id"], str(joint.get("ref_joint1_id")), str(joint.get("ref_joint2_id"))
     links = sketch.links_with(one, other)
@@ -118,7 +118,7 @@ def _add_tracker(sketch: Sketch, joint: dict[str, Any]) -> None:
     sketch.links[links[0]].points.append(name)
 
 
-def _read_linkage(sketch: Sketch, joints: list[dict[str, Any]]) -> None:
+def _read_linkage(sketch: FileSketch, joints: list[dict[str, Any]]) -> None:
     for joint in joints:
         _add_joint(sketch, joint)
     for joint in joints:
@@ -127,7 +127,7 @@ def _read_linkage(sketch: Sketch, joints: list[dict[str, Any]]) -> None:
         if kind == "Crank" and ends:
             sketch.add_link(clean(f"{name}_crank"), [ends[0], name])
             speed = number(joint.get("angle") or 0, f"the angle of {name!r}")
-            sketch.drives.append(Drive("angle", clean(f"{name}_crank"), speed=speed))
+            sketch.drives.append(FileDrive("angle", clean(f"{name}_crank"), speed=speed))
         elif kind == "Fixed" and len(ends) == 2:
             sketch.add_link(clean(f"{name}_plate"), [*ends, name])
         elif kind in ("Revolute", "Pivot"):
@@ -140,7 +140,7 @@ def _read_linkage(sketch: Sketch, joints: list[dict[str, Any]]) -> None:
             raise StudyError(f"joint {name!r} of the kind {cut(repr(kind))} names {len(ends)} others")
 
 
-def _add_joint(sketch: Sketch, joint: dict[str, Any]) -> None:
+def _add_joint(sketch: FileSketch, joint: dict[str, Any]) -> None:
     """A joint, and those without a name of their own by which it is placed."""
     name = _name(joint.get("name"), "joint")
     sketch.add_point(name, joint.get("x"), joint.get("y"), fixed=joint.get("type") == "Static")
@@ -154,7 +154,7 @@ def _inline(end: dict[str, Any]) -> str:
     return str(end.get("name") or f"{end.get('x')}, {end.get('y')}")
 
 
-def _end(sketch: Sketch, raw: Any) -> str:
+def _end(sketch: FileSketch, raw: Any) -> str:
     end = mapping(raw, "reference to a joint")
     name = _inline(end) if end.get("inline") else str(end.get("ref"))
     if name not in sketch.points:

@@ -15,8 +15,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mechdesign.errors import StudyError, cut
-from mechdesign.importing.sketch import Sketch, listed, mapping, number
-from mechdesign.importing.source import JOINTS, LINKS, Source
+from mechdesign.importing.sketch import FileSketch, listed, mapping, number
+from mechdesign.importing.source import JOINTS, LINKS, ImportedText
 
 NAME = "joints.csv and links.csv, or both as JSON"
 _TOOL = "tables of joints and links"
@@ -25,13 +25,13 @@ _BETWEEN = re.compile(r"[\s,;|]+")
 _KEYS = ("name", "x", "y", "ground", "drive", "trace", "slide")
 
 
-def recognises(source: Source) -> bool:
+def recognises(source: ImportedText) -> bool:
     """Whether there are both tables, or JSON with lists of joints and links."""
     data = source.data
     return bool(source.tables) or (isinstance(data, dict) and {"joints", "links"} <= data.keys())
 
 
-def read(source: Source) -> Sketch:
+def read(source: ImportedText) -> FileSketch:
     """Read both tables.
 
     Raises
@@ -79,7 +79,7 @@ def _yes(raw: Any, meaning: str) -> bool:
     return word in (*_YES, "1")
 
 
-def _add_joint(sketch: Sketch, joint: Mapping[str, Any]) -> Iterator[tuple[str, float | None]]:
+def _add_joint(sketch: FileSketch, joint: Mapping[str, Any]) -> Iterator[tuple[str, float | None]]:
     """Add a joint; yields name and speed of a driven one."""
     name = str(joint.get("name", ""))
     fixed = _yes(joint.get("ground"), f"ground of joint {name!r}")

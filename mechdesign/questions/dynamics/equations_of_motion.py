@@ -20,7 +20,7 @@ from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import quiet
-from mechdesign.mechanism.charts import Atlas, Chart, Positions, Sides, regularity
+from mechdesign.mechanism.charts import Chart, Charts, Positions, Sides, regularity
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
@@ -111,7 +111,7 @@ class EquationsOfMotion:
         #: The joint that jammed when rates were computed last.
         self.jams = ""
         self.positions = Positions(mechanism, at, followed)
-        self.atlas = Atlas(self.positions)
+        self.atlas = Charts(self.positions)
         slopes = self.slopes(linear)
         chart, _ = self.atlas.best(slopes, ())
         self.branch = Branch(chart, at, np.zeros(len(self.contacts)), (), (-np.inf, np.inf))

@@ -18,7 +18,7 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.statics import Reaction
 from mechdesign.questions.stiffness.applied import Applied
 from mechdesign.questions.stiffness.bodies import build_bodies
-from mechdesign.questions.stiffness.elements import Coil
+from mechdesign.questions.stiffness.elements import SpringElement
 from mechdesign.questions.stiffness.force_method import load, moments_about, twists_of
 from mechdesign.questions.stiffness.network import Network, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -32,7 +32,7 @@ def chain_network(joints: Joints, mechanism: Mechanism, section: StiffnessSectio
     graph = joints.graph
     base = next(point for body, point in graph.points if body == GROUND)
     bodies = build_bodies(mechanism, GROUND, base, section, [graph.nodes[node] for node in joints.loaded])
-    edges = [edge for edge in bodies.edges if not any(isinstance(element, Coil) for element in edge.elements)]
+    edges = [edge for edge in bodies.edges if not any(isinstance(element, SpringElement) for element in edge.elements)]
     return build_network(replace(bodies, edges=tuple(edges)), whole=True)
 
 

@@ -25,7 +25,7 @@ from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
-from mechdesign.questions.friction import Friction, Slipping
+from mechdesign.questions.friction import JointFriction, Slipping
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
@@ -61,10 +61,10 @@ class ForceQuestion:
         return cls(study, section, section.joints(study.mechanism), moves, tempo)
 
     @cached_property
-    def friction(self) -> Friction | None:
+    def friction(self) -> JointFriction | None:
         """Friction in the joints, if the study gives any."""
         mechanism = self.study.mechanism
-        return Friction(mechanism, self.joints) if mechanism.description.friction else None
+        return JointFriction(mechanism, self.joints) if mechanism.description.friction else None
 
     @property
     def forces(self) -> list[str]:

@@ -15,7 +15,7 @@ from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.cams import Profile, cam_table, cautions, profiles
+from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
 from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
@@ -49,7 +49,7 @@ class _Events:
     along: Along | None
     limits: Sequence[Sequence[Limit]]
     changes: Sequence[Sequence[Change]]
-    cams: Sequence[Profile]
+    cams: Sequence[CamSide]
 
 
 def answers_of(passage: Passage) -> list[Group]:

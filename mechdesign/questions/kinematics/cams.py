@@ -28,7 +28,7 @@ MOST_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class CamSide:
     """One side of a cam of several designs; arrays are of shape (designs, places), lengths and angles of the study."""
 
     cam: Cam
@@ -49,7 +49,7 @@ class Profile:
             yield Caution(kind, message, "cam", row, first)
 
 
-def profiles(study: Study, poses: Poses) -> list[Profile]:
+def profiles(study: Study, poses: Poses) -> list[CamSide]:
     """The profiles of all cams in each design."""
     sides = []
     per_design = poses.count // poses.designs
@@ -73,7 +73,7 @@ def profiles(study: Study, poses: Poses) -> list[Profile]:
             }  # fmt: skip
             columns = {name: whole(values) for name, values in numbers.items()}
             undercut = cam.undercuts(columns["curvature_radius"], cam.roller(configuration))
-            sides.append(Profile(cam, side, coordinates, columns, undercut))
+            sides.append(CamSide(cam, side, coordinates, columns, undercut))
     return sides
 
 
@@ -101,11 +101,11 @@ def beyond_profile(
     return warnings
 
 
-def cam_table(study: Study, sides: Sequence[Profile]) -> Table:
+def cam_table(study: Study, sides: Sequence[CamSide]) -> Table:
     """``cam.csv``: every profile of every design; coordinates of another cam are nan."""
     coordinates = {c.name: c for side in sides for c in (side.cam.followed, side.cam.follower)}
 
-    def column(values: Callable[[Profile], ArrayLike]) -> NDArray[Any]:
+    def column(values: Callable[[CamSide], ArrayLike]) -> NDArray[Any]:
         columns = [np.broadcast_to(values(side), side.undercut.shape) for side in sides]
         return np.concatenate(columns, axis=1).ravel()
 
@@ -118,7 +118,7 @@ def cam_table(study: Study, sides: Sequence[Profile]) -> Table:
     return CAM.table([*CAM.columns(labels, **words), *followed, *CAM.columns(labels, **numbers)])
 
 
-def cautions(study: Study, sides: Sequence[Profile], design: int) -> Iterator[Caution]:
+def cautions(study: Study, sides: Sequence[CamSide], design: int) -> Iterator[Caution]:
     """Warnings of the cams of a design."""
     angle, turn = study.units.label("angle"), study.units.angle_factor
     for side in sides:

@@ -22,7 +22,7 @@ from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
-from mechdesign.questions.friction import Friction
+from mechdesign.questions.friction import JointFriction
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.kinematics.targets import followed, needed
@@ -193,12 +193,12 @@ class MotionQuestion:
         return [*advantages, *(f"{cam.coupling}_curvature_radius" for cam in self.cams), *centres]
 
     @cached_property
-    def friction(self) -> Friction | None:
+    def friction(self) -> JointFriction | None:
         """Friction in the joints under the loads, if the study gives any."""
         mechanism, loads = self.study.mechanism, self.section.loads
         if not loads or not mechanism.description.friction:
             return None
-        return Friction(mechanism, joints_of(mechanism, loads))
+        return JointFriction(mechanism, joints_of(mechanism, loads))
 
     @property
     def rated(self) -> dict[str, Coordinate]:

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.reliability.cheapest import DIGITS, Tolerance
+from mechdesign.questions.reliability.cheapest import DIGITS, Allotment
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study import Study
@@ -15,7 +15,7 @@ from mechdesign.study.text.document import plain
 from mechdesign.study.text.units import kind_of
 
 
-def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
+def allocated_data(study: Study, tolerances: Sequence[Allotment], scales: Floats) -> dict[str, Any]:
     """The study's data with its tolerances times the factors `scales`, shape (tolerances,).
 
     A wildcard is written out, dimension by dimension, unless all its dimensions keep equal tolerances. `allocate` is
@@ -46,7 +46,7 @@ def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats
     return data
 
 
-def _dimension(raw: Any, tolerance: Tolerance, scale: float, study: Study) -> Any:
+def _dimension(raw: Any, tolerance: Allotment, scale: float, study: Study) -> Any:
     size = _number(tolerance.given * scale)
     if isinstance(raw, dict) and raw.get("sigma") is not None:
         return {**raw, "sigma": size}
@@ -61,7 +61,7 @@ def _dimension(raw: Any, tolerance: Tolerance, scale: float, study: Study) -> An
     return {**{key: raw[key] for key in raw if key != "leg"}, "tolerance": new} if isinstance(raw, dict) else new
 
 
-def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:
+def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Allotment, scale: float) -> dict[str, Any]:
     """A clearance with its radius or diameter times a factor, and the tolerance of that in proportion."""
     size = _number(clearance.size * scale)
     new = {**raw, clearance.kind: size}

@@ -41,7 +41,7 @@ _MAX_ROUNDS = 30
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class Allotment:
     """The tolerance of one source, in the study's units; `cost` is None where it is not allocated but held.
 
     `given` is, by `kind`: half the width of a ``tolerance``, a ``sigma``, the standard deviation of ``measured``
@@ -77,7 +77,7 @@ class Tolerance:
         return float(f"{math.floor(size / unit * (1.0 + 1e-7)) * unit:.{DIGITS}g}") / self.given
 
 
-def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
+def tolerances(study: Study, sources: Sources) -> list[Allotment]:
     """Tolerances of all sources, in their order.
 
     Dimensions are allocated; loads and clearances only where `cost` names them. With grades, dimensions without any
@@ -102,12 +102,12 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         possible = bool(grades) or not allowed
         allocated = half > 0 and dimension.kind != "measured" and (scalar.kind != "load" or scalar.name in costs)
         cost = costs.get(scalar.name, Cost()) if allocated and possible else None
-        rows.append(Tolerance(scalar.name, half, 0.5 * (low + high), dimension.kind, scalar.unit or "", cost, grades))
+        rows.append(Allotment(scalar.name, half, 0.5 * (low + high), dimension.kind, scalar.unit or "", cost, grades))
     for pin in sources.pins:
         cost = costs.get(pin.name) if pin.radius > 0 else None
         clearance = section.clearances[pin.name]
         size = float(clearance.radius if clearance.backlash is None else clearance.backlash)
-        rows.append(Tolerance(pin.name, size, 0.0, "clearance", study.units.label(pin.quantity), cost))
+        rows.append(Allotment(pin.name, size, 0.0, "clearance", study.units.label(pin.quantity), cost))
     return rows
 
 
@@ -120,7 +120,7 @@ class ToleranceModel:
 
     task: Task
     aim: Aim
-    tolerances: Sequence[Tolerance]
+    tolerances: Sequence[Allotment]
     free: Ints
     widest: Floats
 

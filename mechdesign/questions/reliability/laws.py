@@ -327,7 +327,7 @@ class Beta(Marginal):
 
 
 @dataclass(frozen=True)
-class Measured(Marginal):
+class MeasuredLaw(Marginal):
     """The empirical law of measured deviations: the k-th smallest of n is the quantile (k - 1/2)/n.
 
     Quantiles between two values are interpolated; no deviation lies beyond the smallest or the largest. The values are
@@ -337,12 +337,12 @@ class Measured(Marginal):
     ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)  # above the smallest
 
     @staticmethod
-    def of(values: Floats, about: Number, nominal: Number) -> Measured:
+    def of(values: Floats, about: Number, nominal: Number) -> MeasuredLaw:
         """The law of the differences between measured values, which are not all the same, and the value `about`."""
         ordered, mean = np.sort(values), float(values.mean())
         ordered = mean + (ordered - mean) * values.std(ddof=1) / math.sqrt(_interpolated(ordered - mean, 2))
         least, most = float(ordered[0]), float(ordered[-1])
-        return Measured(least - about, most - about, nominal, ordered - least)
+        return MeasuredLaw(least - about, most - about, nominal, ordered - least)
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:

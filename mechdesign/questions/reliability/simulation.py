@@ -16,7 +16,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
-from mechdesign.questions.reliability.engine.problem import Estimate, Problem, counted, slopes
+from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
 from mechdesign.questions.reliability.first_order import derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel
 from mechdesign.questions.reliability.question import ReliabilityQuestion
@@ -136,7 +136,7 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
     return errors, valid if forces is None else valid & np.isfinite(errors).all(axis=0)
 
 
-def problem_of(setting: Setting, sources: Sources) -> Problem:
+def problem_of(setting: Setting, sources: Sources) -> LimitStates:
     """Margins of the limits, nan where the mechanism cannot be assembled, with gradients where the model has them."""
     setting = setting.narrowed()
     question = setting.question
@@ -168,8 +168,8 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
     try:
         gradients(np.zeros((len(sources.owners), 1)))
     except MechanismError:
-        return Problem(len(sources.owners), margins, circles=sources.circles)
-    return Problem(len(sources.owners), margins, gradients, sources.circles)
+        return LimitStates(len(sources.owners), margins, circles=sources.circles)
+    return LimitStates(len(sources.owners), margins, gradients, sources.circles)
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:

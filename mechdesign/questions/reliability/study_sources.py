@@ -16,7 +16,7 @@ from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic, play
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
-from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law
+from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw, fit_law
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
@@ -92,7 +92,7 @@ def _law(study: Study, name: str, dimension: Dimension, nominal: Number, factor:
     """The law of a dimension, in the core's units."""
     if dimension.measured is not None:
         values, about = dimension.deviations(nominal / factor, study.folder)
-        return Measured.of(factor * values, factor * about, nominal)
+        return MeasuredLaw.of(factor * values, factor * about, nominal)
     try:
         flaw = dimension.flaw(nominal)
         if not flaw:

@@ -32,7 +32,7 @@ from mechdesign.questions.poses import (
 from mechdesign.questions.stiffness.body import Body, ask, hold, pushes, under_loads
 from mechdesign.questions.stiffness.compliance import Held, put
 from mechdesign.questions.stiffness.effects import Effects, effects_of
-from mechdesign.questions.stiffness.elements import Guide, Hinge
+from mechdesign.questions.stiffness.elements import Hinge, SlideElement
 from mechdesign.questions.stiffness.tables import (
     Springs,
     compliance_table,
@@ -342,5 +342,5 @@ def _without_joint(body: Body) -> list[Caution]:
             "springs",
         )
         for leg in body.legs or ()
-        if not any(isinstance(element, Hinge | Guide) and element.drive is None for element in leg.elements)
+        if not any(isinstance(element, Hinge | SlideElement) and element.drive is None for element in leg.elements)
     ]

@@ -20,7 +20,7 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.bodies import link_of
 from mechdesign.questions.stiffness.elements import BeamLine, Piece, beam_line, piece_freedoms
 from mechdesign.questions.stiffness.network import Network
-from mechdesign.questions.stiffness.schema import Profile
+from mechdesign.questions.stiffness.schema import CrossSection
 
 # Force per length of a beam at places of its line, shape (n,).
 Density = Callable[[Complexes], Vector]
@@ -84,7 +84,7 @@ class Applied:
             self.vertices += [(self.beams[link].a, wrench) for _, wrench in _gauss(case, density, piece)]
 
     def on_beams(
-        self, link: str, piece: Piece, profile: Profile, origin: Complexes
+        self, link: str, piece: Piece, profile: CrossSection, origin: Complexes
     ) -> Iterator[tuple[int, Floats, Floats]]:
         """What acts above the beginning of a piece of beams: the case, the wrench that all of the piece bears, and the
         twist of its end against its beginning by what acts within it, shapes (3, n), about an origin.

@@ -13,7 +13,15 @@ from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.wheels import Engagement
-from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift
+from mechdesign.questions.stiffness.elements import (
+    Beam,
+    Element,
+    Hinge,
+    JointCompliance,
+    Shift,
+    SlideElement,
+    SpringElement,
+)
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
@@ -45,7 +53,7 @@ class NetworkEdge:
 
 
 @dataclass(frozen=True, eq=False)
-class Transmission:
+class BodyCoupling:
     """A coupling between bodies.
 
     Parameters
@@ -83,7 +91,7 @@ class Bodies:
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
     pins: Mapping[str, str]
-    transmissions: tuple[Transmission, ...]
+    transmissions: tuple[BodyCoupling, ...]
 
     @cached_property
     def carrying(self) -> list[NetworkEdge]:
@@ -193,7 +201,7 @@ class _Builder:
         slide = self.mechanism.graph.slides.index(name)
         drives = self.mechanism.description.drives.values()
         drive = next((d.name for d in drives if d.kind != "angle" and d.target == name), None)
-        elements = (*self._freedom(Guide(slide, drive)), *self._bearing(name, base or point, slide))
+        elements = (*self._freedom(SlideElement(slide, drive)), *self._bearing(name, base or point, slide))
         # The beam of a leg's rod begins at the base.
         end = self._vertex(b, point) if base is None else self._node(b, base)
         self.edges.append(NetworkEdge(self._vertex(a, name), end, elements, name, point))
@@ -235,7 +243,7 @@ class _Builder:
 
     def spring(self, spring: Spring, holders: Mapping[str, list[str]]) -> None:
         """Add a spring between two links, or between bodies at its points, about which it turns freely."""
-        coil = Coil(spring, self.mechanism.geometry)
+        coil = SpringElement(spring, self.mechanism.geometry)
         if not self.mechanism.geometry.term(spring.stiffness, {}):
             return
         one, other = spring.between
@@ -263,7 +271,7 @@ class _Builder:
             beam = Beam(link, root, points[seat], section)
             self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, points[seat]))
 
-    def transmissions(self) -> tuple[Transmission, ...]:
+    def transmissions(self) -> tuple[BodyCoupling, ...]:
         """The couplings, each with the vertices on which it acts."""
         mechanism, graph = self.mechanism, self.mechanism.graph
         pairs: list[Engagement] = [*mechanism.meshes, *mechanism.cams]
@@ -276,7 +284,7 @@ class _Builder:
                 seats = {coupling.name: tuple(self._on_link(link, graph.nodes[node]) for link, node in ends)}
             else:
                 seats = {part.name: self._seats(part) for part in leaves(coupling.gap)}
-            transmissions.append(Transmission(coupling, pair, seats))
+            transmissions.append(BodyCoupling(coupling, pair, seats))
         return tuple(transmissions)
 
     def _seats(self, part: Coordinate) -> tuple[str, ...]:
@@ -314,13 +322,13 @@ class _Builder:
             points[name] = tuple(vertices)
         return points
 
-    def _freedom(self, element: Hinge | Guide) -> tuple[Element, ...]:
+    def _freedom(self, element: Hinge | SlideElement) -> tuple[Element, ...]:
         """The freedom of a joint; none if a rigid drive holds it."""
         self.held.add(element.drive)
         return (element,) if element.drive is None or element.drive in self.section.actuators else ()
 
     def _bearing(self, name: str, point: str, slide: int | None, give: float = 1.0) -> tuple[Element, ...]:
-        return (Bearing(name, point, slide, give),) if name in self.section.bearings else ()
+        return (JointCompliance(name, point, slide, give),) if name in self.section.bearings else ()
 
     def _node(self, body: str, point: str) -> str:
         """The vertex of a body at one of its points."""

@@ -23,7 +23,7 @@ from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Wrench, borne
-from mechdesign.questions.stiffness.bodies import Transmission
+from mechdesign.questions.stiffness.bodies import BodyCoupling
 from mechdesign.questions.stiffness.elements import slide_direction
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -70,7 +70,7 @@ def efforts_on(
 
 
 def compliance_of(
-    transmission: Transmission, section: StiffnessSection, configuration: Configuration, length: Value
+    transmission: BodyCoupling, section: StiffnessSection, configuration: Configuration, length: Value
 ) -> Value | None:
     """Compliance of a coupling to its unit effort; None where it is rigid."""
     given = section.couplings.get(transmission.coupling.name)
@@ -86,13 +86,13 @@ def compliance_of(
     return sum(soft) * _unit(transmission, length) ** 2
 
 
-def _unit(transmission: Transmission, length: Value) -> Value:
+def _unit(transmission: BodyCoupling, length: Value) -> Value:
     """The effort that counts as a force of 1: a moment on an angle."""
     return length if transmission.coupling.gap.quantity == "angle" else 1.0
 
 
 def _wrenches(
-    transmission: Transmission, configuration: Configuration, case: int, effort: Value, side: Floats
+    transmission: BodyCoupling, configuration: Configuration, case: int, effort: Value, side: Floats
 ) -> Iterator[tuple[str, Wrench]]:
     """Wrenches on vertices by an effort on the gap of a coupling."""
     pair = transmission.engagement

@@ -19,7 +19,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Link, Spring
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.stiffness.schema import Profile, StiffnessSection
+from mechdesign.questions.stiffness.schema import CrossSection, StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist
 
 # Beams whose distances from a slide differ by less than this fraction of the link's length are equally near: the slide
@@ -38,7 +38,7 @@ class Hinge:
 
 
 @dataclass(frozen=True)
-class Guide:
+class SlideElement:
     """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
 
     slide: int
@@ -63,7 +63,7 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Bearing:
+class JointCompliance:
     """The compliance of a joint itself, `give` times: across its slide, or in all directions at a pin."""
 
     name: str
@@ -73,7 +73,7 @@ class Bearing:
 
 
 @dataclass(frozen=True, eq=False)
-class Coil:
+class SpringElement:
     """A spring of the mechanism: it gives along its line, or where it `turns` about its point.
 
     One of no free length and no preload gives alike in every direction.
@@ -104,7 +104,7 @@ class Coil:
         return not any(self.geometry.term(term, {}) for term in (spring.free, spring.preload, spring.push))
 
 
-Element = Hinge | Guide | Beam | Shift | Bearing | Coil
+Element = Hinge | SlideElement | Beam | Shift | JointCompliance | SpringElement
 
 
 class Piece(NamedTuple):
@@ -212,21 +212,21 @@ def freedoms(
             yield from _beam_freedoms(element, section, configuration, at)
         elif isinstance(element, Shift):
             yield slide_twist(np.full(configuration.shape, element.direction)), None
-        elif isinstance(element, Coil):
+        elif isinstance(element, SpringElement):
             yield from element.freedoms(configuration, at)
-        elif isinstance(element, Bearing):
+        elif isinstance(element, JointCompliance):
             yield from _bearing_freedoms(element, section, configuration, at)
         else:
             twist = (
                 slide_twist(slide_direction(element.slide, configuration))
-                if isinstance(element, Guide)
+                if isinstance(element, SlideElement)
                 else hinge_twist(configuration.point(element.point) - at)
             )
             yield twist, None if element.drive is None else 1 / section.actuators[element.drive]
 
 
 def _bearing_freedoms(
-    bearing: Bearing, section: StiffnessSection, configuration: Configuration, at: Complexes
+    bearing: JointCompliance, section: StiffnessSection, configuration: Configuration, at: Complexes
 ) -> Iterator[tuple[Floats, Value]]:
     """Twists and compliances of a joint's own displacements and rotation."""
     stiffness = section.bearings[bearing.name]
@@ -255,7 +255,7 @@ def _beam_freedoms(
         yield from piece_freedoms(piece, profile, at)
 
 
-def piece_freedoms(piece: Piece, profile: Profile, at: Complexes) -> Iterator[tuple[Floats, Value]]:
+def piece_freedoms(piece: Piece, profile: CrossSection, at: Complexes) -> Iterator[tuple[Floats, Value]]:
     """Twists (3, n) and compliances of a straight piece of beams: stretch, shear, bending."""
     _, middle, along, length = piece
     area, inertia, factor = profile.extent

@@ -22,7 +22,7 @@ from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.bodies import TARGET, Bodies, NetworkEdge, is_pin
-from mechdesign.questions.stiffness.elements import Bearing, Hinge
+from mechdesign.questions.stiffness.elements import Hinge, JointCompliance
 
 # Edges along a path, each with its direction: 1 from `a` to `b`, -1 from `b` to `a`.
 EdgePath = tuple[tuple[int, int], ...]
@@ -70,7 +70,7 @@ class Network(Bodies):
     def pin(self, point: str) -> tuple[str, ...]:
         """Vertices whose mean displacement is that of the elastic pin at a point; none where the pin is rigid."""
         for edge in self.edges:
-            if edge.name == point and any(isinstance(element, Bearing) for element in edge.elements):
+            if edge.name == point and any(isinstance(element, JointCompliance) for element in edge.elements):
                 return (edge.a,) if is_pin(edge.a) else (edge.a, edge.b)
         return ()
 

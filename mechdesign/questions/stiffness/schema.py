@@ -26,7 +26,7 @@ _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
-class Profile(fields.Model):
+class CrossSection(fields.Model):
     """A cross-section: {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}."""
 
     E: fields.PositiveStress
@@ -55,7 +55,7 @@ class Profile(fields.Model):
     """
 
     @model_validator(mode="after")
-    def _one_form(self) -> Profile:
+    def _one_form(self) -> CrossSection:
         if tuple(self.given(*dict.fromkeys(key for form in _FORMS for key in form))) not in _FORMS:
             raise failure(
                 "a section is {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}"
@@ -168,7 +168,7 @@ class StiffnessSection(PoseSection):
     """The point whose stiffness is asked. Without ``link`` a pin that gives is midway between its links; rod.B is its
     end on link rod. Example: P
     """
-    sections: dict[str, Profile] = Field(default_factory=dict)
+    sections: dict[str, CrossSection] = Field(default_factory=dict)
     """Cross-sections by name, for ``elastic``. Example: {beam: {E: 200 GPa, width: 20 mm, height: 40 mm}}"""
     elastic: dict[fields.LinkName, str] = Field(default_factory=dict)
     """Section of each link that bends; other links are rigid. A link is a beam from ``from`` to ``to``, its other

@@ -124,7 +124,7 @@ def constraint_compliance(wrenches: Floats, chain: LegScrews) -> Floats:
     return total
 
 
-class Spring(NamedTuple):
+class EquivalentSpring(NamedTuple):
     """One equivalent spring of a leg in n poses.
 
     Parameters
@@ -142,7 +142,7 @@ class Spring(NamedTuple):
     angle: Floats
 
 
-def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> list[Spring]:
+def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> list[EquivalentSpring]:
     """Springs that hold the body as a leg does: one along a single wrench, two for two wrenches, none for three.
 
     Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
@@ -158,12 +158,12 @@ def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> lis
     sliding = np.hypot(twist[0], twist[1]) > np.abs(twist[2]) * length / RANK
     slides, pins = _parallel_springs(twist, chain), _pin_springs(twist, chain)
     return [
-        Spring(*(np.where(sliding, a, b) for a, b in zip(slide, pin, strict=True)))
+        EquivalentSpring(*(np.where(sliding, a, b) for a, b in zip(slide, pin, strict=True)))
         for slide, pin in zip(slides, pins, strict=True)
     ]
 
 
-def _single(wrench: Floats, chain: LegScrews, length: Value) -> Spring:
+def _single(wrench: Floats, chain: LegScrews, length: Value) -> EquivalentSpring:
     """The spring along one wrench (3, n): linear, or rotational where the wrench is a pure moment."""
     compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
     force = vector(wrench[0], wrench[1])
@@ -174,12 +174,12 @@ def _single(wrench: Floats, chain: LegScrews, length: Value) -> Spring:
     with np.errstate(divide="ignore", invalid="ignore"):
         foot = chain.tip - 1j * force * about_tip / size**2
         stiffness = norm**2 / compliance
-    return Spring(
+    return EquivalentSpring(
         stiffness, np.where(turning, chain.tip, foot), np.where(turning, np.nan, np.mod(np.angle(force), np.pi))
     )
 
 
-def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
+def _parallel_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:
     """The two springs of wrenches that are reciprocal to the slide `twist`, shape (3, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         along = vector(twist[0], twist[1])
@@ -201,7 +201,7 @@ def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
             stiffness = np.where(total > 4 * RIGID * c11, 1 / total, np.inf)
             force, moment = 1 / c11, 1 / c22
             springs.append(
-                Spring(
+                EquivalentSpring(
                     np.where(apart, stiffness, force if sign > 0 else moment),
                     np.where(apart, chain.tip + sign * arm * along, chain.tip),
                     np.where(apart, angle, angle if sign > 0 else np.nan),
@@ -210,13 +210,13 @@ def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
     return springs
 
 
-def _pin_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
+def _pin_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:
     """The two springs of wrenches that are reciprocal to the hinge `twist`, shape (3, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place = vector(-twist[1] / twist[2], twist[0] / twist[2])
         basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
         low, high, angle = principal(np.moveaxis(constraint_compliance(basis, chain), 2, 0))
-    return [Spring(high, place, angle), Spring(low, place, np.mod(angle + np.pi / 2, np.pi))]
+    return [EquivalentSpring(high, place, angle), EquivalentSpring(low, place, np.mod(angle + np.pi / 2, np.pi))]
 
 
 def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:

@@ -17,7 +17,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
-from mechdesign.questions.stiffness.schema import Profile
+from mechdesign.questions.stiffness.schema import CrossSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, framed
@@ -287,7 +287,7 @@ def _section(study: Study, link: str) -> str:
     return f"{name}{_size(stiffness.sections[name])}" if stiffness is not None and name is not None else ""
 
 
-def _size(profile: Profile) -> str:
+def _size(profile: CrossSection) -> str:
     if profile.diameter is not None:
         inner = f" / {profile.inner_diameter:g}" if profile.inner_diameter is not None else ""
         return f" \N{DIAMETER SIGN}{profile.diameter:g}{inner}"

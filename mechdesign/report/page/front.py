@@ -25,9 +25,9 @@ from mechdesign.questions.optimize.variables import parted
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.scene import Sweep, pose
 from mechdesign.report.page.frames import near_the_paths, paths_of
-from mechdesign.report.page.linkage import Sheet, Sketcher, add
+from mechdesign.report.page.linkage import Canvas, Sketcher, add
 from mechdesign.report.page.moving import gaps
-from mechdesign.report.page.tracks import TIMES, Cell, Moving, Numbers, deltas, places
+from mechdesign.report.page.tracks import TIMES, Cell, MovingPicture, ShownNumbers, deltas, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.report.tables import json_text
 from mechdesign.results import Column, Table
@@ -45,7 +45,7 @@ _CLOUD = 200  # more dots than this are drawn as an image
 Entry = tuple[str, list[Cell | None]]
 
 
-def front(drawn: Designs, table: Table, name: str) -> Moving | None:
+def front(drawn: Designs, table: Table, name: str) -> MovingPicture | None:
     """The designs of a front, each of which moves when it is chosen; use inside `style.context`.
 
     None where the study has no motion in which they can be drawn.
@@ -64,7 +64,7 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     sweeps = {row: sweep for row, sweep in _sweeps(drawn, table, order) if len(sweep.valid) > 1}
     if not sweeps:
         return None
-    sheet = Sheet.around(np.concatenate([sweep.extent for sweep in sweeps.values()]))
+    sheet = Canvas.around(np.concatenate([sweep.extent for sweep in sweeps.values()]))
     fitting = _fitting(sheet, [(row, sweeps[row]) for row in order.tolist() if row in sweeps])
     # Along the first goal, as the front runs.
     rows = np.array(sorted(fitting, key=lambda row: (table[drawn.goals[0].name][row], row)))
@@ -81,10 +81,10 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     data = {"poses": len(rows), "first": knee, "choices": choices, "given": fields, "keys": [fields],
             "numbers": numbers.tracks, "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
     drawing = _drawing(sheet, sweeps[int(rows[knee])])
-    return Moving(drawing, beside, data, choices[knee]["title"], ["value"], entries, {}, ["pareto"])
+    return MovingPicture(drawing, beside, data, choices[knee]["title"], ["value"], entries, {}, ["pareto"])
 
 
-def _fitting(sheet: Sheet, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:
+def _fitting(sheet: Canvas, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:
     """The first designs, by their rows, as the script draws them: as many as fit into the budget, and always one."""
     choices: dict[int, dict[str, Any]] = {}
     size, alike = 0, None
@@ -104,7 +104,7 @@ def _named(drawn: Designs, table: Table, row: int, mark: str) -> dict[str, Any]:
     return {"title": title, "number": row + 1, "mark": mark}
 
 
-def _drawing(sheet: Sheet, sweep: Sweep) -> str:
+def _drawing(sheet: Canvas, sweep: Sweep) -> str:
     """The drawing in which the script changes the design; the names of the points stay."""
     root = sheet.root("the mechanism of a design of the front")
     _draw(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
@@ -169,14 +169,14 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     return sweeps
 
 
-def _choice(sheet: Sheet, sweep: Sweep, alike: Numbers | None) -> tuple[dict[str, Any], Numbers]:
+def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[dict[str, Any], ShownNumbers]:
     """A design as the script draws it, and the numbers that say its poses; those of all have as many decimals."""
     layer = Element("g")
     _draw(layer, sheet, sweep)
     study, poses = sweep.study, sweep.poses
     columns = [Column(name, np.asarray(values), study.units.label(study.mechanism.quantity(name)))
                for name, values in poses.values.items()]  # fmt: skip
-    numbers = Numbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), alike)
+    numbers = ShownNumbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), alike)
     fields = [[column.name, numbers.cell(column).unit, numbers.add(column)] for column in columns]
     assert poses.rows is not None
     share = (poses.rows - poses.rows[0]) / (poses.rows[-1] - poses.rows[0])
@@ -187,7 +187,7 @@ def _choice(sheet: Sheet, sweep: Sweep, alike: Numbers | None) -> tuple[dict[str
     } | places(sheet, sweep.configuration, sweep.mechanism.description.links), numbers  # fmt: skip
 
 
-def _draw(layer: Element, sheet: Sheet, sweep: Sweep) -> None:
+def _draw(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     """A design in its first valid pose, and the paths of its points."""
     scene = pose(sweep.mechanism, sweep.configuration, int(sweep.valid[0]))
     assert scene is not None
@@ -197,12 +197,12 @@ def _draw(layer: Element, sheet: Sheet, sweep: Sweep) -> None:
     sketcher.draw()
 
 
-def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[Numbers, list[Entry], list[list[Any]]]:
+def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
     """Variables and goals of the designs of a page: their numbers, a row each, and how the script names them."""
     names = [*drawn.variables, *(goal.name for goal in drawn.goals if goal.name not in drawn.variables)]
     columns = [table.column(name) for name in names if table.column(name).numeric]
     columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in columns]
-    numbers = Numbers(Table("front", tuple(columns)), rows, begin)
+    numbers = ShownNumbers(Table("front", tuple(columns)), rows, begin)
     entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
     fields = []
     for column in columns:

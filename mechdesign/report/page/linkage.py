@@ -40,7 +40,7 @@ _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
 
 @dataclass(frozen=True)
-class Sheet:
+class Canvas:
     """Where a drawing lies: units of the drawing per length of the study, and the place of its upper left corner."""
 
     corner: complex
@@ -49,7 +49,7 @@ class Sheet:
     height: float
 
     @classmethod
-    def around(cls, places: Complexes) -> Sheet:
+    def around(cls, places: Complexes) -> Canvas:
         """A sheet that shows all of these places."""
         window = fit(places, WIDTH / _POINTS, MAX_HEIGHT / _POINTS, _PAD / _POINTS)
         scale, height = window.scale * _POINTS, window.height * _POINTS
@@ -83,7 +83,7 @@ class Sheet:
 class Sketcher:
     """Draws a pose of a mechanism into an SVG element."""
 
-    def __init__(self, root: Element, sheet: Sheet, mechanism: Mechanism, scene: Scene, travel: Travel) -> None:
+    def __init__(self, root: Element, sheet: Canvas, mechanism: Mechanism, scene: Scene, travel: Travel) -> None:
         self.root, self.sheet, self.scene, self.travel = root, sheet, scene, travel
         self.colors = shapes.link_colors(mechanism)
 

@@ -26,9 +26,19 @@ from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.axes import box
 from mechdesign.report.page.frames import frames, largest
-from mechdesign.report.page.linkage import Sheet, Sketcher
+from mechdesign.report.page.linkage import Canvas, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import PLACES, ROWS, TIMES, Cell, Moving, Numbers, deltas, meanings, places
+from mechdesign.report.page.tracks import (
+    PLACES,
+    ROWS,
+    TIMES,
+    Cell,
+    MovingPicture,
+    ShownNumbers,
+    deltas,
+    meanings,
+    places,
+)
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Poses, Study
@@ -63,7 +73,7 @@ _RATES = ("velocity", "acceleration")
 
 def moving(
     study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False
-) -> Moving | None:  # fmt: skip
+) -> MovingPicture | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
@@ -92,7 +102,7 @@ def _motion(
     marked: Sequence[float],
     *,
     plain: bool,
-) -> Moving | None:
+) -> MovingPicture | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(drawn.shown)
     sweep, motion, table = frames(drawn, result.tables[drawn.name], marked)
@@ -103,8 +113,8 @@ def _motion(
     scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
     # Guides reach farther than points.
     ends = [end for scene in scenes for guide in scene.guides for end in guide.ends(whole.travel, scene.span)]
-    sheet = Sheet.around(np.append(whole.extent, ends))
-    numbers = Numbers(table, sweep.rows, begin)
+    sheet = Canvas.around(np.append(whole.extent, ends))
+    numbers = ShownNumbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
@@ -136,10 +146,10 @@ def _motion(
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), plain=plain)
     replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
-    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
+    return MovingPicture(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
-def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str, *, plain: bool) -> str:
+def _drawing(study: Study, whole: Sweep, sheet: Canvas, scenes: Sequence[Scene], words: str, *, plain: bool) -> str:
     """The first of some valid poses, with the paths of the points."""
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
@@ -161,7 +171,7 @@ def gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
     return [(begin, end - 1, _WHY[Reason.of(int(reason[begin]))]) for begin, end in runs if reason[begin]]
 
 
-def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:
+def _rows(table: Table, numbers: ShownNumbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:
     """Numbers of a table: a row each output, with its rates beside it, and the speed of points."""
     columns = {column.name: column for column in table.columns if column.values.dtype.kind == "f"}
     columns.pop("conditioning", None)
@@ -236,7 +246,7 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
     return np.where(finite, times, np.nanmedian(times))
 
 
-def _arrows(drawn: DrawnPoses, motion: Motion, sweep: Sweep, sheet: Sheet) -> list[dict[str, Any]]:
+def _arrows(drawn: DrawnPoses, motion: Motion, sweep: Sweep, sheet: Canvas) -> list[dict[str, Any]]:
     """Vectors at the poses as arrows of the drawing: of each unit a round length, and a layer for each kind."""
     vectors = list(drawn.vectors(motion, sweep))
     groups = []
@@ -260,7 +270,7 @@ def _track(places: Complexes) -> list[str]:
     return [deltas(places.real, PLACES), deltas(places.imag, PLACES)]
 
 
-def _dots(figure: Figure, table: Table, numbers: Numbers) -> list[list[Any]]:
+def _dots(figure: Figure, table: Table, numbers: ShownNumbers) -> list[list[Any]]:
     """Dots on the curves at the pose: panel, number, slope and place at 0 of its height, colour."""
     dots: list[list[Any]] = []
     for panel, axes in enumerate(figure.axes):

@@ -52,7 +52,7 @@ _Number = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Answered:
+class AnsweredQuestion:
     """The outcome of one question."""
 
     command: str
@@ -64,7 +64,7 @@ class Answered:
 
 
 @dataclass(frozen=True)
-class Entry:
+class IndexEntry:
     """A study in an index."""
 
     name: str
@@ -90,7 +90,7 @@ class Entry:
         return (2, "met") if self.required else (3, "nothing required")
 
 
-def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: bool = True) -> bytes:
+def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, plots: bool = True) -> bytes:
     """The page of a study.
 
     Parameters
@@ -181,7 +181,7 @@ def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, 
     return first, {command: [*own[taken[command] :]] for command, own in numbers.items()}
 
 
-def index(entries: Sequence[Entry]) -> bytes:
+def index(entries: Sequence[IndexEntry]) -> bytes:
     """The page of several studies, a row each: first those that will not do, then by their names."""
     entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
     return _page("index.html.j2", entries=entries, version=installed("mechdesign"))
@@ -253,7 +253,7 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, Any]]:
+def _requirements(study: Study, answers: Iterable[AnsweredQuestion]) -> list[dict[str, Any]]:
     """The requirements of the questions that were asked, in the order of the study, each with its verdict.
 
     Those on warnings come after the others, and those of its cases, where they were asked, last.

@@ -25,8 +25,8 @@ from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
-from mechdesign.report.page.linkage import Sheet, Sketcher, add, dashed
-from mechdesign.report.page.tracks import Map, Moving, Numbers, meanings, places
+from mechdesign.report.page.linkage import Canvas, Sketcher, add, dashed
+from mechdesign.report.page.tracks import Map, MovingPicture, ShownNumbers, meanings, places
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
@@ -43,7 +43,7 @@ _OPAQUE = 128  # opacity from which on a pixel belongs to the map
 _AROUND = 6.0  # left free around a region in a small map
 
 
-def roaming(study: Study, result: Result, name: str) -> Moving | None:
+def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
     """The mechanism in its workspace, for each of a few values of held coordinates, with a map of each index.
 
     `name` begins the ids in the drawing.
@@ -56,12 +56,12 @@ def roaming(study: Study, result: Result, name: str) -> Moving | None:
     solved = [_solved(study, region, cells) for region in shown]
     reached = [np.ravel(configuration.point(point)) for _, configuration in solved for point in mechanism.points]
     everywhere = np.concatenate([*(region.places() for region in shown), *reached])
-    sheet = Sheet.around(everywhere[np.isfinite(everywhere)])
+    sheet = Canvas.around(everywhere[np.isfinite(everywhere)])
     choices, drawn, alike = [], [], None
     for region, (rows, configuration) in zip(shown, solved, strict=True):
         table = _table(study, region, rows, configuration)
         begin = int(np.argmax(np.nan_to_num(table["inverse_condition"], nan=-1.0)))
-        numbers = Numbers(table, np.arange(len(rows)), begin, alike)
+        numbers = ShownNumbers(table, np.arange(len(rows)), begin, alike)
         alike = alike or numbers
         entries = [(column.name, [numbers.cell(column)]) for column in table.columns]
         links = mechanism.description.links
@@ -91,7 +91,7 @@ def roaming(study: Study, result: Result, name: str) -> Moving | None:
     words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
     replaces = ("workspace", *indices)
     drawing = tostring(root, encoding="unicode")
-    return Moving(drawing, "", data, words, ["value"], entries, meanings(table), replaces, maps)
+    return MovingPicture(drawing, "", data, words, ["value"], entries, meanings(table), replaces, maps)
 
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
@@ -124,7 +124,7 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
     return Table("poses", tuple(columns))
 
 
-def _maps(layers: Element, sheet: Sheet, region: Region, norms: Mapping[str, BoundaryNorm], name: str) -> list[Map]:
+def _maps(layers: Element, sheet: Canvas, region: Region, norms: Mapping[str, BoundaryNorm], name: str) -> list[Map]:
     """A group for each index with its map over a region, or one of the region alone."""
     places = sheet.all(region.places())
     low, high = _corners(places)
@@ -155,14 +155,14 @@ def _corners(places: Complexes) -> tuple[complex, complex]:
             complex(np.nanmax(places.real), np.nanmax(places.imag)) + room)  # fmt: skip
 
 
-def _region(layer: Element, sheet: Sheet, region: Region) -> None:
+def _region(layer: Element, sheet: Canvas, region: Region) -> None:
     """The region, and faintly what is left out."""
     if region.others is not None:
         _fill(layer, sheet, region.others[0], LEFT_OUT)
     _fill(layer, sheet, region.local, PALE)
 
 
-def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: BoundaryNorm) -> None:
+def _map(layer: Element, sheet: Canvas, region: Region, index: str, norm: BoundaryNorm) -> None:
     """A local index over the region, as a picture of few colours."""
     figure = Figure(figsize=(sheet.width / 72, sheet.height / 72), dpi=_DPI, facecolor="none")
     FigureCanvasAgg(figure)
@@ -186,7 +186,7 @@ def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: Boundar
     add(layer, "image", href=data, width=sheet.width, height=sheet.height, preserveAspectRatio="none")
 
 
-def _boundary(layer: Element, sheet: Sheet, region: Region) -> None:
+def _boundary(layer: Element, sheet: Canvas, region: Region) -> None:
     """The boundary, by what ends the region there."""
     table = region.boundary
     for rows in curves(table):
@@ -194,7 +194,7 @@ def _boundary(layer: Element, sheet: Sheet, region: Region) -> None:
         _look(line, fate(str(table["kind"][rows[0]]), str(table["at"][rows[0]])))
 
 
-def _fill(layer: Element, sheet: Sheet, local: Table, color: str) -> None:
+def _fill(layer: Element, sheet: Canvas, local: Table, color: str) -> None:
     for x, y, _ in grids(local, "det_J"):
         z = x + 1j * y
         edge = np.concatenate([z[:, 0], z[::-1, -1]])
@@ -207,7 +207,7 @@ def _look(line: Element, kind: str) -> None:
     dashed(line, dashes, width)
 
 
-def _legend(root: Element, sheet: Sheet, shown: Sequence[Region], maps: Sequence[tuple[Column, BoundaryNorm]]) -> None:
+def _legend(root: Element, sheet: Canvas, shown: Sequence[Region], maps: Sequence[tuple[Column, BoundaryNorm]]) -> None:
     """Below the drawing what ends the regions, and what the colours of each map mean; the first is seen."""
     fates = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip

@@ -17,7 +17,7 @@ from mechdesign.report.page.cases import gates, telling_rows
 from mechdesign.report.page.front import front
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import Moving
+from mechdesign.report.page.tracks import MovingPicture
 from mechdesign.report.requirements import DrawnCases
 from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result, Table
@@ -77,7 +77,7 @@ def section(
     }, warnings
 
 
-def _moving(study: Study, result: Result, before: Before | None, marked: Sequence[float]) -> Moving | None:
+def _moving(study: Study, result: Result, before: Before | None, marked: Sequence[float]) -> MovingPicture | None:
     """The mechanism of a result moving; of a front any of its designs, where these have a motion."""
     part = None
     if isinstance(result.drawn, DrawnDesigns) and "pareto" in result.tables:

@@ -14,7 +14,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Link
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.page.linkage import Sheet
+from mechdesign.report.page.linkage import Canvas
 from mechdesign.results import Column, Table
 
 # Integers in a unit of a drawing, and in a degree.
@@ -54,7 +54,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Moving:
+class MovingPicture:
     """A mechanism that moves in a page."""
 
     drawing: str  # inline SVG in one pose: what is seen without script and in print
@@ -68,13 +68,13 @@ class Moving:
     maps: Sequence[tuple[str, Sequence[Map]]] = ()  # maps to choose from, by what the orientation is
 
 
-class Numbers:
+class ShownNumbers:
     """Columns as integers in units of their last shown decimal, and the text of each in the pose that is drawn.
 
     Those of further poses have as many decimals as `alike`, and the same units.
     """
 
-    def __init__(self, table: Table, rows: Ints, begin: int, alike: Numbers | None = None) -> None:
+    def __init__(self, table: Table, rows: Ints, begin: int, alike: ShownNumbers | None = None) -> None:
         self.rows, self.begin, self.alike = rows, begin, alike
         self.sizes: dict[str, float] = {}
         for column in table.columns:
@@ -157,7 +157,7 @@ def steps(text: str, count: int) -> Floats:
 
 
 def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """A `Moving` as plain data with the arrows and the numbers of another that moves along the same motion.
+    """A `MovingPicture` as plain data with the arrows and the numbers of another that moves along the same motion.
 
     These are taken straight between the poses of the other.
     """
@@ -213,7 +213,7 @@ def _letters(number: int) -> str:
     return letters + _LETTERS[number]
 
 
-def places(sheet: Sheet, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:
+def places(sheet: Canvas, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:
     """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
     valid = configuration.valid
     tracks: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,

@@ -17,7 +17,7 @@ from mechdesign.errors import StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, Mark, dotted, has, read, value_at
+from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, TextPlace, dotted, has, read, value_at
 from mechdesign.study.text.forms import Generator, name_forms
 from mechdesign.study.text.reporter import schema_fields
 
@@ -116,7 +116,7 @@ def _apply(document: Document, text: str, label: str) -> None:
         holder.append(parsed.data)
     else:
         holder[key] = parsed.data
-    mark = Mark(label)
+    mark = TextPlace(label)
     for marks in (document.keys, document.values):
         for old in [place for place in marks if place[: len(path)] == path]:
             del marks[old]
@@ -142,8 +142,8 @@ def _descend(document: Document, segments: list[str], label: str, *, making: boo
             inner = {}
             if making:
                 data[key] = inner
-                document.keys.setdefault(tuple(path), Mark(label))
-                document.values[tuple(path)] = Mark(label)
+                document.keys.setdefault(tuple(path), TextPlace(label))
+                document.values[tuple(path)] = TextPlace(label)
                 document.added.add(tuple(path))
         if not isinstance(inner, dict | list):
             raise StudyError(f"{dotted(path)} is neither a mapping nor a list")

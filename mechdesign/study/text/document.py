@@ -42,7 +42,7 @@ _HINTS = {
 }
 
 
-class Mark(NamedTuple):
+class TextPlace(NamedTuple):
     """A place in a text, counted from 1; line 0 where there is no text (an override).
 
     `start` and `end` are those of the value there, in characters of the text from 0.
@@ -72,8 +72,8 @@ class Document:
 
     name: str
     data: Any
-    keys: dict[KeyPath, Mark] = field(default_factory=dict)
-    values: dict[KeyPath, Mark] = field(default_factory=dict)
+    keys: dict[KeyPath, TextPlace] = field(default_factory=dict)
+    values: dict[KeyPath, TextPlace] = field(default_factory=dict)
     # Mistakes after which the rest can be read, and the parts in which further mistakes only follow from them.
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[KeyPath] = field(default_factory=set)
@@ -85,7 +85,7 @@ class Document:
     @classmethod
     def of(cls, data: Any, name: str = "") -> Document:
         """A document of data without a text."""
-        return cls(name, data, values={(): Mark(name)})
+        return cls(name, data, values={(): TextPlace(name)})
 
     def raw(self, path: Sequence[str | int]) -> Any:
         """The data as written at a path, None if there are none."""
@@ -131,11 +131,11 @@ def read(content: bytes, name: str) -> Document:
         Where the bytes are not one YAML document of plain data and reasonable size.
     """
     if len(content) > MAX_BYTES:
-        raise Mark(name).failure(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")
+        raise TextPlace(name).failure(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise Mark(name).failure("is not a text file in UTF-8: not a study file") from None
+        raise TextPlace(name).failure("is not a text file in UTF-8: not a study file") from None
     try:
         _check_events(text, name)
         builder = _Builder(name)
@@ -145,7 +145,7 @@ def read(content: bytes, name: str) -> Document:
         raise _misread(error, name) from None
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
-        raise Mark(name).failure(f"is not a text in YAML: {first}") from None
+        raise TextPlace(name).failure(f"is not a text in YAML: {first}") from None
 
 
 def in_yaml(value: Any) -> str:
@@ -160,8 +160,8 @@ def in_yaml(value: Any) -> str:
 def _misread(error: yaml.MarkedYAMLError, name: str) -> StudyError:
     """What is wrong where a text is not YAML; a brace that is not closed is reported where it opens."""
 
-    def at(mark: Any) -> Mark:
-        return Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
+    def at(mark: Any) -> TextPlace:
+        return TextPlace(name, mark.line + 1, mark.column + 1) if mark else TextPlace(name)
 
     context, problem = str(error.context or ""), str(error.problem or "")
     begin, noticed = error.context_mark or error.problem_mark, error.problem_mark or error.context_mark
@@ -194,15 +194,15 @@ def _check_events(text: str, name: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         _check_depth(depth, here)
     if not documents:
-        raise Mark(name).failure("is empty: nothing to study (`mechdesign new` prints a start)")
+        raise TextPlace(name).failure("is empty: nothing to study (`mechdesign new` prints a start)")
 
 
-def _mark(part: Any, name: str) -> Mark:
+def _mark(part: Any, name: str) -> TextPlace:
     begin = part.start_mark
-    return Mark(name, begin.line + 1, begin.column + 1, begin.index, part.end_mark.index)
+    return TextPlace(name, begin.line + 1, begin.column + 1, begin.index, part.end_mark.index)
 
 
-def _check_depth(depth: int, here: Mark) -> None:
+def _check_depth(depth: int, here: TextPlace) -> None:
     if depth > MAX_DEPTH:
         raise here.failure(f"nested deeper than {MAX_DEPTH} levels; write the section flatter")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.reliability.engine.problem import Problem
+from mechdesign.questions.reliability.engine.problem import LimitStates
 
 # Most steps of the iteration.
 _ITERATIONS = 30
@@ -28,14 +28,14 @@ _LITTLE_GAIN = 0.95
 _DIRECTIONS_APART = 0.5
 
 
-def sizes(problem: Problem) -> Floats:
+def sizes(problem: LimitStates) -> Floats:
     """Magnitudes of the margins at the mean, by which margins are scaled, shape (limits,); 1 where one is 0 or nan."""
     scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
     return np.asarray(np.where((scale > 0) & np.isfinite(scale), scale, 1.0))
 
 
 def descend(
-    problem: Problem, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
+    problem: LimitStates, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
 ) -> tuple[Floats, Floats, Flags]:
     """Step all starts to the nearest point of their limits; directions stay as they are.
 
@@ -114,14 +114,14 @@ def descend(
     return u, normal, good
 
 
-def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
+def _merit(problem: LimitStates, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
     """The merit function that the iteration minimises, shape (n,); infinite where margins are nan."""
     value = problem.margins(u)[limit, np.arange(len(limit))] / scale[limit]
     merit = 0.5 * (u**2).sum(axis=0) + weight * np.abs(value)
     return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
 
 
-def alike(problem: Problem, one: Floats, other: Floats) -> bool:
+def alike(problem: LimitStates, one: Floats, other: Floats) -> bool:
     """Whether two points count as the same."""
     gap = one - other
     if (np.hypot(*gap[problem.circles.T]) > _DIRECTIONS_APART).any():

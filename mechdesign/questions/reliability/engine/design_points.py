@@ -13,7 +13,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.questions.reliability.engine.descent import alike, descend, sizes
-from mechdesign.questions.reliability.engine.problem import Problem, failed
+from mechdesign.questions.reliability.engine.problem import LimitStates, failed
 
 # Standard deviations of the explored samples, among which starts are chosen, and the number of samples of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
@@ -91,7 +91,7 @@ class DesignPoints:
         return np.asarray(self.distance <= self.distance.min(initial=np.inf) + _FARTHEST)
 
 
-def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
+def find(problem: LimitStates, rng: np.random.Generator) -> DesignPoints:
     """Design points of all limits; the search is repeated from failures that lie beyond no tangent so far."""
     d = problem.dimension
     near = problem.draw(rng, _DIRECTED_STARTS if len(problem.circles) else 1, 0.1 / np.sqrt(d))
@@ -127,12 +127,12 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     return points
 
 
-def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
+def _explored(problem: LimitStates, rng: np.random.Generator) -> Floats:
     """The explored samples: points of all spreads."""
     return np.concatenate([problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS], axis=1)
 
 
-def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
+def _exchanged(problem: LimitStates, points: DesignPoints) -> Floats:
     """Failures among design points with two variables exchanged: of parts that are alike either may fail."""
     u = _BEYOND * points.u[points.near]
     first, second = np.triu_indices(problem.dimension, 1)
@@ -149,7 +149,7 @@ def _explained(points: DesignPoints, u: Floats) -> Flags:
     return np.asarray((points.normal @ u >= _NEARLY * points.distance[:, None]).any(axis=0))
 
 
-def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _PointArrays:
+def _ended(problem: LimitStates, ends: Floats, rng: np.random.Generator) -> _PointArrays:
     """Design points on edges where margins end, moved nearer to the mean without a slope."""
     ends = _nearer(problem, ends, rng)
     at = np.where(problem.is_normal[:, None], ends, 0.0)
@@ -159,7 +159,7 @@ def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _PointAr
     return ends, np.full(count, _ANY), normal, np.zeros((count, len(problem.circles), 2))
 
 
-def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
+def _starts(problem: LimitStates, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
     """Starts far apart, shape (dimension, starts), on the rays to samples that fail, and their limits.
 
     The limit is `_ANY` where margins end.
@@ -172,7 +172,7 @@ def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]
     return limit, _edges(problem, limit, np.concatenate(chosen, axis=1))
 
 
-def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
+def _edges(problem: LimitStates, limit: Ints, far: Floats) -> Floats:
     """Points of limits on the rays from the mean to failures `far`, shape (dimension, points); `_ANY` is any limit."""
     low, high = np.zeros(len(limit)), np.ones(len(limit))
     is_normal = problem.is_normal[:, None]
@@ -186,7 +186,7 @@ def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
     return np.where(is_normal, high * far, far)
 
 
-def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
+def _nearer(problem: LimitStates, ends: Floats, rng: np.random.Generator) -> Floats:
     """Points on an edge where margins end, moved nearer to the mean, shape (dimension, ends).
 
     The direction that separates failures from the other points about an edge takes the place of the slope.
@@ -208,7 +208,7 @@ def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
     return ends
 
 
-def _apart(problem: Problem, u: Floats, most: int) -> Floats:
+def _apart(problem: LimitStates, u: Floats, most: int) -> Floats:
     """The nearest point, then each time the one whose direction is farthest from all chosen, up to `most`."""
     if not u.shape[1]:
         return u
@@ -223,7 +223,7 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     return u[:, chosen]
 
 
-def _distinct(problem: Problem, parts: Sequence[_PointArrays], failures: Floats, lost: Ints) -> DesignPoints:
+def _distinct(problem: LimitStates, parts: Sequence[_PointArrays], failures: Floats, lost: Ints) -> DesignPoints:
     """Design points, the nearest first and each once; `lost` are limits that every explored sample breaks."""
     u, normal = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 2))
     limit, pull = (np.concatenate([part[k] for part in parts]) for k in (1, 3))
@@ -243,7 +243,7 @@ def _along(one: Floats, other: Floats) -> bool:
     return bool(one @ other >= _SAME_COSINE * np.linalg.norm(one) * np.linalg.norm(other))
 
 
-def explored_weights(problem: Problem, u: Floats) -> Floats:
+def explored_weights(problem: LimitStates, u: Floats) -> Floats:
     """Density of the law over that of the explored samples, at `u` of shape (dimension, n): shape (n,)."""
     normal = u[problem.normals]
     half, d = 0.5 * (normal * normal).sum(axis=0), len(normal)
@@ -252,7 +252,7 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
     return np.asarray(len(SPREADS) * np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
 
-def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _PointArrays:
+def _worst(problem: LimitStates, limit: Ints, u: Floats, scale: Floats) -> _PointArrays:
     """Descend with fixed directions and turn these towards failure, in turns until they settle.
 
     Arguments are those of `descend`, results those of `DesignPoints`, but `u` and `normal` of shape (dimension,
@@ -285,13 +285,13 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _PointArr
     return points, at, normal, pull
 
 
-def _points(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
+def _points(problem: LimitStates, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
     """Points, limits and normals of the starts that came to their limits."""
     u, normal, good = descend(problem, limit, u, scale)
     return u[:, good], limit[good], normal[:, good]
 
 
-def _turned(problem: Problem, limit: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
+def _turned(problem: LimitStates, limit: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
     """Points with their directions turned against the slope of their limits; margins and slopes before the turn."""
     if not len(problem.circles) or not len(limit):
         return u, np.zeros(len(limit)), np.zeros_like(u)

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.reliability.engine.problem import Problem
+from mechdesign.questions.reliability.engine.problem import LimitStates
 
 # Samples of the law itself, for each dimension, that are added to the samples from which a density is learned.
 _PRIOR_SAMPLES = 0.25
@@ -34,7 +34,7 @@ class Mixture:
         Distance in standard deviations.
     """
 
-    problem: Problem
+    problem: LimitStates
     weight: Floats
     centre: Floats
     root: Floats

@@ -115,7 +115,7 @@ def counted(failures: int, samples: int, invalid: int, evaluations: int) -> Esti
     return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)
 
 
-class Problem:
+class LimitStates:
     """Limit states over `dimension` independent standard normal variables, and how often they were evaluated.
 
     Parameters

@@ -9,7 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.questions.reliability.engine.design_points import DesignPoints, find
-from mechdesign.questions.reliability.engine.problem import Estimate, Problem, needed, reached
+from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, needed, reached
 from mechdesign.questions.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.schema.section import Precision
@@ -24,7 +24,7 @@ FEW = 40_000
 _ENOUGH_FAILURES = 30
 # A method that is tried after plain samples: from the problem, its design points, a generator, the most samples and the
 # precision to an estimate, or None where it does not apply. An estimate without samples is only a check.
-Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
+Rung = Callable[[LimitStates, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
 # Ratio of the nearest ends of two methods' intervals from which on they disagree.
 FACTOR = 1.5
 
@@ -61,7 +61,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
 
 
 def climb(
-    problem: Problem,
+    problem: LimitStates,
     precision: Precision,
     plain: Callable[[int], Estimate],
     rungs: Mapping[str, Rung],

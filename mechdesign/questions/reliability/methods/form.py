@@ -18,7 +18,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.descent import descend, sizes
 from mechdesign.questions.reliability.engine.design_points import DesignPoints, find
 from mechdesign.questions.reliability.engine.mixture import Mixture
-from mechdesign.questions.reliability.engine.problem import Estimate, Problem
+from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates
 from mechdesign.questions.reliability.methods import SEARCH, of_limits
 from mechdesign.questions.reliability.probability import half_spaces
 from mechdesign.questions.reliability.schema.section import Precision
@@ -50,14 +50,14 @@ def _at_pose(task: Task, setting: Setting) -> Estimate:
 
 
 def rung(
-    problem: Problem, points: DesignPoints, rng: np.random.Generator, most: int, precision: Precision
+    problem: LimitStates, points: DesignPoints, rng: np.random.Generator, most: int, precision: Precision
 ) -> Estimate | None:
     """The step of `auto`: a check of importance sampling."""
     # With random directions the check would cost more than the sampling.
     return None if len(problem.circles) else form(problem, points)
 
 
-def form(problem: Problem, points: DesignPoints) -> Estimate:
+def form(problem: LimitStates, points: DesignPoints) -> Estimate:
     """Probability that a point lies beyond any of the tangents.
 
     It is 0 where no design point was found and no sample failed. It is nan where samples failed although no design
@@ -72,7 +72,7 @@ def form(problem: Problem, points: DesignPoints) -> Estimate:
     return Estimate(value, value, value, problem.evaluations)
 
 
-def _mean(problem: Problem, points: DesignPoints) -> float:
+def _mean(problem: LimitStates, points: DesignPoints) -> float:
     """Mean of the tangents' probability over random directions, drawn more often where failures are likely."""
     rng = np.random.Generator(np.random.SFC64(0))
     count, d = len(points.u), len(problem.normals)
@@ -95,7 +95,7 @@ def _mean(problem: Problem, points: DesignPoints) -> float:
     return min(float(np.mean(mixture.worth(u) * _chances(problem, points, u, rng))), 1.0)
 
 
-def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.Generator) -> Floats:
+def _chances(problem: LimitStates, points: DesignPoints, u: Floats, rng: np.random.Generator) -> Floats:
     """Probability of failure by tangents, with the directions that the points `u`, shape (dimension, n), have: (n,)."""
     count, begun = u.shape[1], points.u[:_POINTS_BEGUN]
     limit = points.limit[:_POINTS_BEGUN]

@@ -22,7 +22,7 @@ from mechdesign.questions.reliability.engine.mixture import Mixture
 from mechdesign.questions.reliability.engine.problem import (
     POINTS_TOGETHER,
     Estimate,
-    Problem,
+    LimitStates,
     failed,
     needed,
     reached,
@@ -85,7 +85,7 @@ def _at_pose(task: Task, setting: Setting) -> Estimate:
 
 
 def importance_sampling(
-    problem: Problem,
+    problem: LimitStates,
     points: DesignPoints,
     rng: np.random.Generator,
     samples: int,
@@ -124,7 +124,7 @@ def importance_sampling(
 rung = importance_sampling
 
 
-def _about(problem: Problem, points: DesignPoints) -> Mixture:
+def _about(problem: LimitStates, points: DesignPoints) -> Mixture:
     """Parts about the design points, weighted by the tangents' probabilities, and a part beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
@@ -146,7 +146,7 @@ def _least(normal: Floats) -> float:
     return float(np.sqrt((normal * normal).sum(axis=0).min(initial=np.inf)))
 
 
-def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> tuple[Mixture, float, float]:
+def _learned(problem: LimitStates, points: DesignPoints, rng: np.random.Generator) -> tuple[Mixture, float, float]:
     """The learned mixture joined with the fixed one about the design points, and the mean square and largest weight.
 
     Each round is one step of expectation and maximisation over all failures so far. Mean square and largest weight are
