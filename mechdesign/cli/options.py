@@ -294,14 +294,6 @@ ATOL = _text(
     "in the table.",
     min=0,
 )
-TOLERANCES = _text(
-    Path,
-    "--tolerances",
-    "FILE",
-    "YAML with tolerances of columns by command.table.column, e.g. reliability.*.sigma: {rtol: 0.05}; the last pattern "
-    "that fits counts, --rtol and --atol where none does.",
-)
-OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # Options that make the cases of a sweep.
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
 # Options of every question, and those of single questions.
