@@ -8,7 +8,6 @@ from typing import Any
 
 MAX_JOBS = 512  # threads or processes of one command
 MERGE = "merge"  # the command that puts shards together
-DIVIDED = ("optimize", "reliability", "sweep", "sensitivities")  # commands whose work can be divided into shards
 
 
 @dataclass(frozen=True)

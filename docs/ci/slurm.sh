@@ -1,5 +1,5 @@
 #!/bin/bash
-# One great study on eight nodes of a cluster, and another job that puts the parts together when all are done:
+# The cases of a great sweep on eight nodes of a cluster, and a job that puts the parts together when all are done:
 #   parts=$(sbatch --parsable --array=1-8 slurm.sh) && sbatch --dependency=afterok:$parts slurm.sh merge
 #SBATCH --job-name=mechdesign
 #SBATCH --cpus-per-task=16
@@ -9,6 +9,6 @@ set -euo pipefail
 study=study.yaml
 out=results/study
 if [ "${1:-}" = merge ]; then
-  exec mechdesign merge "$study" --out "$out" --jobs "$SLURM_CPUS_PER_TASK" --junit "$out/report.xml"
+  exec mechdesign merge "$study" --out "$out" --junit "$out/report.xml"
 fi
-exec mechdesign run "$study" --out "$out" --jobs "$SLURM_CPUS_PER_TASK" --shard "$SLURM_ARRAY_TASK_ID/8" --resume
+exec mechdesign sweep "$study" --out "$out" --jobs "$SLURM_CPUS_PER_TASK" --shard "$SLURM_ARRAY_TASK_ID/8" --resume

@@ -281,8 +281,7 @@ _add(
     _compare,
     "compare",
     (
-        given.OLD, given.NEW, given.RTOL, given.ATOL, given.TOLERANCES, given.OUT_DIFFERENCES, given.JUNIT, given.JSON,
-        given.QUIET,
+        given.OLD, given.NEW, given.RTOL, given.ATOL, given.JUNIT, given.JSON, given.QUIET,
     ),
     "Say what moved between two folders of results.",
     "Say what moved between two folders of results, of one command, a study or many: rows are matched by their poses "

@@ -109,19 +109,25 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
     unless `options.fail_fast`. After an interrupt the summary and the JUnit file show what was finished.
     """
     files = study_files(paths)
+    several, part = len(files) > 1, options.part
+    if part is not None:
+        # The results of a study are those of a run without shards, in the same place.
+        files, options = [*part.share(files)], replace(options, shard=None)
     alone = drawing_ahead(options) if len(files) == 1 else nullcontext()
     with LiveTable(quiet=options.quiet) as live_table, alone:
-        record = BatchRecord(options, files, live_table)
+        record = BatchRecord(options, files, live_table, summed=several and part is None)
         try:
-            tasks = _read(files, options, record, only)
-            if not record.stopped:
+            tasks = _read(files, options, record, only, several=several)
+            if tasks and not record.stopped:
                 _answer(tasks, options, record)
         except KeyboardInterrupt:
             record.interrupted = True
     return record.close()
 
 
-def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str]) -> list[Task]:
+def _read(
+    paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str], *, several: bool
+) -> list[Task]:
     """Read and check the studies; only their texts are kept."""
     tasks: list[Task] = []
     inputs: list[Path] = []
@@ -134,7 +140,7 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             study = load_source(origin, options)
             label = study.label
             claim(owners, study)
-            root = folder(study, "", options, several=len(paths) > 1)
+            root = folder(study, "", options, several=several)
             own = _as_in_shards(label, root, options) if options.command == MERGE else options
             if own != options:
                 study = load_source(origin, own)
@@ -167,7 +173,7 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
         return options
     folders = [root, *sorted(child for child in root.glob("*") if child.is_dir())]
     parts = [path for directory in folders for path in shards.files_in(directory)]
-    origins = [shards.head_of(parts[0])["origin"]] if parts else filter(None, map(manifest.read, folders))
+    origins = [shards.origin_of(parts[0])] if parts else filter(None, map(manifest.read, folders))
     for origin in origins:
         changes, seed = origin.get("overrides"), origin.get("seed")
         if isinstance(changes, list) and isinstance(seed, int):
@@ -178,17 +184,15 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
 
 
 def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
-    """Questions of a study with their folders; if its shards are of a single command, that command alone."""
+    """Questions of a study with their folders; where its sweep was divided, that alone."""
     folders = tuple((command, place(root / command, options)) for command in commands)
     if options.command != MERGE:
         return folders
-    if alone := shards.files_in(root):
-        return ((shards.head_of(alone[0])["command"], root),)
+    if shards.files_in(root):
+        return ((SWEEP.name, root),)
     if (done := manifest.read(root)) is not None and done.get("command") in QUESTIONS:
         return ((done["command"], root),)
-    begun = tuple((command, directory) for command, directory in folders if shards.files_in(directory))
-    sharded = {shards.head_of(path)["command"] for _, directory in begun for path in shards.files_in(directory)}
-    return folders if not begun or "run" in sharded else begun
+    return tuple(question for question in folders if shards.files_in(question[1])) or folders
 
 
 def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:
@@ -207,7 +211,7 @@ def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> Non
         if not options.resume:
             _import(tasks, options)
     record.begin(tasks)
-    work = partial(_study, tasks, record.several)
+    work = partial(_study, tasks, record.summed)
     waiting = iter(range(len(tasks)))
     if count == 1:
         for index in waiting:

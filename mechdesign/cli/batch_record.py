@@ -66,10 +66,13 @@ class End:
 class BatchRecord:
     """Collects the outcomes of studies in any order, shows them in that of the studies, and writes the summary."""
 
-    def __init__(self, options: Options, studies: Sequence[Path | None], live_table: LiveTable) -> None:
+    def __init__(
+        self, options: Options, studies: Sequence[Path | None], live_table: LiveTable, *, summed: bool
+    ) -> None:
         self.options = options
         self.live_table = live_table
         self.several = len(studies) > 1
+        self.summed = summed  # whether a summary and an index are written
         self.interrupted = False
         self.stopped = False  # no further question is started
         self._studies = studies
@@ -88,7 +91,7 @@ class BatchRecord:
         """Check that the summary, JUnit and index files replace no others, and none that is `read`."""
         if self.options.junit is not None:
             check_replaceable(self.options.junit, read)
-        for name in [SUMMARY, *[pages.INDEX] * bool(self.options.report)] * self.several:
+        for name in [SUMMARY, *[pages.INDEX] * bool(self.options.report)] * self.summed:
             check_replaceable(self._root / name, read)
 
     def missing(self, number: int, outcome: Outcome) -> None:
@@ -96,7 +99,7 @@ class BatchRecord:
         self._outcomes[number].append(outcome)
         self._left -= 1
         self.stopped |= self.options.fail_fast
-        if self.options.report and self.several:
+        if self.options.report and self.summed:
             from mechdesign.report.page.page import IndexEntry
 
             self._entries[number] = IndexEntry(
@@ -165,7 +168,7 @@ class BatchRecord:
         if options.junit is not None:
             self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode())
         table = summary.summary(outcomes)
-        if self.several and any(outcome.written for outcome in outcomes):
+        if self.summed and any(outcome.written for outcome in outcomes):
             self._file(self._root / SUMMARY, to_csv(table).encode())
         terminal.show(table, as_json=options.json)
         first = self._first_to_open()
@@ -178,7 +181,7 @@ class BatchRecord:
         if len(table) > 1 and failures:
             terminal.say("\n".join([f"failed: {len(failures)} of {counted(len(table), 'question')}", *failures]))
         terminal.suggest(first, quiet=options.quiet or options.json)
-        return max(self._exit_code, *(outcome.exit_code for outcome in outcomes))
+        return max([self._exit_code, *(outcome.exit_code for outcome in outcomes)])
 
     def _first_to_open(self) -> Path | None:
         """Of a single study its report, else the most telling picture; None of several."""

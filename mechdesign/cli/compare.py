@@ -16,14 +16,12 @@ from mechdesign.cli.execution import exit_code
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
-from mechdesign.files import FORMATS, check_writable, digest
-from mechdesign.records import check_replaceable, remove_recorded
-from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.comparison import folders
-from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
+from mechdesign.files import FORMATS, digest
+from mechdesign.records import check_replaceable
+from mechdesign.report import comparison, manifest, requirements, writer
+from mechdesign.report.comparison import Comparison, Difference, Tolerance
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import to_csv
 from mechdesign.results import Result
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
@@ -31,13 +29,10 @@ from mechdesign.work.threads import one_thread
 
 HELP_PAGE = "howto/batch"
 
-# Files in the folder of differences.
-_TABLE = "differences.csv"
-_PICTURE = "differences.png"
-# Changes that are printed as messages, not in the table.
-_SAID = ("verdict", "outcome", "stale")
+# Changes that are told as messages.
+_SAID = ("stale",)
 _SHOWN = 12  # digits of a hash
-_EXACTLY = Tolerances(Tolerance(0.0, 0.0))
+_EXACTLY = Tolerance(0.0, 0.0)
 
 
 def compare(
@@ -45,8 +40,6 @@ def compare(
     new: Path,
     rtol: float,
     atol: float | None,
-    tolerances: Path | None,
-    out: Path | None,
     junit: Path | None,
     *,
     json: bool,
@@ -57,27 +50,16 @@ def compare(
     Raises
     ------
     StudyError
-        If there is nothing to compare, or the tolerances are none.
+        If there is nothing to compare, or a tolerance is none.
     OutputError
         If a file cannot be written.
     """
     if not (math.isfinite(rtol) and math.isfinite(atol or 0)):
         raise StudyError("--rtol and --atol take numbers from 0 on")
-    default = Tolerance(rtol, atol)
-    chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if junit is not None:
         check_replaceable(junit)
-    if out is not None:
-        check_writable(out)
-        check_replaceable(out / _TABLE)
-        check_replaceable(out / _PICTURE)
-    comparison = folders.compare(old, new, chosen)
-    if out is not None:
-        _write(out, comparison)
-    code = _tell(comparison, "compare", junit, as_json=json, quiet=quiet)
-    if out is not None and comparison.moved:
-        terminal.suggest(out / _PICTURE, quiet=quiet or json)
-    return code
+    found = comparison.compare(old, new, Tolerance(rtol, atol))
+    return _tell(found, "compare", junit, as_json=json, quiet=quiet)
 
 
 @one_thread()
@@ -104,7 +86,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     if options.junit is not None:
         check_replaceable(options.junit)
     root = path.parent if path.name == manifest.NAME else path
-    recorded = folders.results(path)
+    recorded = comparison.results(path)
     if not recorded:
         raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
     total, code = Comparison(), 0
@@ -118,7 +100,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             total.differences += [Difference(folder, "", verdict.requirement, "not met") for verdict in unmet]
             code = max(code, exit_code(result.failed, verdicts, result.main))
             _verify(total, folder, root / folder, content, Path(there))
-    total.differences += folders.stale(recorded)
+    total.differences += comparison.stale(recorded)
     return max(code, _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet))
 
 
@@ -149,14 +131,14 @@ def _repeat(
     return result, verdicts
 
 
-def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
+def _verify(total: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
     """Add the differences between the stored and the repeated tables, and between the bytes of all files."""
     # The repeated study contains its overrides.
-    before, after = content | {"overrides": []}, folders.results(there)["."]
-    comparison.notes += [f"{folder}: {note}" for note in folders.notes(before, after)]
-    folders.compare_results(comparison, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
+    before, after = content | {"overrides": []}, comparison.results(there)["."]
+    total.notes += [f"{folder}: {note}" for note in comparison.notes(before, after)]
+    total.add(folder, (kept, before), (there, after), _EXACTLY, illegible=True)
     again, listed = after["files"], content["files"]
-    tables = {difference.table for difference in comparison.differences if difference.folder == folder}
+    tables = {difference.table for difference in total.differences if difference.folder == folder}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
         table = name.removesuffix(".csv")
@@ -166,57 +148,44 @@ def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, 
         digests = {"in the manifest": listed.get(name, ""), "of the file": digest(kept / name)}
         wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in digests.items() if other != expected]
         if wrong and table not in tables:
-            comparison.differences.append(
+            total.differences.append(
                 Difference(folder, table, "", "bytes", old=", ".join(wrong), new=expected[:_SHOWN])
             )
 
 
-def _write(out: Path, comparison: Comparison) -> None:
-    writer.write_file(out / _TABLE, to_csv(comparison.table).encode())
-    if not comparison.moved:
-        # Files of an older comparison are removed.
-        remove_recorded(out / _PICTURE)
-        return
-    from mechdesign.report.comparison.picture import differences_figure
-    from mechdesign.report.figures import style
-
-    with style.context():
-        writer.write_file(out / _PICTURE, style.encoded(differences_figure(comparison.moved)))
-
-
-def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
+def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
     """Show a comparison and return the exit code."""
-    for note in comparison.notes:
+    for note in found.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
-    for difference in comparison.differences:
+    for difference in found.differences:
         if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
-    tables, columns = comparison.compared["tables"], comparison.compared["columns"]
+    tables, columns = found.compared["tables"], found.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
-    terminal.say(f"{command}: {counted(len(comparison.differences), 'difference')} in {compared}", quiet=quiet)
+    terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
     if as_json or not sys.stdout.isatty():
-        terminal.show(comparison.table, as_json=as_json)
+        terminal.show(found.table, as_json=as_json)
     else:
-        terminal.show_lines([str(line) for line in comparison.differences if line.change not in _SAID])
+        terminal.show_lines([str(line) for line in found.differences if line.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(comparison, command).encode())
-    return 1 if comparison.differences else 0
+        writer.write_file(junit, _junit(found, command).encode())
+    return 1 if found.differences else 0
 
 
-def _junit(comparison: Comparison, command: str) -> str:
+def _junit(found: Comparison, command: str) -> str:
     """JUnit XML: a suite for each folder, with a case for each table and one for all other differences."""
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    moved = [(difference.folder, difference.table) for difference in comparison.differences]
-    cases = dict.fromkeys([*comparison.cases, *moved])
+    moved = [(difference.folder, difference.table) for difference in found.differences]
+    cases = dict.fromkeys([*found.cases, *moved])
     for folder in dict.fromkeys(folder for folder, _ in cases):
         suite = TestSuite(folder)
         for table in [name for where, name in cases if where == folder]:
             case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
             wrong = [
                 difference
-                for difference in comparison.differences
+                for difference in found.differences
                 if (difference.folder, difference.table) == (folder, table)
             ]
             if wrong:

@@ -20,7 +20,7 @@ from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.options import PDF, Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
-from mechdesign.commands import DIVIDED, MERGE, SWEEP
+from mechdesign.commands import MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import FORMATS, owned, settle
 from mechdesign.progress import Progress
@@ -38,7 +38,7 @@ from mechdesign.study.loading import StudySource, load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES, leaves, read
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import ahead, shards
-from mechdesign.work.chunks import Divided, divided, worker_count
+from mechdesign.work.chunks import worker_count
 from mechdesign.work.journal import NAME, Journal
 from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
@@ -141,7 +141,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     """
     places.check(command, directory, options, manifest.read_by(study))
     if options.part is not None:
-        return _shard(study, command, directory, options, options.part, progress)
+        return _shard(study, directory, options, options.part, progress)
     begun = time.perf_counter()
     output = extras(command, options)
     before = under = None
@@ -149,26 +149,31 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
-    share, merging = None, options.command == MERGE
+    compute, merging = getattr(mechdesign, command), options.command == MERGE
+    more: dict[str, Any] = {"jobs": options.jobs, "progress": progress}
     if merging and shards.files_in(directory):
-        share = shards.merge(directory, manifest.computed_from(study, command))
+        from mechdesign.experiments.sweep import merged
+
+        compute, more = merged, {"blocks": shards.merge(directory, manifest.computed_from(study, command))}
     elif (options.resume or merging) and (kept := _finished(study, command, directory, output)) is not None:
-        return kept
+        return dataclasses.replace(kept, kept=options.resume)
     elif merging:
-        # A mistake in the study explains the missing shards.
+        # A mistake in the study explains the missing results.
         requirements.foresee(study, [command] if is_long(study, command) else [])
-        raise shards.missing(directory)
+        raise StudyError(
+            f"{directory}: there are no shards and no whole results of this study, seed and options; compute them "
+            "with --shard 1/N to N/N"
+        )
     if is_long(study, command):
         requirements.foresee(study, [command])
-    more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, command, directory, options) if command in RESUMED else None
+    if options.all_modes:
+        more["all_modes"] = True
+    journal = _journal(study, command, directory, options) if command in RESUMED and not merging else None
     if journal is not None:
         more["journal"] = journal
     try:
-        with progress, divided(share):
-            result: Result = getattr(mechdesign, command)(
-                study, seed=options.seed, jobs=options.jobs, progress=progress, **more
-            )
+        with progress:
+            result: Result = compute(study, seed=options.seed, **more)
             if before is not None:
                 under = Before.of(study, result, before, _earlier(before, command, options))
     except Interrupted as interrupt:
@@ -198,34 +203,19 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     )  # fmt: skip
 
 
-def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
-    """Compute one shard of a command and keep it for `merge`; what is not divided is left to `merge`."""
+def _shard(study: Study, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
+    """Compute one shard of a sweep and keep it for `merge`."""
+    from mechdesign.experiments.sweep import shard_of
+
     sentence, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
-    origin = manifest.computed_from(study, command)
+    origin = manifest.computed_from(study, SWEEP.name)
     if options.resume and shards.is_current(directory, origin):
-        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=sentence)
-    if is_long(study, command):
-        requirements.foresee(study, [command])
-    taken = shards.Taken(shard)
-    if command not in DIVIDED:
-        # By this merge knows that it is asked.
-        taken.write(directory, origin, options.command)
-        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
-    try:
-        with progress, divided(taken):
-            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
-    except Divided:
-        pass
-    except Interrupted:
-        # An interrupted shard is not kept.
-        raise KeyboardInterrupt from None
-    except MechdesignError:
-        # `merge` will meet and report the same error.
-        taken.write(directory, origin, options.command)
-        raise
-    taken.write(directory, origin, options.command)
+        return Outcome(study.label, SWEEP.name, directory, 0, 0, kept=True, shard=sentence)
+    with progress:
+        blocks = shard_of(study, shard, seed=options.seed, jobs=options.jobs, progress=progress)
+    shards.write(directory, shard, origin, blocks)
     seconds = time.perf_counter() - begun
-    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=sentence)
+    return Outcome(study.label, SWEEP.name, directory, 0, 0, seconds=seconds, shard=sentence)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:

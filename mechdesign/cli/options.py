@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mechdesign.commands import MAX_JOBS, QUESTIONS
+from mechdesign.commands import MAX_JOBS, QUESTIONS, SWEEP
 from mechdesign.errors import StudyError
 from mechdesign.files import FORMATS, formats_of
 
@@ -157,8 +157,8 @@ SHARD = _text(
     str,
     "--shard",
     "I/N",
-    "Compute only the I-th of N parts of the long computations, I from 1 on, and keep it in the folder of the results; "
-    "`mechdesign merge` puts the parts together.",
+    "Only the I-th of N parts, I from 1 on: of `run` every N-th study, of `sweep` every N-th batch of cases, kept in "
+    "the folder of the results; `mechdesign merge` puts the parts together.",
 )
 JSON = _flag("--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("--quiet", "Say nothing but the results and what went wrong.", "-q")
@@ -294,14 +294,6 @@ ATOL = _text(
     "in the table.",
     min=0,
 )
-TOLERANCES = _text(
-    Path,
-    "--tolerances",
-    "FILE",
-    "YAML with tolerances of columns by command.table.column, e.g. reliability.*.sigma: {rtol: 0.05}; the last pattern "
-    "that fits counts, --rtol and --atol where none does.",
-)
-OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # Options that make the cases of a sweep.
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
 # Options of every question, and those of single questions.
@@ -309,9 +301,9 @@ COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, STRICT, NO_PLOTS, FORM
 OWN = {
     "kinematics": (ANIMATE, ALL_MODES, BEFORE),
     "workspace": (BEFORE,),
-    "optimize": (RESUME_DESIGNS, EXECUTOR, SHARD),
-    "reliability": (EXECUTOR, SHARD),
-    "sensitivities": (EXECUTOR, SHARD),
+    "optimize": (RESUME_DESIGNS, EXECUTOR),
+    "reliability": (EXECUTOR,),
+    "sensitivities": (EXECUTOR,),
 }
 
 
@@ -354,7 +346,7 @@ class Options:
         for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
             if value is not None and self.no_plots:
                 raise StudyError(f"{option} and --no-plots contradict each other")
-        if self.shard is not None and self.report:
+        if self.shard is not None and self.report and self.command == SWEEP.name:
             raise StudyError("--shard and --report contradict each other; merge takes --report")
         if self.report not in (None, HTML, PDF):
             raise StudyError(f"--report takes {PDF} or nothing, not {self.report!r}")

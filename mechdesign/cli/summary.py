@@ -30,7 +30,7 @@ def summary(outcomes: Sequence[Outcome]) -> Table:
     rows = [outcome for outcome in outcomes if outcome.command]
     return SUMMARY.table(SUMMARY.columns(
         {}, study=[outcome.study for outcome in rows], command=[outcome.command for outcome in rows],
-        outcome=[outcome.shard or outcome.word + " (kept)" * outcome.kept for outcome in rows],
+        outcome=[outcome.word + " (kept)" * outcome.kept for outcome in rows],
         exit_code=[outcome.exit_code for outcome in rows], requirements=[
             f"{sum(verdict.met for verdict in outcome.verdicts)}/{len(outcome.verdicts)}" if outcome.verdicts else ""
             for outcome in rows

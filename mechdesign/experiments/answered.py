@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,24 @@ class Answered:
     units: tuple[str, ...]
     warned: Mapping[str, Warned]
     worst: tuple[Worst, ...]
+
+    @classmethod
+    def read(cls, table: Floats, texts: Mapping[str, Any]) -> Answered:
+        """The answers with a table, and what `texts` has kept of the rest."""
+        return cls(
+            table, tuple(texts["reasons"]), tuple(texts["units"]),
+            {kind: Warned(**warned) for kind, warned in texts["warned"].items()},
+            tuple(Worst(**worst | {"verdict": Verdict(**worst["verdict"])}) for worst in texts["worst"]),
+        )  # fmt: skip
+
+    @property
+    def texts(self) -> dict[str, Any]:
+        """All but the table, for JSON."""
+        return {
+            "reasons": self.reasons, "units": self.units,
+            "warned": {kind: asdict(warned) for kind, warned in self.warned.items()},
+            "worst": [asdict(worst) for worst in self.worst],
+        }  # fmt: skip
 
 
 class Sheet:

@@ -22,6 +22,7 @@ from mechdesign.study import Study, forms
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks
+from mechdesign.work.shards import WHOLE, Shard
 
 # Cases in one batch where a case costs far less among many, the largest batch, and the batches that are wanted at
 # least so that every worker has some.
@@ -34,13 +35,14 @@ def seeded(study: Study, seed: int | None) -> Study:
 
 
 def answers(
-    study: Study, cases: Sequence[Changes], results: Sequence[CaseNumber] = (), *, begin: int = 0, jobs: int | None = 1
-) -> Iterator[Answered]:
+    study: Study, cases: Sequence[Changes], results: Sequence[CaseNumber] = (), *, begin: int = 0, jobs: int | None = 1,
+    shard: Shard = WHOLE,
+) -> Iterator[Answered]:  # fmt: skip
     """Verdicts on the requirements and the `results` of the cases of a study, batch by batch.
 
     Each question that they need is asked once for every case, with the study's seed. `Answered.reasons` says why a case
     could not be loaded or answered. A batch has many cases where their questions can be asked of many designs at once,
-    else one. Cases before `begin` are left out.
+    else one. Cases before `begin` are left out, and batches of other shards.
     """
     together = set(commands_of(study, results)) <= batches.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
@@ -49,7 +51,7 @@ def answers(
     # A computation that is resumed has the same batches.
     chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
     answer = Answer(study, tuple(results), cases[0])
-    yield from map_chunks(answer, chunks, jobs, processes=True, travels=True)
+    yield from map_chunks(answer, shard.share(chunks), jobs, processes=True, travels=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError, counted
+from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.columns import SWEEP
@@ -30,6 +31,7 @@ from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit, is_judged, with_entries
 from mechdesign.work.journal import Journal
+from mechdesign.work.shards import Block, Shard
 from mechdesign.work.threads import one_thread
 
 _SECTION = "matrix"
@@ -104,6 +106,31 @@ def sweep(
         if not len(tally):
             raise
         raise Interrupted(_result(study, cases, tally, results)) from None
+    return _result(study, cases, tally, results)
+
+
+@one_thread()
+def shard_of(
+    study: Study, shard: Shard, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL
+) -> list[Block]:
+    """The answers of a shard's batches of cases, for `merged`."""
+    study = seeded(study, seed)
+    cases, results = prepared(study)
+    progress.start(-(-len(cases) // shard.count), "cases")
+    blocks = []
+    for answered in answers(study, cases, results, jobs=jobs, shard=shard):
+        blocks.append((answered.table, json.dumps(answered.texts)))
+        progress.update(len(answered.table))
+    return blocks
+
+
+def merged(study: Study, blocks: Sequence[Block], *, seed: int | None = None) -> Result:
+    """What `sweep` gives, from the blocks of all shards."""
+    study = seeded(study, seed)
+    cases, results = prepared(study)
+    tally = Tally(cases, len(results), len(study.requirements))
+    for table, texts in blocks:
+        tally.add(Answered.read(table, json.loads(texts)))
     return _result(study, cases, tally, results)
 
 

@@ -6,7 +6,7 @@ import json
 import time
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -133,17 +133,13 @@ class Tally:
             self._rows.extend(block.ravel().tolist())
             self._sizes.append(len(block))
             journal.add(key, block, journal.words)
-        self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
-        self._units = state["units"]
-        self.warned = {kind: Warned(**entry) for kind, entry in state["warned"].items()}
-        self.worst = [Worst(**worst | {"verdict": Verdict(**worst["verdict"])}) for worst in state["worst"]]
+        whole = Answered.read(self.table, state)
+        self.reasons = {reason: k for k, reason in enumerate(whole.reasons)}
+        self._units, self.warned, self.worst = [*whole.units], dict(whole.warned), [*whole.worst]
 
     def _state(self) -> Mapping[str, Any]:
-        return {
-            "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units,
-            "warned": {kind: asdict(warned) for kind, warned in self.warned.items()},
-            "worst": [asdict(worst) for worst in self.worst],
-        }  # fmt: skip
+        whole = Answered(self.table, tuple(self.reasons), tuple(self._units), self.warned, tuple(self.worst))
+        return whole.texts | {"sizes": self._sizes}
 
     def _key(self, begin: int, end: int) -> bytes:
         return digest([np.array([begin, end], dtype=float)])

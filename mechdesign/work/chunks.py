@@ -1,7 +1,7 @@
 """Chunks of work on threads, processes or any executor, in order and with bounded memory.
 
 A long computation is a function that can be pickled, with its study and arguments, and a sequence of items: it can run
-on other machines and be divided into shards. Its values do not depend on where they are computed.
+on other machines. Its values do not depend on where they are computed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from contextvars import ContextVar
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from mechdesign.commands import MAX_JOBS
 from mechdesign.work import interrupts
@@ -24,11 +24,8 @@ HELP_PAGE = "reference/commands"
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
-# From the name of a computation, its map and the items, to the values.
-Share = Callable[[str, Callable[[Iterable[Any]], Iterator[Any]], Iterable[Any]], Iterator[Any]]
 
 _pool: ContextVar[Pool | None] = ContextVar("pool of long computations", default=None)
-_division: ContextVar[Share | None] = ContextVar("who computes which chunks", default=None)
 
 
 def worker_count(jobs: int | None) -> int:
@@ -77,8 +74,8 @@ def workers(
         its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
         less need processes. The function, items and values are pickled.
     travels : bool
-        Whether the work is long enough to run on the executor of `on`, where there is one, and to be divided by
-        `divided`. The function, items and values are then pickled.
+        Whether the work is long enough to run on the executor of `on`, where there is one. The function, items and
+        values are then pickled.
 
     Raises
     ------
@@ -86,11 +83,9 @@ def workers(
         If a chunk ends each worker that takes it.
     """
     count = worker_count(jobs)
-    elsewhere, share = (_pool.get(), _division.get()) if travels else (None, None)
-    work = function if share is None else partial(_undivided, function)
+    elsewhere = _pool.get() if travels else None
     with _local(count, processes=processes) if elsewhere is None else nullcontext(elsewhere) as pool:
-        compute = partial(_one_after_another, work) if pool is None else ChunkMap(pool, work)
-        yield compute if share is None else partial(share, _name(function), compute)
+        yield partial(_one_after_another, function) if pool is None else ChunkMap(pool, function)
 
 
 def _local(count: int, *, processes: bool) -> AbstractContextManager[Pool | None]:
@@ -111,7 +106,6 @@ def _one_after_another(function: Callable[[Item], Value], items: Iterable[Item])
 def _settle_in() -> None:
     # Work within a task runs in this worker.
     _pool.set(None)
-    _division.set(None)
     # The parent handles interrupts: it lets the chunks under way finish.
     interrupts.leave_to_parent()
 
@@ -128,47 +122,10 @@ def on(pool: Pool) -> Iterator[None]:
 
 
 @contextmanager
-def divided(share: Share | None) -> Iterator[None]:
-    """Inside, `share` decides which chunks of long computations are computed, from the name, the map and its items."""
-    before = _division.set(share)
-    try:
-        yield
-    finally:
-        _division.reset(before)
-
-
-class Divided(BaseException):
-    """A long computation ends without its values, since other shards compute a part of them."""
-
-
-@contextmanager
-def apart(left: list[Divided]) -> Iterator[None]:
-    """Inside, divided work does not end the computations after it, which do not depend on it; `left` collects it."""
-    try:
-        yield
-    except Divided as error:
-        left.append(error)
-
-
-@contextmanager
 def here() -> Iterator[None]:
-    """Inside, all work runs in this process and is not divided."""
-    pool, division = _pool.set(None), _division.set(None)
+    """Inside, all work runs in this process."""
+    pool = _pool.set(None)
     try:
         yield
     finally:
         _pool.reset(pool)
-        _division.reset(division)
-
-
-def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
-    with here():
-        return function(item)
-
-
-def _name(function: Any) -> str:
-    """Name of a function with its callable arguments, the same in every process."""
-    if isinstance(function, partial):
-        return " ".join(map(_name, (function.func, *filter(callable, function.args))))
-    kind = function if hasattr(function, "__qualname__") else type(function)
-    return f"{kind.__module__}.{kind.__qualname__}"

@@ -309,10 +309,6 @@ SEQUENCES: dict[str, tuple[list[list[str] | str], int, str]] = {
     ),
     "nothing to verify": ([["run", "--verify", "results/bar"]], 2, "no such folder"),
     "nothing to compare": ([["run", "bar.yaml"], ["compare", "results/bar", "results/bra"]], 2, "no such folder"),
-    "a verdict that is another": (
-        [["run", "bar.yaml"], ["run", "bar.yaml", "--out", "other", *UNMET], ["compare", "results/bar", "other"]], 1,
-        "at most 1",
-    ),
     "a junit file of what is not met": (
         [["run", "bar.yaml", "--junit", "junit.xml", *UNMET]], 1, "at most 1: NOT MET, worst 104",
     ),

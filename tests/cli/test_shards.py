@@ -1,18 +1,18 @@
 """One run in parts, and on executors: the same files as without."""
 
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mechdesign
 from mechdesign.work import shards
 from mechdesign.work.shards import FILE, Shard
 
-from .conftest import SLIDER, answer
+from .conftest import SLIDER
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # The second chunk of samples is not whole.
@@ -41,23 +41,16 @@ def test_four_shards_merged_are_one_run(studies, invoke):
     for k in (3, 1, 4, 2):
         told = invoke("run", *names, *common, "--out", "parts", "--shard", f"{k}/4", "--jobs", 1 + k % 2)
         assert told.exit_code == 0
-        assert f"sweep: shard {k}/4 is kept" in told.stderr
-        assert f"optimize: shard {k}/4 is kept in parts/straight_line_synthesis/optimize/shard_{k}_of_4" in told.stderr
-        assert not [*Path("parts").rglob("*.csv")]
-    kept = shards._read(studies / "parts/two_link_arm/reliability/shard_2_of_4" / FILE)[1]
-    # Chunks of samples at three poses, and replicates of Sobol' indices.
-    counts = [len(each.values) for each in pickle.loads(kept).values()]
-    assert len(counts) == 2
-    assert all(counts)
+        # Each study is answered by one shard, whose result is that of the whole run; the fourth has none.
+        for name in names:
+            assert (f"{Path(name).stem}: " in told.stderr) == (name in names[k - 1 : k])
+        assert not Path("parts/summary.csv").exists()
     # The changes and the seed are those of the shards.
-    merged = invoke("merge", *names, "--no-plots", "--out", "parts")
-    assert merged.exit_code == 0
-    assert "two_link_arm: as its shards, with seed=3" in merged.stderr
-    assert content("parts") == content("whole")
-    # A second time there is nothing to do.
-    again = invoke("merge", *names, "--no-plots", "--out", "parts")
-    assert again.exit_code == 0
-    assert "they are whole" in again.stderr
+    for _ in range(2):
+        merged = invoke("merge", *names, "--no-plots", "--out", "parts")
+        assert merged.exit_code == 0
+        assert "two_link_arm: as its shards, with seed=3" in merged.stderr
+        assert content("parts") == content("whole")
 
 
 @pytest.mark.parametrize("made", ["nothing", "results", "shards elsewhere"])
@@ -70,8 +63,9 @@ def test_without_shards_nothing_is_merged_and_nothing_computed(studies, invoke, 
         assert invoke("run", "plain.yaml", "--no-plots", "--out", "parts").exit_code == 0
         (studies / "plain.yaml").write_text(SLIDER)
     elif made == "shards elsewhere":
+        asked = ("--vary", "mechanism.parameters.r=30,40", "--results", "kinematics.B.x.max", "--out", "other")
         for k in (1, 2):
-            assert invoke("run", "plain.yaml", "--no-plots", "--out", "other", "--shard", f"{k}/2").exit_code == 0
+            assert invoke("sweep", "plain.yaml", *asked, "--no-plots", "--shard", f"{k}/2").exit_code == 0
 
     def fail(study, **options):
         raise AssertionError("it was computed")
@@ -84,33 +78,31 @@ def test_without_shards_nothing_is_merged_and_nothing_computed(studies, invoke, 
     assert (content("parts") if Path("parts").exists() else {}) == before
 
 
-def test_what_is_not_divided_is_computed_once_by_the_merge_of_all_shards(studies, invoke, analysis):
+def test_a_run_without_the_studies_of_a_shard_is_not_merged(studies, invoke):
     (studies / "plain.yaml").write_text(SLIDER)
-    asked = ("plain.yaml", "--no-plots", "--out", "parts")
-    computed = []
-    analysis(lambda study, **options: computed.append(study) or answer())
+    (studies / "other.yaml").write_text(SLIDER)
+    asked = ("plain.yaml", "other.yaml", "--no-plots", "--out", "parts")
     assert invoke("run", *asked, "--shard", "1/2").exit_code == 0
     done = invoke("merge", *asked)
-    assert (done.exit_code, "shards are missing: 2/2" in done.stderr, len(computed)) == (2, True, 0)
+    assert done.exit_code == 2
+    assert "parts/other/kinematics: there are no shards and no whole results of this study, seed and" in done.stderr
     assert invoke("run", *asked, "--shard", "2/2").exit_code == 0
-    notes = Path("parts/kinematics/shard_1_of_2/notes.txt")
+    assert invoke("merge", *asked).exit_code == 0
+    # A result of other options is none of this run.
+    (studies / "other.yaml").write_text(SLIDER + "# newer\n")
+    assert invoke("merge", *asked).exit_code == 2
+
+
+def test_merged_shards_of_cases_leave_what_is_not_theirs(studies, invoke):
+    asked = ("offset_slider_crank.yaml", "--no-plots", "--out", "parts")
+    for k in (1, 2):
+        assert invoke("sweep", *asked, "--shard", f"{k}/2").exit_code == 0
+    notes = Path("parts/shard_1_of_2/notes.txt")
     notes.write_text("of the user")
     for _ in range(2):
         assert invoke("merge", *asked).exit_code == 0
-    assert len(computed) == 1
     assert [*Path("parts").rglob("shard_*")] == [notes.parent]
     assert [*notes.parent.iterdir()] == [notes]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", ["two_link_arm", "slider_crank_tolerances"])
-def test_shards_of_one_command(studies, invoke, name):
-    asked = [f"{name}.yaml", *ARM, "--no-plots"]
-    assert invoke("reliability", *asked, "--out", "whole").exit_code == 0
-    for k in (1, 2):
-        assert invoke("reliability", *asked, "--out", "parts", "--shard", f"{k}/2").exit_code == 0
-    assert invoke("merge", *asked, "--out", "parts").exit_code == 0
-    assert content("parts") == content("whole")
 
 
 @pytest.mark.nightly
@@ -125,33 +117,33 @@ def test_shards_of_cases_that_the_command_line_names(studies, invoke):
 
 @pytest.mark.nightly
 def test_shards_that_cannot_be_merged(studies, invoke):
-    asked = ["two_link_arm.yaml", *ARM, "--no-plots", "--out", "parts"]
+    asked = ["offset_slider_crank.yaml", "--no-plots", "--out", "parts"]
     told = invoke("merge", *asked)
     assert told.exit_code == 2
-    assert "parts/reliability: there are no shards; compute them with --shard 1/N to N/N" in told.stderr
+    assert "parts/kinematics: there are no shards and no whole results" in told.stderr
     for k in (1, 3):
-        invoke("run", *asked, "--shard", f"{k}/3")
+        invoke("sweep", *asked, "--shard", f"{k}/3")
     told = invoke("merge", *asked)
     assert told.exit_code == 2
-    assert "parts/reliability: shards are missing: 2/3; compute them, e.g. with --shard 2/3" in told.stderr
-    invoke("run", *asked, "--shard", "2/3", "--seed", 5)
+    assert "parts: shards are missing: 2/3; compute them, e.g. with --shard 2/3" in told.stderr
+    invoke("sweep", *asked, "--shard", "2/3", "--seed", 5)
     told = invoke("merge", *asked)
     assert told.exit_code == 2
-    assert "shard_2_of_3/chunks: is a shard of something else; other than here: seed, study" in told.stderr
-    invoke("run", *asked, "--shard", "2/3")
-    kept = studies / "parts/reliability/shard_2_of_3" / FILE
+    assert "shard_2_of_3/answers.npz: is a shard of something else; other than here: seed, study" in told.stderr
+    invoke("sweep", *asked, "--shard", "2/3")
+    kept = studies / "parts/shard_2_of_3" / FILE
     whole = kept.read_bytes()
-    kept.write_bytes(whole[:-1])
-    told = invoke("merge", *asked)
-    assert told.exit_code == 2
-    assert "shard_2_of_3/chunks: is not a whole shard" in told.stderr
+    for damaged in (whole[: len(whole) // 2], whole.replace(b"seed", b"deed"), b"no archive", b""):
+        kept.write_bytes(damaged)
+        told = invoke("merge", *asked)
+        assert told.exit_code == 2
+        assert "shard_2_of_3/answers.npz: is not a whole shard" in told.stderr
     # A requeued job computes it anew; one that is whole is kept.
-    assert "shard 2/3 is kept" in invoke("run", *asked, "--shard", "2/3", "--resume").stderr
-    assert kept.read_bytes() == whole
+    assert "shard 2/3 is kept" in invoke("sweep", *asked, "--shard", "2/3", "--resume").stderr
     before = kept.stat().st_mtime_ns
-    invoke("run", *asked, "--shard", "2/3", "--resume")
+    invoke("sweep", *asked, "--shard", "2/3", "--resume")
     assert kept.stat().st_mtime_ns == before
-    invoke("run", *asked, "--shard", "2/4")
+    invoke("sweep", *asked, "--shard", "2/4")
     told = invoke("merge", *asked)
     assert told.exit_code == 2
     assert "there are shards of " in told.stderr
@@ -159,7 +151,7 @@ def test_shards_that_cannot_be_merged(studies, invoke):
 
 def test_a_shard_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(mechdesign.MechdesignError, match="the shard could not be written: No such file"):
-        shards.Taken(shards.Shard(1, 2)).write(tmp_path / "nowhere", {}, "run")
+        shards.write(tmp_path / "nowhere", Shard(1, 2), {}, [])
 
 
 def test_a_shard_is_data_alone(tmp_path):
@@ -167,22 +159,35 @@ def test_a_shard_is_data_alone(tmp_path):
         def __reduce__(self):
             return os.mkdir, (str(tmp_path / "made"),)
 
-    taken = shards.Taken(Shard(1, 1))
-    taken.kept = {"work 1": shards.Kept(1, [Evil()])}
-    taken.write(tmp_path, {}, "run")
-    folder = tmp_path / "shard_1_of_1"
-    folder.mkdir()
-    (tmp_path / FILE).rename(folder / FILE)
-    with pytest.raises(shards.StudyError, match="is not a whole shard"):
+    (tmp_path / "shard_1_of_1").mkdir()
+    empty = np.zeros(0)
+    head = np.array([Evil()], dtype=object)
+    np.savez(tmp_path / "shard_1_of_1" / FILE, head=head, counts=empty, rows=empty, words=np.zeros(0, np.uint8))
+    with pytest.raises(mechdesign.StudyError, match="is not a whole shard"):
         shards.merge(tmp_path, {})
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("command", ["reliability", "optimize", "sensitivities"])
+def test_one_computation_is_divided_by_an_executor_alone(studies, invoke, command):
+    told = invoke(command, "two_link_arm.yaml", "--shard", "1/2")
+    assert told.exit_code == 2
+    assert "no such option: --shard" in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [(["--shard", "5/4"], "--shard takes I/N"), (["--shard", "1/2", "--report"], "contradict")]
+)
+def test_what_is_no_shard(studies, invoke, options, message):
+    told = invoke("sweep", "offset_slider_crank.yaml", *options)
+    assert told.exit_code == 2
+    assert message in told.stderr
+    assert not Path("results").exists()
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--shard", "5/4"], "--shard takes I/N"),
-        (["--shard", "1/2", "--report"], "--shard and --report contradict each other"),
         (["--executor", "dask"], "--executor takes dask:ADDRESS, dask:local or module:factory, not 'dask'"),
         (["--executor", "nowhere:two"], "--executor nowhere:two: No module named 'nowhere'"),
         (["--executor", "os:cpus"], "--executor os:cpus: module 'os' has no attribute 'cpus'"),
@@ -193,7 +198,7 @@ def test_a_shard_is_data_alone(tmp_path):
         (["--executor", "dask:tcp://127.0.0.1:9"], "no scheduler answers there: "),
     ],
 )
-def test_what_is_no_executor_or_shard(studies, invoke, options, message):
+def test_what_is_no_executor(studies, invoke, options, message):
     told = invoke("reliability", "two_link_arm.yaml", *options)
     assert told.exit_code == 2
     assert message in told.stderr

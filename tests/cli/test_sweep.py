@@ -179,7 +179,7 @@ def test_the_best_case_is_told_by_sweep_run_and_merge(study, invoke):
     for more in ([], ["--resume"]):
         assert told in invoke("run", *asked, *more).stderr
     for k in (1, 2):
-        assert "best of" not in invoke("run", *asked, "--out", "parts", "--shard", f"{k}/2").stderr
+        assert "best of" not in invoke("sweep", *asked, "--out", "parts", "--shard", f"{k}/2").stderr
     for _ in range(2):
         assert told in invoke("merge", *asked, "--out", "parts").stderr
 

@@ -136,8 +136,6 @@ def test_a_file_that_comes_while_it_is_computed_stays(folder, analysis, invoke):
         ("junit", ("sweep", "slider.yaml", "--junit", "junit")),
         ("junit", ("compare", "results", "results", "--junit", "junit")),
         ("junit", ("run", "--verify", "results", "--junit", "junit")),
-        ("out/differences.csv", ("compare", "results", "results", "--out", "out")),
-        ("out/differences.png", ("compare", "results", "results", "--out", "out")),
         ("out/summary.csv", ("run", "slider.yaml", "other.yaml", "--out", "out")),
         ("out/index.html", ("run", "slider.yaml", "other.yaml", "--out", "out", "--report")),
         ("out/report.html", ("run", "slider.yaml", "--out", "out", "--report")),
@@ -176,11 +174,11 @@ def test_own_files_are_replaced(folder, analysis, invoke, kind):
         assert invoke("check", "slider.yaml", "--out", "drawn", "--format", kind).exit_code == 0
         moved = folder / "two/slider/kinematics/motion.csv"
         moved.write_text(moved.read_text().replace("90,3,", "90,4,"))
-        done = invoke("compare", "one", "two", "--out", "drawn", "--junit", "junit.xml", "--quiet")
+        done = invoke("compare", "one", "two", "--junit", "junit.xml", "--quiet")
         assert done.exit_code == 1, done.stderr
     assert {path.name for path in (folder / "drawn").iterdir()} == {
         ".mechdesign.json",
-        f"mechanism.{kind}", f"dimensions.{kind}", "differences.csv", "differences.png"}  # fmt: skip
+        f"mechanism.{kind}", f"dimensions.{kind}"}  # fmt: skip
 
 
 def test_a_junit_file_replaces_none_an_empty_one_or_its_own(folder, analysis, invoke):
@@ -224,7 +222,7 @@ WRITERS = [
     ),
     ("run", "cut.yaml", "slider.yaml", "--out", "FOLDER", "--no-plots", "--report"),
     ("check", "cut.yaml", "--out", "FOLDER", "--format", "png,svg,pdf"),
-    ("compare", "old", "new", "--out", "FOLDER"),
+    ("compare", "old", "new", "--junit", "FOLDER/report.xml"),
     *(("export", "cut.yaml", "--to", name, "--out", "FOLDER") for name in exports()),
     ("export", "cut.yaml", "--to", "study.json", "--out", "FOLDER/mine.json"),
     ("import", "slider.dxf", "--out", "FOLDER/study.yaml"),

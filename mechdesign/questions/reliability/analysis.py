@@ -35,7 +35,6 @@ from mechdesign.questions.reliability.task import MAX_SAMPLES, MethodResult, Par
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.work.chunks import Divided, apart
 from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Poses whose sensitivities are computed together.
@@ -68,18 +67,13 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     if section.precision is not None:
         task = replace(task, precision=section.precision)
     results: list[MethodResult] = []
-    left: list[Divided] = []
     interrupted = ""
     indices: dict[int, SobolIndices] = {}
     allocated = Result("allocation", {})
     try:
         for method in section.methods:
-            with apart(left):
-                results.append(with_cycle(methods.run(method, task), task, results))
-        with apart(left):
-            indices = sobol.indices(task, section)
-        if left:
-            raise left[0]
+            results.append(with_cycle(methods.run(method, task), task, results))
+        indices = sobol.indices(task, section)
         allocated = allocate(task, section)
     except Partial as partial:
         results.append(partial.result)
