@@ -177,11 +177,12 @@ def _write(out: Path, comparison: Comparison) -> None:
         # Files of an older comparison are removed.
         remove_recorded(out / _PICTURE)
         return
-    from mechdesign.report.comparison.picture import differences_figure
+    from mechdesign.report.comparison.picture import differences_picture
     from mechdesign.report.figures import style
+    from mechdesign.report.figures.layout import draw
 
     with style.context():
-        writer.write_file(out / _PICTURE, style.encoded(differences_figure(comparison.moved)))
+        writer.write_file(out / _PICTURE, style.encoded(draw(differences_picture(comparison.moved))))
 
 
 def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mechdesign.report.comparison.differences import Difference
-from mechdesign.report.comparison.picture import differences_figure
+from mechdesign.report.comparison.picture import differences_picture
 from mechdesign.report.figures import style
+from mechdesign.report.figures.layout import draw
 from mechdesign.results import Column
 
 
@@ -17,7 +18,7 @@ def test_curves_that_lie_over_each_other_are_drawn_as_their_difference(change: f
     old, new = np.sin(np.radians(x)), np.sin(np.radians(x)) + change
     moved = Difference("kinematics", "motion", "P.x", "moved", values=(old, new), along=Column("crank", x, "deg"))
     with style.context():
-        (axes,) = differences_figure([moved]).axes
+        (axes,) = draw(differences_picture([moved])).axes
     curves = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
     assert len(curves) == drawn
     if len(curves) == 1:
