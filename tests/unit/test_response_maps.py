@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import mechdesign
 from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
-from mechdesign.experiments.figures.sweep.quantities import Axis, sample
+from mechdesign.experiments.figures.sweep.quantities import CaseAxis, sample
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE, ANGLE = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
@@ -27,8 +27,8 @@ def maps_of(figure: Figure) -> list[Any]:
     return [axes for axes in figure.axes if axes.get_title(loc="left")]
 
 
-def axis(name: str, values: Any, **limits: float) -> Axis:
-    return Axis(name, "mm", np.asarray(values, dtype=float), (), limits.get("low"), limits.get("high"))
+def axis(name: str, values: Any, **limits: float) -> CaseAxis:
+    return CaseAxis(name, "mm", np.asarray(values, dtype=float), (), limits.get("low"), limits.get("high"))
 
 
 def contours(figure: Figure) -> list[np.ndarray]:

@@ -27,7 +27,7 @@ _TITLE, _NOTE, _HEADING, _ASIDE, _LABEL, _WORD = 11.0, 8.5, 9.5, 8.5, 10.0, 8.0 
 # Inches: at the edges of a page, between what is separate, between a text and what it is of.
 _EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
 # Inches: the least width of panels by their kind, and the room beside them at first.
-_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "": 2.0}
+_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "grid": 1.2, "": 2.0}
 _BESIDE = 0.9
 # Inches: the height of a panel that stands alone, among up to so many below each other, among more, and the least.
 _ALONE, _SOME, _MORE, _MOST, _LOWEST = 2.6, 1.75, 1.5, 1.2, 0.7
@@ -42,7 +42,7 @@ _AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for wh
 _UP, _ALONG, _DIGIT = 0.29, 0.47, 0.083  # inches from tick to tick, and of a digit
 _MOST_TICKS = 9
 _LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
-_LEGEND_DOT = 8.0  # points
+_LEGEND_DOT, _LEGEND_MARK = 8.0, 6.0  # points
 _NAMES = 0.4  # of the width, for names beside bars
 _BESIDE_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 _ABOVE_LEGEND: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
@@ -137,6 +137,8 @@ def _columns(picture: Picture) -> int:
     """Panels side by side."""
     first = next(panel for panel in picture.panels if panel is not None)
     names = first.y.words if first.kind == "bars" else ()
+    if picture.share == "grid":
+        return picture.across
     return max(1, min(picture.across, len(picture.panels), fitting_panels(first.kind, names)))
 
 
@@ -391,6 +393,6 @@ def fitting(labels: Sequence[str], width: float | None = None) -> int:
 def _enlarge_dots(legend: Legend) -> Legend:
     """Dots of a legend as large as can be seen: one alone is lost where thousands are drawn."""
     for handle in legend.legend_handles:
-        if isinstance(handle, Line2D) and handle.get_marker() == ".":
-            handle.set(markersize=_LEGEND_DOT, alpha=1.0)
+        if isinstance(handle, Line2D) and handle.get_linestyle() == "None" and handle.get_markersize() < _LEGEND_DOT:
+            handle.set(markersize=_LEGEND_DOT if handle.get_marker() == "." else _LEGEND_MARK, alpha=1.0)
     return legend

@@ -177,7 +177,8 @@ class Contours(PanelMark):
 
     def draw(self, axes: Axes) -> None:
         axes.grid(visible=False)
-        axes.set_facecolor("#EEEEEE")
+        if self.norm is None or self.outline:
+            axes.set_facecolor("#EEEEEE")
         if self.norm is None:
             return
         levels = np.asarray(self.norm.boundaries)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from mechdesign.experiments.figures.sweep.quantities import MOST_DRAWN, Axis
+from mechdesign.experiments.figures.sweep.quantities import MOST_DRAWN, CaseAxis
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.results import Table
 
@@ -53,8 +53,8 @@ class Plane:
         In how many classes of each entry cases are gathered; 0 where they are not.
     """
 
-    x: Axis
-    y: Axis
+    x: CaseAxis
+    y: CaseAxis
     steps: tuple[Floats, Floats]
     cells: Ints
     place: Ints
@@ -62,7 +62,7 @@ class Plane:
     classes: int = 0
 
     @classmethod
-    def of(cls, x: Axis, y: Axis, *, others: bool) -> Plane | None:
+    def of(cls, x: CaseAxis, y: CaseAxis, *, others: bool) -> Plane | None:
         """The plane of two entries, beside which others vary or not; None where the cases lie on a line."""
         steps = (x.distinct, y.distinct)
         across, up = (np.searchsorted(step, axis.values) for step, axis in zip(steps, (x, y), strict=True))
@@ -157,7 +157,7 @@ class Gates:
     nearest: Flags
 
     @classmethod
-    def of(cls, plane: Plane, limited: Sequence[Axis], table: Table) -> Gates:
+    def of(cls, plane: Plane, limited: Sequence[CaseAxis], table: Table) -> Gates:
         """What results with limits make of a plane."""
         every = [_margin(axis, table[f"{axis.name}_met"] == 1) for axis in limited]
         single = [plane.over(plane.reduced(margin, np.fmax.reduceat)) for margin in every]
@@ -178,7 +178,7 @@ class Gates:
         return bool((self.single[k] < 0).any() and (self.single[k] > 0).any())
 
 
-def _margin(limited: Axis, met: Flags) -> Floats:
+def _margin(limited: CaseAxis, met: Flags) -> Floats:
     """By how much each case keeps the limits of a result; nan where it does and the requirement is not met yet."""
     above = np.inf if limited.low is None else limited.values - limited.low
     below = np.inf if limited.high is None else limited.high - limited.values

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
 from mechdesign.errors import counted, cut
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.report.cases import FRONT, RANK, best_of, short
 from mechdesign.report.figures import style
+from mechdesign.report.figures.marks import Axis, Dots, Lines, PanelMark, Zone
 from mechdesign.results import Column, Table
 from mechdesign.study.text.units import Amount
 
@@ -21,12 +21,8 @@ from mechdesign.study.text.units import Amount
 MOST_VALUES = 12
 CLASSES = 8
 MOST_LETTERS = 10  # of a word at an axis
-MOST_LINES = 3  # of a name
 PLURALS = {"entry": "entries", "result": "results"}
 FEW_VALUES = 4  # whose ticks are the values themselves
-NAME, TITLE = 9.0, 10.0  # points
-GAP = 0.1  # inches
-_LETTER = 0.09
 _APART = 0.22  # part of the range between values whose numbers do not touch
 _ROOM_AROUND = 0.08  # part of the range beyond the values
 # Cases that are drawn one by one, at most, and over a map.
@@ -37,7 +33,7 @@ _FEW_DOTS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class CaseAxis:
     """An entry that varies or a result: its values over the cases, words as 0, 1, 2, and the limits required of it."""
 
     name: str
@@ -49,7 +45,9 @@ class Axis:
     varied: bool = True
 
     @classmethod
-    def of(cls, column: Column, low: float | None = None, high: float | None = None, *, varied: bool = True) -> Axis:
+    def of(
+        cls, column: Column, low: float | None = None, high: float | None = None, *, varied: bool = True
+    ) -> CaseAxis:
         """The axis of a column."""
         name = short(column.name)
         if column.numeric:
@@ -74,15 +72,14 @@ class Axis:
         finite = self.distinct[np.isfinite(self.distinct)]
         return [float(finite[0]), float(finite[-1])] if len(finite) else []
 
-    def label(self, room: float) -> str:
-        """Name and unit in lines of so many inches; a long name is broken after its points, or cut in front."""
-        bar, plain = self.name[: self.name.startswith("|")], self.name.lstrip("|")
-        for name in (self.name, bar + (plain.partition(".")[2] or plain)):
-            text = style.axis_label(name.replace(".", ". "), self.unit)
-            lines = [line.replace(". ", ".") for line in style.folded(text, NAME, room).split("\n")]
-            if len(lines) < MOST_LINES:
-                break
-        return "\n".join(lines[:MOST_LINES])
+    @property
+    def axis(self) -> Axis:
+        """The axis of panels over it."""
+        values = self.distinct
+        apart = self.varied and not self.words and 1 < len(values) <= FEW_VALUES
+        few = apart and np.diff(values).min() > _APART * np.ptp(values)
+        return Axis(self.name, self.unit, ends=self.span(), ticks=values.tolist() if few else (),
+                    words=[cut(word, MOST_LETTERS) for word in self.words])  # fmt: skip
 
     def span(self) -> tuple[float, float]:
         """From the lowest to the highest value or limit, and some room."""
@@ -111,17 +108,12 @@ class Kind:
     cases: Flags
     least: float = 0.0  # points
 
-    def draw_key(self, axes: Axes) -> None:
-        """Draw what a legend shows."""
-        self.draw(axes, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp), 6.0)
-
-    def draw(self, axes: Axes, x: Floats, y: Floats, drawn: Ints, size: float) -> None:
-        """Draw those of some cases at their values, with markers of a size in points."""
+    def dots(self, x: CaseAxis, y: CaseAxis, drawn: Ints, size: float) -> Dots:
+        """Those of some cases at their values, with markers of a size in points."""
         rows = drawn[self.cases[drawn]]
-        axes.plot(
-            x[rows], y[rows], self.marker, color=self.color, markersize=max(size, self.least), linestyle="none",
-            markeredgewidth=1.0 if self.least else 0.4, markeredgecolor="white", zorder=3, label=self.words,
-        )  # fmt: skip
+        look = {"marker": self.marker, "color": self.color, "markersize": max(size, self.least), "zorder": 3,
+                "markeredgewidth": 1.0 if self.least else 0.4, "markeredgecolor": "white"}  # fmt: skip
+        return Dots(x.values[rows], y.values[rows], label=self.words, look=look)
 
 
 def kinds_of(table: Table, *, required: bool) -> list[Kind]:
@@ -159,61 +151,27 @@ def sample(table: Table, most: int) -> tuple[Ints, float]:
     return np.unique(rows), _SMALL_DOT
 
 
-def draw_limits(axes: Axes, of: Axis, *, upright: bool) -> None:
+def limit_marks(of: CaseAxis, at: Literal["x", "y"] = "y") -> Iterator[PanelMark]:
     """Dashed lines at the limits of a requirement, and what lies beyond them in grey."""
-    line, span = (axes.axvline, axes.axvspan) if upright else (axes.axhline, axes.axhspan)
     lowest, highest = of.span()
     for limit, end in ((of.low, lowest), (of.high, highest)):
         if limit is not None:
-            line(limit, color=style.INK, linestyle=style.DASHES[1], linewidth=1.0, zorder=1.5)
-            span(min(limit, end), max(limit, end), color=style.FAINT, alpha=0.18, linewidth=0, zorder=0.5)
-
-
-def frame(
-    axes: Axes, x: Axis, y: Axis, room: float, tall: float, *, between: float = 0.0, outer_x: bool = True,
-    outer_y: bool = True,
-) -> None:  # fmt: skip
-    """Ends, few ticks and names of the axes of a panel, numbers and names at the outer edges only.
-
-    `room` is the width of the panel, `tall` the height for a name, `between` the part of the gap beside the panel that
-    a name may take (inches).
-    """
-    axes.set_xlim(*x.span())
-    axes.set_ylim(*y.span())
-    for axis, of, outer in ((axes.xaxis, x, outer_x), (axes.yaxis, y, outer_y)):
-        if of.words:
-            letters = MOST_LETTERS if of is y else max(3, int(room / len(of.words) / _LETTER))
-            axis.set_ticks(range(len(of.words)), [cut(word, letters) if outer else "" for word in of.words])
-            continue
-        axis.set_major_locator(MaxNLocator(2 if style.narrow() else 4, steps=[1, 2, 2.5, 5, 10]))
-        values = of.distinct
-        if of.varied and len(values) <= FEW_VALUES and np.diff(values).min() > _APART * np.ptp(values):
-            axis.set_major_locator(FixedLocator(values.tolist()))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value)))
-        axis.set_tick_params(labelbottom=outer, labelleft=outer)
-    if outer_x:
-        axes.set_xlabel(x.label(room + between), fontsize=NAME)
-    if outer_y:
-        axes.set_ylabel(y.label(tall), fontsize=NAME)
+            dashed = {"color": style.INK, "linestyle": style.DASHES[1], "linewidth": 1.0, "zorder": 1.5}
+            yield Lines([limit], at, look=dashed)
+            yield Zone(min(limit, end), max(limit, end), at, look={"color": style.FAINT, "alpha": 0.18, "zorder": 0.5})
 
 
 def number_text(value: float) -> str:
     return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
 
 
-def title(words: str) -> tuple[str, float]:
-    """A title in lines, and the room that it takes (inches)."""
-    folded = style.folded(words, TITLE, style.width() - 0.2)
-    return folded, style.line(TITLE) * (folded.count("\n") + 1) + 2 * GAP
-
-
-def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], noun: str) -> str:
+def left_out(all_of: Sequence[CaseAxis], shown: Sequence[CaseAxis], noun: str) -> str:
     """How many entries or results (by their `noun`) have no room, in words."""
     left = len([axis for axis in all_of if axis not in shown])
     return f"; {left} more {noun if left == 1 else PLURALS[noun]} in sweep.csv" if left else ""
 
 
-def without_number(shown: Sequence[Axis], count: int) -> str:
+def without_number(shown: Sequence[CaseAxis], count: int) -> str:
     """How many cases lack a number, in words."""
     lost = int(np.isnan([axis.values for axis in shown]).any(axis=0).sum())
     return f"; {lost} of {counted(count, 'case')} without a number left out" if lost else ""

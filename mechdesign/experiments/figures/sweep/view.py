@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from mechdesign.experiments.figures.sweep.quantities import Axis
+from mechdesign.experiments.figures.sweep.quantities import CaseAxis
 from mechdesign.report.figures.pictures import View
 from mechdesign.report.requirements import DrawnCases
 from mechdesign.results import Table
@@ -24,15 +24,17 @@ class CasesView(View):
         return DrawnCases.of(self.result)
 
     @cached_property
-    def entries(self) -> list[Axis]:
+    def entries(self) -> list[CaseAxis]:
         """The entries of the matrix that vary."""
-        entries = [Axis.of(self.table.column(name)) for name in self.drawn.entries]
+        entries = [CaseAxis.of(self.table.column(name)) for name in self.drawn.entries]
         return [entry for entry in entries if len(entry.distinct) > 1]
 
     @cached_property
-    def results(self) -> list[Axis]:
+    def results(self) -> list[CaseAxis]:
         """The results with their limits."""
-        return [Axis.of(self.table.column(name), *limits, varied=False) for name, limits in self.drawn.results.items()]
+        return [
+            CaseAxis.of(self.table.column(name), *limits, varied=False) for name, limits in self.drawn.results.items()
+        ]
 
     @property
     def empty(self) -> bool:

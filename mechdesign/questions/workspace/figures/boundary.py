@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.mechanism import Configuration
@@ -37,8 +36,9 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO, Label, covered, place_labels
+from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Words
 from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
-from mechdesign.report.figures.panels import MAX_PANELS, Along, legend_below, stack, tick_abscissa
+from mechdesign.report.figures.panels import MAX_PANELS, Along
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -47,7 +47,7 @@ SIDES = ("inner", "outer")
 # Of the drives.
 LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
-_DRIVES_HEIGHT = 1.9  # inches, of a panel
+_LIMIT = {"color": style.INK, "linewidth": 0.9, "zorder": 1.5}
 _DRIVES_BESIDE = 1.2  # inches beside it
 _TOGETHER = 0.09  # of its height, between limits whose names do not touch
 _SMALL_SYMBOLS = 0.7
@@ -175,53 +175,49 @@ def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Lab
 
 
 @picture(WorkspaceView, "drives", order=60)
-def drives_figure(view: WorkspaceView) -> Figure | None:
+def drives_picture(view: WorkspaceView) -> Picture | None:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
-    study, mechanism = view.study, view.study.mechanism
-    every = [
-        (region.boundary, side, region.title)
-        for region in view.regions
-        for side in SIDES
-        if (region.boundary["side"] == side).any()
-    ]
+    study, names = view.study, view.study.mechanism.drives
+    every = [(region.boundary, side, region.title) for region in view.regions for side in SIDES
+             if (region.boundary["side"] == side).any()]  # fmt: skip
     if not every:
         return None
-    names, parts = mechanism.drives, [every[k] for k in evenly(len(every), MAX_PANELS)]
-    label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
+    parts = [every[k] for k in evenly(len(every), MAX_PANELS)]
     words = [", ".join(filter(None, (where, f"{side} boundary"))) for _, side, where in parts]
     titles, held = panel_titles(words, style.width() - _DRIVES_BESIDE, 1)
     notes = [f"panels: values of {held}"] * bool(held)
     notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
-    heading = "Drives along the boundary of the workspace"
-    figure, panels = stack(len(parts), heading, label, note="; ".join(notes), tall=_DRIVES_HEIGHT)
-    units = {study.units.label(mechanism.quantity(name)) for name in names}
+    units = {study.units.label(study.mechanism.quantity(name)) for name in names}
+    drive = Axis("drive", "".join(units) if len(units) == 1 else "")
+    angles = np.concatenate([boundary["theta"] for boundary, *_ in parts])
+    angle = Along(angles, style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle")))
+    limits, panels = _drive_limits(study), []
+    for (boundary, side, _), title in zip(parts, titles, strict=True):
+        rows = [rows for rows in curves(boundary) if boundary["side"][rows[0]] == side]
+        own = {name: np.concatenate([np.append(boundary[name][part], np.nan) for part in rows])
+               for name in ("theta", *names)}  # fmt: skip
+        marks: list[PanelMark] = [
+            Trace(own["theta"], own[name], label=name, look={"color": LINE_COLORS[k % len(LINE_COLORS)],
+                  "linestyle": DASHES[k % len(DASHES)], "linewidth": 1.9})
+            for k, name in enumerate(names)
+        ]  # fmt: skip
+        marks.append(Lines([*limits], label="limit of a drive", look=_LIMIT))
+        reach = np.ptp([*limits, *(end(own[name]) for name in names for end in (np.nanmin, np.nanmax))])
+        marks += [Words(1, height, ", ".join(limited), (-2, 1.5), "x", look={"ha": "right", "path_effects": HALO})
+                  for height, limited in _together(limits, _TOGETHER * float(reach))]  # fmt: skip
+        panels.append(Panel(marks, angle.axis, drive, title))
+    return Picture("Drives along the boundary of the workspace", panels, ("; ".join(notes),), share="x")
+
+
+def _drive_limits(study: Study) -> dict[float, list[str]]:
+    """Limits of the drives and whose they are."""
     limits: dict[float, list[str]] = {}
-    for bound in mechanism.bounds:
-        for end in bound.ends(mechanism.nominal) if bound.drive else ():
+    for bound in study.mechanism.bounds:
+        for end in bound.ends(study.mechanism.nominal) if bound.drive else ():
             if end is not None:
                 value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
                 limits.setdefault(value, []).append(bound.coordinate.name)
-    entries: dict[str, Line2D] = {}
-    for axes, (boundary, side, _), title in zip(panels, parts, titles, strict=True):
-        for number, name in enumerate(names):
-            for rows in curves(boundary):
-                if boundary["side"][rows[0]] != side:
-                    continue
-                own = boundary.take(rows)
-                (entries[name],) = axes.plot(own["theta"], own[name], color=LINE_COLORS[number % len(LINE_COLORS)],
-                                             linestyle=DASHES[number % len(DASHES)], linewidth=1.9)  # fmt: skip
-        for limit in limits:
-            entries["limit of a drive"] = axes.axhline(limit, color=style.INK, linewidth=0.9, zorder=1.5)
-        for height, limited in _together(limits, _TOGETHER * float(np.ptp(axes.get_ylim()))):
-            axes.annotate(", ".join(limited), (1, height), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
-                          textcoords="offset points", fontsize=7.5, path_effects=HALO)  # fmt: skip
-        axes.set_title(title, loc="left", fontsize=9.5)
-        axes.set_ylabel(style.axis_label("drive", "".join(units) if len(units) == 1 else ""))
-    angles = np.concatenate([boundary["theta"] for boundary, *_ in parts])
-    tick_abscissa(panels[-1], Along(angles, label))
-    panels[-1].set_xlim(float(angles.min()), float(angles.max()))
-    legend_below(figure, list(entries.values()), list(entries))
-    return figure
+    return limits
 
 
 def _together(limits: Mapping[float, Sequence[str]], near: float) -> list[tuple[float, list[str]]]:

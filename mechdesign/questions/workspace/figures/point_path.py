@@ -15,6 +15,7 @@ from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.marks import Axis, Panel, Picture, Trace
 from mechdesign.report.figures.overlay import name_both
 from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.pictures import picture
@@ -26,7 +27,7 @@ _SHOWN_RATIOS = 0.97
 
 
 @picture(WorkspaceView, "path", "speed_ratio", order=30)
-def path_figures(view: WorkspaceView) -> dict[str, Figure] | None:
+def path_pictures(view: WorkspaceView) -> dict[str, Figure | Picture] | None:
     """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
     if "path" not in view.result.tables:
         return None
@@ -65,21 +66,16 @@ def _path(study: Study, path: Table, before: Before | None) -> Figure:
     return page.figure
 
 
-def _speed(study: Study, path: Table) -> Figure:
-    drive = study.mechanism.drives[0]
-    figure = style.new_figure(3.4)
-    axes = figure.add_subplot()
-    parts = pieces(path)
+def _speed(study: Study, path: Table) -> Picture:
+    """The speed ratio over the drive."""
+    drive, parts = study.mechanism.drives[0], pieces(path)
     looks = zip(style.PALETTE * len(parts), DASHES * len(parts), strict=False)
-    for rows, (color, dashes) in zip(parts, looks, strict=False):
-        name = f"piece {int(path['piece'][rows[0]])}"
-        axes.plot(path[drive][rows], path["speed_ratio"][rows], color=color, linestyle=dashes, label=name)
+    marks = [
+        Trace(path[drive][rows], path["speed_ratio"][rows], look={"color": color, "linestyle": dashes},
+              label=f"piece {int(path['piece'][rows[0]])}" if len(parts) > 1 else "")
+        for rows, (color, dashes) in zip(parts, looks, strict=False)
+    ]  # fmt: skip
     top, tail = _ends(path["speed_ratio"])
-    axes.set_ylim(0, 1.3 * top if tail else None)
-    axes.set_title("Speed of the point over that of the drive", loc="left")
-    axes.set_xlabel(coordinate_label(study, drive))
-    axes.set_ylabel(_label(path))
-    axes.margins(x=0.01)
-    if len(parts) > 1:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    return figure
+    along = Axis(coordinate_label(study, drive), margin=0.01)
+    panel = Panel(marks, along, Axis(_label(path), ends=(0.0, 1.3 * top if tail else None)), legend="beside")
+    return Picture("Speed of the point over that of the drive", [panel])
