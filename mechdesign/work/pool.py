@@ -12,11 +12,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache, partial
 from itertools import islice
 from operator import length_hint
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from mechdesign.errors import MechdesignError
 from mechdesign.versions import installed
@@ -48,7 +47,6 @@ class Pool:
     functions and memory: nothing is pickled for them, and a task is a single chunk.
     """
 
-    losses = 1  #: losses of workers after which chunks are computed one by one
     executor: Executor | None = None
 
     def __init__(
@@ -115,28 +113,19 @@ class Pool:
             self.executor.shutdown(wait=False)
 
 
-@dataclass(eq=False)
-class _Task:
+class _Task(NamedTuple):
     """Chunks that are computed together: the number of the first one, and their items."""
 
     first: int
     items: list[Any]
     future: Future[Any]
 
-    @property
-    def lost(self) -> bool:
-        """Whether it will have no value, as its workers were lost."""
-        if not self.future.done():
-            # It belongs to the pool that was lost.
-            return True
-        return self.future.cancelled() or _is_loss(self.future.exception())
-
 
 class ChunkMap(Generic[Item, Value]):
     """An ordered map of a function over items on the workers of a pool.
 
     At most ``3 * width`` tasks are under way or waiting to be consumed; a task has as many chunks as take about a
-    second. Chunks of lost workers are computed again.
+    second. Chunks of lost workers are computed again, one by one with no other work under way.
 
     Raises
     ------
@@ -157,7 +146,7 @@ class ChunkMap(Generic[Item, Value]):
         return partial(_perform, version, pickle.dumps(self._function, protocol=5))
 
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:
-        source, begun, losses = iter(items), 0, 0
+        source, begun = iter(items), 0
         while self._pool.executor is None:
             interrupts.check()
             if not (own := [*islice(source, 1)]):
@@ -186,15 +175,10 @@ class ChunkMap(Generic[Item, Value]):
                 except Exception as error:
                     if not _is_loss(error):
                         raise
-                    losses += 1
                     self._pool.renew()
-                    while losses > self._pool.losses and tasks:
-                        yield from self._one_by_one(tasks[0])
+                    while tasks:
+                        yield from self._again(tasks[0])
                         tasks.popleft()
-                    losses %= self._pool.losses + 1
-                    for task in tasks:
-                        if task.lost:
-                            task.future = self._submit(task.items)
                 else:
                     tasks.popleft()
                     yield from values
@@ -221,9 +205,10 @@ class ChunkMap(Generic[Item, Value]):
             self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
         return cast(list[Value], values)
 
-    def _one_by_one(self, task: _Task) -> Iterator[Value]:
-        """Values of a task that may end its worker: chunk by chunk, with no other work under way."""
-        if not task.lost:
+    def _again(self, task: _Task) -> Iterator[Value]:
+        """Values of a task that was under way when workers were lost, and may have ended one."""
+        future = task.future
+        if future.done() and not future.cancelled() and not _is_loss(future.exception()):
             yield from self._values(task)
             return
         for number, item in enumerate(task.items, task.first + 1):
