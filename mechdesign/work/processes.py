@@ -7,11 +7,12 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
+from types import ModuleType
 from typing import Any
 
 from mechdesign.work import interrupts
@@ -46,7 +47,7 @@ class Processes(ProcessPoolExecutor):
         super().__init__(count, context(), _begin, (settle_in, *given))
         others = multiprocessing.active_children()
         try:
-            with interrupts.undisturbed():
+            with interrupts.undisturbed(), nullcontext() if inherit() else _without_script():
                 # Work that meets no idle process begins one.
                 for _ in range(count):
                     self.submit(os.getpid)
@@ -60,6 +61,16 @@ class Processes(ProcessPoolExecutor):
         """End them at once; work under way is lost."""
         for process in self._begun:
             process.kill()
+
+
+@contextmanager
+def _without_script() -> Iterator[None]:
+    """Inside, new processes begin without the script that runs here, which would begin others there in its turn."""
+    script, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _begin(settle_in: Callable[..., None], *given: Any) -> None:

@@ -85,8 +85,9 @@ def here(tmp_path, monkeypatch):
 def begin(*arguments):
     """Begin a command on such a system; it leads a group of processes, as one on a terminal."""
     paths = [str(Path("lacking").absolute()), *filter(None, [os.environ.get("PYTHONPATH")])]
+    script = [] if arguments[0].endswith(".py") else ["-m", "mechdesign"]
     return subprocess.Popen(
-        [sys.executable, "-m", "mechdesign", *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, *script, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)}, start_new_session=True,
     )  # fmt: skip
 
@@ -153,6 +154,18 @@ def test_ctrl_c(here, command, told):
     assert "Traceback" not in said
     assert list((here / "out").rglob("moments.csv"))
     assert not any(each.is_running() for each in there)
+
+
+def test_a_script_without_a_guard(here):
+    """New processes do not run it again."""
+    (here / "script.py").write_text("""
+import mechdesign
+study = mechdesign.load("arm.yaml")
+one, two = (mechdesign.reliability(study, jobs=jobs).tables["reliability"]["failure"] for jobs in (1, 2))
+print(*(one == two))
+""")
+    output, told, code = ended(begin("script.py"))
+    assert (output, told, code) == ("True True True True\n", "", 0)
 
 
 def test_a_worker_that_dies(here, invoke):
