@@ -12,7 +12,8 @@ def main() -> None:
     import signal
 
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+        numbers = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+        signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     from mechdesign.cli import process
 
     process.run(_command)

@@ -14,6 +14,7 @@ from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
+from mechdesign.work.chunks import spread
 from mechdesign.work.journal import Journal
 
 
@@ -442,7 +443,8 @@ def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = Fals
     if all_modes:
         options["all_modes"] = True
     try:
-        result = answer(study, seed=seed, **options)
+        with spread(options["jobs"]):
+            result = answer(study, seed=seed, **options)
     except Interrupted as interrupt:
         raise Interrupted(Answer.of(study, interrupt.result, seed, all_modes=all_modes)) from None
     return Answer.of(study, result, seed, all_modes=all_modes)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import glob
 import io
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext, redirect_stderr, suppress
 from dataclasses import replace
@@ -45,7 +44,7 @@ from mechdesign.study.loading import StudySource
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK
-from mechdesign.work.processes import TaskProcess, Tell, Work
+from mechdesign.work.processes import TaskProcess, Tell, Work, inherit
 from mechdesign.work.threads import one_thread
 
 if TYPE_CHECKING:
@@ -196,7 +195,7 @@ def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tupl
 
 
 def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:
-    """Answer the questions of the studies, in parallel if there are several and the system can fork processes.
+    """Answer the questions of the studies, in parallel if there are several.
 
     Raises
     ------
@@ -205,10 +204,10 @@ def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> Non
     """
     jobs = worker_count(options.jobs)
     # Work for an executor is sent from this process.
-    count = min(jobs, len(tasks)) if sys.platform == "linux" and options.executor is None else 1
+    count = min(jobs, len(tasks)) if options.executor is None else 1
     if count > 1:
         tasks = [replace(task, options=replace(task.options, jobs=jobs // count)) for task in tasks]
-        if not options.resume:
+        if inherit() and not options.resume:
             _import(tasks, options)
     record.begin(tasks)
     work = partial(_study, tasks, record.summed)

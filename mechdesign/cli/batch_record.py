@@ -117,12 +117,13 @@ class BatchRecord:
         task = self._tasks[index]
         if isinstance(note, ProgressNote):
             self.live_table.advance(index, note)
-            great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
+            great = "" if self.options.quiet else note.announcement
             note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
         self._words[index].append(note.words)
         if note.outcome is not None:
             self._outcomes[task.number].append(note.outcome)
-            self.live_table.done(index, note.outcome)
+            outcome = note.outcome
+            self.live_table.done(index, outcome.command, outcome.word, failed=bool(outcome.exit_code))
             self.stopped |= self.options.fail_fast and note.outcome.exit_code > 0
         if index == self._first:
             self._say()

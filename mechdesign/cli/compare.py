@@ -13,6 +13,7 @@ from typing import Any
 import mechdesign
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import exit_code
+from mechdesign.cli.live_table import Bar
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
@@ -123,7 +124,7 @@ def _repeat(
     except StudyError as error:
         raise StudyError(f"{where}: its study cannot be read here:\n{error}") from None
     more = {"all_modes": True} if content.get("all_modes") else {}
-    with terminal.Bar(quiet=options.quiet) as bar:
+    with Bar(study.label, command, quiet=options.quiet) as bar:
         result = getattr(mechdesign, command)(study, jobs=options.jobs, progress=bar, **more)
     tables = Extras(plots=False, all_modes=bool(more))
     verdicts = requirements.requirements(study, result)

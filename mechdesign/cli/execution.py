@@ -18,6 +18,7 @@ import mechdesign
 from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
+from mechdesign.cli.live_table import Bar
 from mechdesign.cli.options import PDF, Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import MERGE, SWEEP
@@ -393,7 +394,7 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
         directory = place(folder(study, command, options), options)
         with owned(directory):
             try:
-                outcome = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
+                outcome = answer(study, command, directory, options, Bar(study.label, command, quiet=options.quiet))
             except Interrupted as error:
                 if options.report:
                     write_report(directory, study, [interrupted(study, command, directory, error)], options)

@@ -1,27 +1,25 @@
-"""A live table on the terminal: the questions that are computed, failed, or were answered last."""
+"""Progress on the terminal: a row for each question that is computed, failed, or was answered last."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Outcome
 from mechdesign.progress import Progress
 from mechdesign.work import interrupts
 from mechdesign.work.processes import Tell
 
 if TYPE_CHECKING:
-    from rich.live import Live
-    from rich.table import Table as Grid
+    from rich.progress import Progress as Rows
+    from rich.progress import TaskID
 
 _OFTEN = 0.1  # seconds between two progress notes, and between two updates of the table
 _LAST = 5  # number of questions shown that were answered last
-_WIDTH = 24  # of a bar, in characters
+_WIDTH = 16  # of a bar, in characters
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,11 @@ class ProgressNote:
     stage: str = ""
     done: int = 0
     total: int = 0
+
+    @property
+    def announcement(self) -> str:
+        """What is said of a long stage when it begins, even without a terminal; else empty."""
+        return terminal.announced(self.total, self.stage) if not self.done else ""
 
 
 class Reported(Progress):
@@ -63,112 +66,135 @@ class Reported(Progress):
         self._tell(ProgressNote(self._command, self._stage, self._done, self._total))
 
 
+class Bar(Reported):
+    """Progress of a single question, in a table of its own; a long stage is announced even without one."""
+
+    def __init__(self, label: str, command: str, *, quiet: bool) -> None:
+        self._quiet, self._table = quiet, LiveTable(quiet=quiet)
+        self._table.start([label])
+        super().__init__(command, self._show)
+
+    def __exit__(self, *_: object) -> None:
+        self._table.__exit__()
+
+    def _show(self, note: ProgressNote) -> None:
+        if note.announcement and not self._quiet:
+            self._table.say(f"{note.announcement}\n")
+        self._table.advance(0, note)
+
+
 class LiveTable:
-    """The table: questions that failed and those answered last, and below them those under way.
+    """The table: of several studies how many have ended, then questions that failed, answered last, and under way.
 
     It is on stderr, only on a terminal, and appears after a second; messages go above it. Use it as a context.
     """
 
     def __init__(self, *, quiet: bool) -> None:
-        self._wanted = not quiet and terminal.lively()
         # sys.stderr may be redirected later.
         self._stream = sys.stderr
         self._begun = time.monotonic()
-        self._live: Live | None = None
+        self._refreshed = 0.0
         self._labels: Sequence[str] = ()
-        self._under_way: dict[int, tuple[float, ProgressNote]] = {}  # start time and progress
-        self._failed: list[Outcome] = []
-        self._last: deque[Outcome] = deque(maxlen=_LAST)
-        self._ended = 0
-        self._shown = 0.0
+        self._under_way: dict[int, TaskID] = {}
+        self._failed: list[TaskID] = []
+        self._last: list[TaskID] = []
+        self._failures = self._ended = 0
+        self._rows = self._opened() if not quiet and terminal.lively() else None
+
+    def _opened(self) -> Rows:
+        from rich.console import Console
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Rows
+        from rich.table import Column
+
+        console = Console(file=self._stream)
+        # Long names leave room for the other columns.
+        name = Column(no_wrap=True, max_width=console.width // 4)
+        words = [TextColumn(f"{{task.fields[{key}]}}") for key in ("question", "state")]
+        rest = BarColumn(_WIDTH), TaskProgressColumn(), TimeRemainingColumn(elapsed_when_finished=True)
+        return Rows(
+            TextColumn("{task.description}", markup=False, table_column=name), *words, *rest, console=console,
+            # No thread: processes may be forked meanwhile.
+            auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False,
+        )  # fmt: skip
 
     def __enter__(self) -> LiveTable:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._live is not None:
+        if self._rows is not None and self._rows.live.is_started:
             try:
-                self._live.stop()
+                self._rows.stop()
             finally:
-                self._live.console.show_cursor()
+                self._rows.console.show_cursor()
 
     def start(self, labels: Sequence[str]) -> None:
         """Start with studies of these names."""
         self._labels = labels
+        if self._rows is not None and len(labels) > 1:
+            self._rows.add_task("", total=len(labels), question="", state="")
+            self._count()
 
     def advance(self, index: int, how: ProgressNote) -> None:
         """Record the progress of a study's question."""
-        since, before = self._under_way.get(index, (0.0, None))
-        if before is None or before.command != how.command:
-            since = time.monotonic()
-        self._under_way[index] = since, how
-        self.show()
+        if self._rows is not None:
+            row = self._row(self._rows, index, how.command)
+            stage = how.stage.replace("[", r"\[")
+            self._rows.update(row, completed=how.done, total=how.total or None, state=stage)
+            self.show()
 
-    def done(self, index: int, outcome: Outcome) -> None:
-        """Record the outcome of a study's question."""
-        self._under_way.pop(index, None)
-        (self._failed if outcome.exit_code else self._last).append(outcome)
-        self.show()
+    def done(self, index: int, command: str, word: str, *, failed: bool) -> None:
+        """Record the outcome of a study's question in a word."""
+        if self._rows is not None:
+            row = self._row(self._rows, index, command)
+            del self._under_way[index]
+            self._rows.update(row, completed=1, total=1, state=f"[{'red' if failed else 'green'}]{word}")
+            (self._failed if failed else self._last).append(row)
+            self._failures += failed
+            if len(self._last) > _LAST:
+                self._rows.remove_task(self._last.pop(0))
+            self._count()
+
+    def _row(self, rows: Rows, index: int, command: str) -> TaskID:
+        """The row of a question under way, which is a new one at the end if there is none; finished ones make room."""
+        if index not in self._under_way:
+            while len(rows.tasks) >= rows.console.height - 1 and (self._last or self._failed):
+                rows.remove_task((self._last or self._failed).pop(0))
+            self._under_way[index] = rows.add_task(self._labels[index], total=None, question=command, state="")
+        return self._under_way[index]
 
     def end(self, index: int) -> None:
         """Record the end of a study."""
-        self._under_way.pop(index, None)
         self._ended += 1
+        if self._rows is not None:
+            if index in self._under_way:
+                self._rows.remove_task(self._under_way.pop(index))
+            self._count()
+
+    def _count(self) -> None:
+        if self._rows is not None and len(self._labels) > 1:
+            words = f"{self._ended} of {len(self._labels)} studies"
+            failed = f"{self._failures} failed" * bool(self._failures)
+            self._rows.update(self._rows.task_ids[0], description=words, question=failed, completed=self._ended)
         self.show()
 
     def say(self, words: str) -> None:
         """Print messages above the table."""
         words = terminal.readable(words, self._stream)
-        if self._live is None:
+        if self._rows is None or not self._rows.live.is_started:
             print(words, end="", file=self._stream, flush=True)
         elif words:
             from rich.text import Text
 
-            self._live.console.print(Text.from_ansi(words.rstrip("\n")), soft_wrap=True)
+            self._rows.console.print(Text.from_ansi(words.rstrip("\n")), soft_wrap=True)
 
     def show(self) -> None:
         """Update the table on the terminal."""
         now = time.monotonic()
-        if self._live is not None:
-            if now - self._shown > _OFTEN:
-                self._shown = now
-                self._live.update(self._table(), refresh=True)
-        elif self._wanted and now - self._begun > terminal.DELAY:
-            from rich.console import Console
-            from rich.live import Live
-
-            console = Console(file=self._stream)
-            self._live = Live(console=console, auto_refresh=False, transient=True,
-                              redirect_stdout=False, redirect_stderr=False)  # fmt: skip
-            self._live.start()
-
-    def _table(self) -> Grid:
-        from rich.progress_bar import ProgressBar
-        from rich.table import Table as Grid
-        from rich.text import Text
-
-        assert self._live is not None
-        grid = Grid(box=None, pad_edge=False, header_style="bold")
-        # Long names leave room for the other columns.
-        grid.add_column("study", no_wrap=True, max_width=self._live.console.width // 4)
-        grid.add_column("question", no_wrap=True)
-        grid.add_column("outcome", no_wrap=True)
-        grid.add_column("seconds", justify="right", no_wrap=True)
-        # Lines for finished questions: without the head and the two lines below, but at least one.
-        room = max(1, self._live.console.height - 3 - len(self._under_way))
-        failed = self._failed[-room:]
-        last = [*self._last][len(failed) - room :] if room > len(failed) else []
-        for outcome in (*failed, *last):
-            word = Text(outcome.word, style="red" if outcome.exit_code else "green")
-            grid.add_row(Text(outcome.study), outcome.command, word, f"{outcome.seconds:.1f}")
-        for index, (since, how) in sorted(self._under_way.items()):
-            bar = Grid.grid(padding=(0, 1))
-            bar.add_row(how.stage, ProgressBar(how.total, min(how.done, how.total), width=_WIDTH))
-            state = bar if how.total else Text("under way", style="dim")
-            grid.add_row(Text(self._labels[index]), how.command, state, f"{time.monotonic() - since:.1f}")
-        hidden = len(self._failed) - len(failed)
-        parts = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
-        if self._failed:
-            parts.insert(1, f"{len(self._failed)} failed" + f", {hidden} of them above" * bool(hidden))
-        grid.add_row(Text(parts[0]), Text(parts[1]), Text("; ".join(parts[2:])), "")
-        return grid
+        if self._rows is None or now - max(self._refreshed, self._begun + terminal.DELAY) < _OFTEN:
+            return
+        self._refreshed = now
+        if self._rows.live.is_started:
+            self._rows.refresh()
+        else:
+            self._rows.start()

@@ -1,4 +1,4 @@
-"""Messages on stderr, data on stdout: a table on a terminal, CSV in a pipe, a progress bar."""
+"""Messages on stderr, data on stdout: a table on a terminal, CSV in a pipe."""
 
 from __future__ import annotations
 
@@ -7,24 +7,17 @@ import re
 import shlex
 import shutil
 import sys
-import time
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Literal, TextIO
+from typing import Literal, TextIO
 
 import numpy as np
 
 from mechdesign.errors import printable_lines
-from mechdesign.progress import Progress
 from mechdesign.report.tables import cells, csv_blocks, json_blocks
 from mechdesign.results import Table
-from mechdesign.work import interrupts
-
-if TYPE_CHECKING:
-    from rich.progress import Progress as Shown
-    from rich.progress import TaskID
 
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
@@ -185,49 +178,3 @@ def lively() -> bool:
 def announced(total: int, noun: str) -> str:
     """Announcement of a stage of `_GREAT` steps or more; empty for smaller ones."""
     return f"{total} {noun} to compute; Ctrl-C ends it" if total >= _GREAT else ""
-
-
-class Bar(Progress):
-    """A progress bar on stderr, which appears only on a terminal and only after a second."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self._quiet = quiet
-        self._wanted = not quiet and lively()
-        self._begun = time.monotonic()
-        self._bar: Shown | None = None
-        self._task: TaskID | None = None
-        self._total = self._done = 0
-        self._stage = ""
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-            self._bar = self._task = None
-
-    def start(self, total: int, stage: str) -> None:
-        """Begin a stage, and announce a great one even without a bar; an interrupt is raised here."""
-        interrupts.check()
-        if great := announced(total, stage):
-            say(great, quiet=self._quiet)
-        self._total, self._done, self._stage = total, 0, stage
-        if self._bar is not None and self._task is not None:
-            self._bar.reset(self._task, total=total, description=stage)
-
-    def update(self, n: int) -> None:
-        """Add `n` finished steps; an interrupt is raised here."""
-        interrupts.check()
-        self._done += n
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=self._done)
-        elif self._wanted and time.monotonic() - self._begun > DELAY:
-            self._open()
-
-    def _open(self) -> None:
-        from rich.console import Console
-        from rich.progress import MofNCompleteColumn
-        from rich.progress import Progress as Shown
-
-        columns = (*Shown.get_default_columns(), MofNCompleteColumn())
-        self._bar = Shown(*columns, console=Console(stderr=True), transient=True)
-        self._bar.start()
-        self._task = self._bar.add_task(self._stage, total=self._total, completed=self._done)

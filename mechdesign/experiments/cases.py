@@ -51,7 +51,7 @@ def answers(
     # A computation that is resumed has the same batches.
     chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
     answer = Answer(study, tuple(results), cases[0])
-    yield from map_chunks(answer, shard.share(chunks), jobs, processes=True, travels=True)
+    yield from map_chunks(answer, shard.share(chunks), jobs, travels=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
@@ -13,9 +11,8 @@ from functools import partial
 from importlib import import_module
 from typing import ParamSpec, TypeVar
 
-from mechdesign.work import interrupts
 from mechdesign.work.pool import LostWorkerError, Pool
-from mechdesign.work.processes import forked
+from mechdesign.work.processes import Processes
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -25,29 +22,27 @@ _ready: ContextVar[Pool | None] = ContextVar("process that has imported a module
 
 @contextmanager
 def importing(module: str, jobs: int) -> Iterator[None]:
-    """Inside, a forked process imports a module, and then does what `call` is given.
+    """Inside, a process imports a module, and then does what `call` is given.
 
     There is none where it would gain nothing: of one job, where the module is here already, and where the system has
-    no room for it or cannot fork. At the end it is killed: what it has not done nobody waits for.
+    no room for it. At the end it is killed: what it has not done nobody waits for.
     """
-    if jobs == 1 or sys.platform != "linux" or module in sys.modules:
+    if jobs == 1 or module in sys.modules:
         yield
         return
     try:
-        pool = Pool(partial(forked, 1, interrupts.leave_to_parent), 1)
+        process = Processes(1)
     except OSError:
         yield
         return
-    process = pool.executor.submit(os.getpid)
-    pool.executor.submit(import_module, module)
-    before = _ready.set(pool)
+    process.submit(import_module, module)
+    before = _ready.set(Pool(lambda: process, 1))
     try:
         yield
     finally:
         _ready.reset(before)
-        with suppress(BrokenExecutor, ProcessLookupError):
-            os.kill(process.result(), signal.SIGKILL)
-        pool.close()
+        process.kill()
+        process.shutdown()
 
 
 def call(function: Callable[Arguments, Value], *arguments: Arguments.args, **options: Arguments.kwargs) -> Value:
@@ -56,7 +51,7 @@ def call(function: Callable[Arguments, Value], *arguments: Arguments.args, **opt
     There the function, its arguments and its value are pickled.
     """
     pool = _ready.get()
-    if pool is not None:
+    if pool is not None and pool.executor is not None:
         with suppress(BrokenExecutor, LostWorkerError):
             value: Value = pool.outcome(pool.executor.submit(partial(function, *arguments, **options)))
             return value

@@ -1,4 +1,4 @@
-"""Chunks of work on threads, processes or any executor, in order and with bounded memory.
+"""Chunks of work on processes, any executor, or threads, in order and with bounded memory.
 
 A long computation is a function that can be pickled, with its study and arguments, and a sequence of items: it can run
 on other machines. Its values do not depend on where they are computed.
@@ -7,18 +7,14 @@ on other machines. Its values do not depend on where they are computed.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from functools import partial
 from typing import TypeVar
 
 from mechdesign.commands import MAX_JOBS
-from mechdesign.work import interrupts
 from mechdesign.work.pool import ChunkMap, Pool
-from mechdesign.work.processes import forked
 
 HELP_PAGE = "reference/commands"
 
@@ -44,70 +40,48 @@ def worker_count(jobs: int | None) -> int:
 
 
 def map_chunks(
-    function: Callable[[Item], Value],
-    items: Iterable[Item],
-    jobs: int | None = 1,
-    *,
-    processes: bool = False,
-    travels: bool = False,
+    function: Callable[[Item], Value], items: Iterable[Item], jobs: int | None = 1, *, travels: bool = False
 ) -> Iterator[Value]:
     """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers; see `workers`."""
-    with workers(function, jobs, processes=processes, travels=travels) as compute:
+    with workers(function, jobs, travels=travels) as compute:
         yield from compute(items)
 
 
 @contextmanager
 def workers(
-    function: Callable[[Item], Value], jobs: int | None = 1, *, processes: bool = False, travels: bool = False
+    function: Callable[[Item], Value], jobs: int | None = 1, *, travels: bool = False
 ) -> Iterator[Callable[[Iterable[Item]], Iterator[Value]]]:
-    """Give a map of `function` over items, in their order, whose workers live until the context ends.
+    """Give a map of `function` over items, in their order.
 
     Few tasks are under way or waiting to be consumed, whatever the number of items. An exception or an interrupt (also
-    of the consumer) drops the chunks not begun and waits for those under way.
+    of the consumer) drops what is not finished.
 
     Parameters
     ----------
     jobs : int or None
         Number of workers; None uses every processor. 1 computes in the calling thread.
-    processes : bool
-        Workers are forked processes where the system has them, else threads. NumPy releases the interpreter's lock in
-        its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
-        less need processes. The function, items and values are pickled.
     travels : bool
-        Whether the work is long enough to run on the executor of `on`, where there is one. The function, items and
-        values are then pickled.
+        Whether the work may be pickled: the function, items and values. It runs on the pool of `on`, or on processes
+        of this map's own. Else it runs on threads, which share memory and gain on few operations of some hundred
+        thousand elements, where NumPy releases the interpreter's lock.
 
     Raises
     ------
     LostWorkerError
         If a chunk ends each worker that takes it.
     """
-    count = worker_count(jobs)
-    elsewhere = _pool.get() if travels else None
-    with _local(count, processes=processes) if elsewhere is None else nullcontext(elsewhere) as pool:
-        yield partial(_one_after_another, function) if pool is None else ChunkMap(pool, function)
+    shared = _pool.get() if travels else None
+    pool = shared or Pool.local(worker_count(jobs), threads=not travels)
+    try:
+        yield ChunkMap(pool, partial(_apart, function) if travels else function)
+    finally:
+        if pool is not shared:
+            pool.close()
 
 
-def _local(count: int, *, processes: bool) -> AbstractContextManager[Pool | None]:
-    """Workers of this machine; None where the calling thread computes alone."""
-    if count == 1:
-        return nullcontext()
-    if processes and sys.platform == "linux":
-        return closing(Pool(partial(forked, count, _settle_in), count))
-    return closing(Pool(partial(ThreadPoolExecutor, count, "mechdesign"), count, threads=True))
-
-
-def _one_after_another(function: Callable[[Item], Value], items: Iterable[Item]) -> Iterator[Value]:
-    for item in items:
-        interrupts.check()
-        yield function(item)
-
-
-def _settle_in() -> None:
-    # Work within a task runs in this worker.
-    _pool.set(None)
-    # The parent handles interrupts: it lets the chunks under way finish.
-    interrupts.leave_to_parent()
+def spread(jobs: int | None) -> AbstractContextManager[None]:
+    """Context whose long computations run on the same processes, or where they run already."""
+    return on(Pool.local(worker_count(jobs))) if _pool.get() is None else nullcontext()
 
 
 @contextmanager
@@ -129,3 +103,8 @@ def here() -> Iterator[None]:
         yield
     finally:
         _pool.reset(pool)
+
+
+def _apart(function: Callable[[Item], Value], item: Item) -> Value:
+    with here():
+        return function(item)

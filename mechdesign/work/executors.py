@@ -129,9 +129,6 @@ class _Dask(Pool):
             self.close()
             message = f"the scheduler has no workers after {counted(_NO_WORKERS, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
-        if address != LOCAL:
-            # The scheduler has tried several workers already.
-            self.losses = 0
         self.executor = self._client.get_executor(pure=False)
 
     @property

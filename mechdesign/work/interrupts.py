@@ -11,8 +11,9 @@ from types import FrameType
 
 # Signals that interrupt, on systems that have them.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-# These and the alarm.
-_ALL = (*SIGNALS, signal.SIGALRM) if hasattr(signal, "SIGALRM") else SIGNALS
+# Whether the system rings after a while.
+_ALARMS = hasattr(signal, "SIGALRM") and hasattr(signal, "setitimer")
+_ALL = (*SIGNALS, signal.SIGALRM) if _ALARMS else SIGNALS
 _PATIENCE = 2.0  # seconds until an interrupt is raised wherever the command is
 
 
@@ -35,14 +36,14 @@ class Signals:
         self._handled = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
         for number in self._handled:
             signal.signal(number, self._note)
-        if hasattr(signal, "SIGALRM"):
+        if _ALARMS:
             signal.signal(signal.SIGALRM, self._alarm)
             sys.unraisablehook = self._dropped
 
     def hear(self) -> None:
         """Unblock signals that have waited since the process began."""
         if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {*self._handled, signal.SIGALRM})
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ALL)
 
     def ignore(self) -> None:
         """Ignore all signals from now on: the command is done."""
@@ -50,7 +51,7 @@ class Signals:
         for number in self._handled:
             signal.signal(number, signal.SIG_IGN)
         # Python removes its handlers as it ends, and an alarm would then kill it.
-        if hasattr(signal, "setitimer"):
+        if _ALARMS:
             signal.setitimer(signal.ITIMER_REAL, 0)
 
     def check(self) -> None:
@@ -66,9 +67,9 @@ class Signals:
 
     def _pend(self) -> None:
         self._pending = True
-        if hasattr(signal, "setitimer"):
+        if _ALARMS:
             signal.setitimer(signal.ITIMER_REAL, _PATIENCE)
-        else:
+        elif self.raising:
             self.check()
 
     def _alarm(self, number: int, frame: FrameType | None) -> None:
@@ -95,19 +96,31 @@ def check() -> None:
         _signals.check()
 
 
+def interrupt() -> None:
+    """From a thread beside the work: let a termination come to this process, which ends a wait of its main thread."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, signal.SIGTERM)
+    else:
+        signal.raise_signal(signal.SIGTERM)
+
+
 def leave_to_parent() -> None:
-    """In a forked process: its parent handles interrupts, and a termination ends it."""
+    """In a process of workers: its parent handles interrupts, and a termination ends it."""
     global _signals
     _signals = None
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ALL)
+    for number in _ALL:
+        signal.signal(number, signal.SIG_DFL if number == signal.SIGTERM else signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ALL)
 
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Inside, signals wait, also in processes that are forked there."""
+    """Inside, signals wait where the system lets them, also in processes that begin there."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _ALL)
     try:
         yield

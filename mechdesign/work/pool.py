@@ -5,21 +5,22 @@ A task is a function and some items. Other processes get the function pickled, a
 
 from __future__ import annotations
 
+import math
 import pickle
 import platform
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
-from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from functools import cache, cached_property, lru_cache, partial
 from itertools import islice
 from operator import length_hint
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from mechdesign.errors import MechdesignError
 from mechdesign.versions import installed
 from mechdesign.work import interrupts
+from mechdesign.work.processes import Processes, inherit
 from mechdesign.work.threads import keep_freed_memory, one_thread
 
 Item = TypeVar("Item")
@@ -31,6 +32,8 @@ LOOK = 0.2  # seconds between two checks for an interrupt
 # Length of a task in seconds, and the largest factor by which its number of chunks grows from task to task.
 _SECONDS = 1.0
 _GROWTH = 8
+# Seconds of work that this process does alone, before others begin: about what it costs to begin them.
+_FORKED, _FRESH = 0.1, 1.0
 
 
 class LostWorkerError(MechdesignError):
@@ -40,19 +43,35 @@ class LostWorkerError(MechdesignError):
 class Pool:
     """`width` workers of an executor; `open_` gives the executor, and a new one where workers were lost.
 
-    Threads of this process share its functions and memory: nothing is pickled for them, and a task is a single chunk.
+    The executor is opened once this process has worked alone for `patience` seconds. Threads of this process share its
+    functions and memory: nothing is pickled for them, and a task is a single chunk.
     """
 
-    losses = 1  #: losses of workers after which chunks are computed one by one
+    executor: Executor | None = None
 
-    def __init__(self, open_: Callable[[], Executor], width: int, *, threads: bool = False) -> None:
-        self._open, self._width, self.threads = open_, width, threads
-        self.executor = open_()
+    def __init__(
+        self, open_: Callable[[], Executor], width: int, patience: float = 0.0, *, threads: bool = False
+    ) -> None:
+        self._open, self._width, self._patience, self.threads = open_, width, patience, threads
+        self.work(0.0)
+
+    @staticmethod
+    def local(count: int, *, threads: bool = False) -> Pool:
+        """Processes or threads of this machine; a single one is this process."""
+        if threads:
+            return Pool(partial(ThreadPoolExecutor, count, "mechdesign"), count, math.inf * (count == 1), threads=True)
+        return Pool(partial(Processes, count), count, math.inf if count == 1 else _FORKED if inherit() else _FRESH)
 
     @property
     def width(self) -> int:
         """Number of workers."""
         return self._width
+
+    def work(self, seconds: float) -> None:
+        """This process has worked alone; open the executor if that is enough."""
+        self._patience -= seconds
+        if self._patience <= 0:
+            self.executor = self._open()
 
     def renew(self) -> None:
         """Take other workers, once some were lost."""
@@ -75,8 +94,18 @@ class Pool:
         except (CancelledError, ConnectionError) as error:
             raise LostWorkerError(f"the executor lost the work: {type(error).__name__} {error}".rstrip()) from error
 
+    def drop(self, tasks: Sequence[Future[Any]]) -> None:
+        """Let go of tasks: processes of this machine that are at one are killed, others finish it."""
+        if not isinstance(self.executor, Processes):
+            for task in tasks:
+                task.cancel()
+        elif not all(task.done() for task in tasks):
+            self.executor.kill()
+
     def close(self) -> None:
         """Drop the tasks not begun and wait for those under way."""
+        if self.executor is None:
+            return
         try:
             self.executor.shutdown(wait=True, cancel_futures=True)
         except TypeError:
@@ -84,28 +113,19 @@ class Pool:
             self.executor.shutdown(wait=False)
 
 
-@dataclass(eq=False)
-class _Task:
+class _Task(NamedTuple):
     """Chunks that are computed together: the number of the first one, and their items."""
 
     first: int
     items: list[Any]
     future: Future[Any]
 
-    @property
-    def lost(self) -> bool:
-        """Whether it will have no value, as its workers were lost."""
-        if not self.future.done():
-            # It belongs to the pool that was lost.
-            return True
-        return self.future.cancelled() or _is_loss(self.future.exception())
-
 
 class ChunkMap(Generic[Item, Value]):
     """An ordered map of a function over items on the workers of a pool.
 
     At most ``3 * width`` tasks are under way or waiting to be consumed; a task has as many chunks as take about a
-    second. Chunks of lost workers are computed again.
+    second. Chunks of lost workers are computed again, one by one with no other work under way.
 
     Raises
     ------
@@ -114,17 +134,29 @@ class ChunkMap(Generic[Item, Value]):
     """
 
     def __init__(self, pool: Pool, function: Callable[[Item], Value]) -> None:
-        self._pool = pool
-        self._work = partial(_timed, function)
-        if not pool.threads:
-            self._work = partial(_perform, _version(), pickle.dumps(function, protocol=5))
+        self._pool, self._function = pool, function
         # Number of chunks of the next task.
         self._chunks = 1
 
+    @cached_property
+    def _work(self) -> Callable[[list[Item]], tuple[list[Value], float]]:
+        if self._pool.threads:
+            return partial(_timed, self._function)
+        version = None if isinstance(self._pool.executor, Processes) else _version()
+        return partial(_perform, version, pickle.dumps(self._function, protocol=5))
+
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:
-        source, left = iter(items), length_hint(items)
-        tasks: deque[_Task] = deque()
-        begun = losses = 0
+        source, begun = iter(items), 0
+        while self._pool.executor is None:
+            interrupts.check()
+            if not (own := [*islice(source, 1)]):
+                return
+            values, seconds = _timed(self._function, own)
+            yield from values
+            begun += 1
+            if length_hint(source, 2) > 1:
+                self._pool.work(seconds)
+        left, tasks = length_hint(source), deque[_Task]()
         try:
             while True:
                 while len(tasks) < (ahead := LOOK_AHEAD * self._pool.width):
@@ -143,23 +175,18 @@ class ChunkMap(Generic[Item, Value]):
                 except Exception as error:
                     if not _is_loss(error):
                         raise
-                    losses += 1
                     self._pool.renew()
-                    while losses > self._pool.losses and tasks:
-                        yield from self._one_by_one(tasks[0])
+                    while tasks:
+                        yield from self._again(tasks[0])
                         tasks.popleft()
-                    losses %= self._pool.losses + 1
-                    for task in tasks:
-                        if task.lost:
-                            task.future = self._submit(task.items)
                 else:
                     tasks.popleft()
                     yield from values
         finally:
-            for task in tasks:
-                task.future.cancel()
+            self._pool.drop([task.future for task in tasks])
 
     def _submit(self, items: list[Item]) -> Future[Any]:
+        assert self._pool.executor is not None
         try:
             return self._pool.executor.submit(self._work, items)
         except BrokenExecutor as error:
@@ -178,9 +205,10 @@ class ChunkMap(Generic[Item, Value]):
             self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
         return cast(list[Value], values)
 
-    def _one_by_one(self, task: _Task) -> Iterator[Value]:
-        """Values of a task that may end its worker: chunk by chunk, with no other work under way."""
-        if not task.lost:
+    def _again(self, task: _Task) -> Iterator[Value]:
+        """Values of a task that was under way when workers were lost, and may have ended one."""
+        future = task.future
+        if future.done() and not future.cancelled() and not _is_loss(future.exception()):
             yield from self._values(task)
             return
         for number, item in enumerate(task.items, task.first + 1):
@@ -214,9 +242,9 @@ def _function(content: bytes) -> Callable[[Any], Any]:
     return function
 
 
-def _perform(version: str, content: bytes, items: list[Any]) -> tuple[list[Any], float]:
-    """In a worker: the values of a pickled function, and how long they took, in seconds."""
-    if version != _version():
+def _perform(version: str | None, content: bytes, items: list[Any]) -> tuple[list[Any], float]:
+    """In a worker: the values of a pickled function, and how long they took, in seconds; None is the same version."""
+    if version is not None and version != _version():
         raise MechdesignError(f"a worker has {_version()}, not {version}; install the same there")
     keep_freed_memory()
     return _timed(_function(content), items)

@@ -1,62 +1,102 @@
-"""Forked processes: executors of them, and a process that does one long task at a time and reports its progress."""
+"""Processes of this machine, started in whatever way the system has, that end when this one does, however it ends."""
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
 import os
-import signal
-from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
-from contextlib import suppress
-from functools import partial
-from multiprocessing.connection import Connection
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager, nullcontext, suppress
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import BaseContext
+from types import ModuleType
 from typing import Any
 
-from mechdesign.work.interrupts import Signals, undisturbed
+from mechdesign.work import interrupts
 
 # Reports the progress of a task.
 Tell = Callable[[Any], None]
 # From the number of a task, and the function that reports its progress, to its value.
 Work = Callable[[int, Tell], Any]
 
-# Option of Linux's prctl, from prctl.h: the signal that a process gets when its parent ends.
-_PR_SET_PDEATHSIG = 1
+
+def context() -> BaseContext:
+    """How processes start: as was chosen for this one; else forked on Linux, where that is quick and safe."""
+    chosen = multiprocessing.get_start_method(allow_none=True)
+    return multiprocessing.get_context(chosen or ("fork" if sys.platform == "linux" else None))
 
 
-def forked(count: int, settle_in: Callable[[], None]) -> Executor:
-    """An executor of forked workers, which end when this process does; signals wait until each has called `settle_in`.
+def inherit() -> bool:
+    """Whether new processes have what this one has in its memory, and begin in no time."""
+    return context().get_start_method() == "fork"
+
+
+class Processes(ProcessPoolExecutor):
+    """An executor of processes that begin at once, each with `settle_in`; left out, this process handles interrupts.
 
     Raises
     ------
     OSError
         If the system has no room for them.
     """
-    fork = multiprocessing.get_context("fork")
-    others = multiprocessing.active_children()
+
+    def __init__(self, count: int, settle_in: Callable[..., None] = interrupts.leave_to_parent, *given: Any) -> None:
+        super().__init__(count, context(), _begin, (settle_in, *given))
+        others = multiprocessing.active_children()
+        try:
+            with interrupts.undisturbed(), nullcontext() if inherit() else _without_script():
+                # Work that meets no idle process begins one.
+                for _ in range(count):
+                    self.submit(os.getpid)
+        finally:
+            self._begun = set(multiprocessing.active_children()).difference(others)
+            if len(self._begun) < count:
+                # Those that found room would wait for work for ever.
+                self.kill()
+
+    def kill(self) -> None:
+        """End them at once; work under way is lost."""
+        for process in self._begun:
+            process.kill()
+
+
+@contextmanager
+def _without_script() -> Iterator[None]:
+    """Inside, new processes begin without the script that runs here, which would begin others there in its turn."""
+    script, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     try:
-        pool = ProcessPoolExecutor(count, fork, initializer=_end_with_parent, initargs=(os.getpid(), settle_in))
-        with undisturbed():
-            # The first work forks all of them.
-            pool.submit(os.getpid)
-    except OSError:
-        # Where not all could be forked, those that were would wait for work for ever.
-        for worker in set(multiprocessing.active_children()).difference(others):
-            worker.kill()
-        raise
-    return pool
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
-def _end_with_parent(parent: int, settle_in: Callable[[], None]) -> None:
-    """End this process when its parent ends, however that ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGKILL)
-    settle_in()
+def _begin(settle_in: Callable[..., None], *given: Any) -> None:
+    threading.Thread(target=_watch, args=[each for each in given if isinstance(each, Connection)], daemon=True).start()
+    if not sys.warnoptions:
+        # What libraries warn of is nothing to users.
+        warnings.simplefilter("ignore")
+    settle_in(*given)
+
+
+def _watch(*calls: Connection) -> None:
+    """End this process when its parent ends, and interrupt its work when the parent calls."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    # The parent's ends close when it ends.
+    with suppress(EOFError):
+        while parent.sentinel not in (ready := wait([parent.sentinel, *calls])):
+            for call in calls:
+                if call in ready:
+                    call.recv()
+                    interrupts.interrupt()
+    os._exit(1)
 
 
 class TaskProcess:
-    """A forked process that does one task at a time; one that is killed costs its task alone.
+    """A process that does one task at a time; one that is killed costs its task alone.
 
     An interrupt is raised in the task, which returns what it has. Wait for `notes` to be readable, and call `hear`.
 
@@ -73,11 +113,10 @@ class TaskProcess:
     def __init__(self, work: Work) -> None:
         self.task: int | None = None
         self.lost = False
-        self.notes, notes = multiprocessing.Pipe(duplex=False)
+        self.notes, theirs = multiprocessing.Pipe()
         # Only the process holds the other end, which closes when the process is killed.
-        with notes:
-            self._executor = forked(1, partial(_take_tasks, work, notes))
-        self._process = self._executor.submit(os.getpid)
+        with theirs:
+            self._executor = Processes(1, _take_tasks, work, theirs)
 
     def begin(self, task: int) -> None:
         """Give it a task."""
@@ -100,30 +139,27 @@ class TaskProcess:
     def interrupt(self) -> None:
         """Raise an interrupt in the task under way, if there is one."""
         if self.task is not None:
-            self._send(signal.SIGTERM)
+            with suppress(OSError):
+                self.notes.send(None)
 
     def close(self) -> None:
         """End the process; a task under way is lost."""
         if self.task is not None:
-            self._send(signal.SIGKILL)
+            self._executor.kill()
         self._executor.shutdown()
         self.notes.close()
-
-    def _send(self, number: int) -> None:
-        with suppress(ProcessLookupError, BrokenExecutor):
-            os.kill(self._process.result(), number)
 
 
 def _take_tasks(work: Work, notes: Connection) -> None:
     """In the process, when it begins: signals are raised during a task, and after one no further task begins."""
     global _duty
-    signals = Signals()
+    signals = interrupts.Signals()
     signals.raising = False
     _duty = work, notes, signals
     signals.hear()
 
 
-_duty: tuple[Work, Connection, Signals]
+_duty: tuple[Work, Connection, interrupts.Signals]
 
 
 def _do(task: int) -> Any:
@@ -132,8 +168,9 @@ def _do(task: int) -> Any:
 
     def tell(note: Any) -> None:
         # An interrupt must not leave a report half written.
-        with undisturbed():
-            notes.send(note)
+        before, signals.raising = signals.raising, False
+        notes.send(note)
+        signals.raising = before
 
     value = None
     try:

@@ -10,8 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-from rich.console import Console
-from rich.live import Live
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import Outcome
@@ -92,15 +90,55 @@ def test_a_long_name_leaves_room_for_what_became_of_it(capsys, monkeypatch):
     assert "requirement not met" in capsys.readouterr().out
 
 
-def test_the_table_of_what_is_under_way_has_room_for_it():
-    live_table = LiveTable(quiet=False)
-    live_table._live = Live(console=Console(file=io.StringIO(), width=400, height=24))
-    live_table.start(["long " * 30, "b"])
-    live_table.advance(0, ProgressNote("reliability", "samples", 1, 4))
-    live_table.done(1, Outcome("b", "kinematics", Path(), 1, 0))
-    live_table._live.console.print(live_table._table())
-    text = live_table._live.console.file.getvalue()
-    assert all(word in text for word in ("kinematics", "requirement not met", "reliability", "samples", "1 failed"))
+class Screen(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    """Standard error is a terminal of 400 columns, on which tables appear at once."""
+    settings = {"COLUMNS": "400", "LINES": "24", "TERM": "xterm", "CI": ""}
+    for name, value in settings.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setattr(terminal, "DELAY", -1.0)
+
+    def begin():
+        # Not sooner, as the stream is pytest's at first.
+        monkeypatch.setattr(sys, "stderr", Screen())
+        return sys.stderr
+
+    return begin
+
+
+def test_the_table_of_what_is_under_way_has_room_for_it(screen):
+    shown = screen()
+    with LiveTable(quiet=False) as live_table:
+        live_table.start(["long " * 30, "b"])
+        live_table.advance(0, ProgressNote("reliability", "samples", 1, 4))
+        live_table._refreshed = 0.0
+        live_table.done(1, "kinematics", "requirement not met", failed=True)
+    words = ("kinematics", "requirement not met", "reliability", "samples", "25%", "0 of 2 studies", "1 failed")
+    assert [word for word in words if word not in shown.getvalue()] == []
+
+
+def test_the_table_fits_on_the_screen(screen):
+    """Whatever has been answered, rows under way are seen, and failures as long as there is room."""
+    shown = screen()
+    with LiveTable(quiet=False) as live_table:
+        live_table.start([f"study {k}" for k in range(100)])
+        for k in range(98):
+            live_table.done(k, "kinematics", "failed" if k % 4 else "done", failed=bool(k % 4))
+        for k in (98, 99):
+            live_table._refreshed = 0.0
+            live_table.advance(k, ProgressNote("optimize", "designs", k, 200))
+    last = shown.getvalue().rpartition("0 of 100 studies")[2]
+    assert all(word in last for word in ("73 failed", "study 97", "study 98", "study 99", "49%"))
+    assert "study 1 " not in last
+    assert last.count("kinematics") + last.count("optimize") <= 23
 
 
 @pytest.mark.nightly
@@ -182,13 +220,6 @@ def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeyp
     assert "open " not in invoke("kinematics", "slider.yaml").stderr
 
 
-class Screen(io.StringIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self):
-        return True
-
-
 def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
     monkeypatch.setenv("TERM", "xterm")
@@ -196,17 +227,21 @@ def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
     place = "a long place " * 10
     words = f"s: run: requirement: range at least 65: NOT MET, worst 60.2 at {place}\ns: x at most 1: met, worst 0\n"
     painted = words.replace("NOT MET", "\x1b[1;31mNOT MET\x1b[0m").replace(": met", ": \x1b[32mmet\x1b[0m")
-    live_table = LiveTable(quiet=False)
+    live_table = LiveTable(quiet=True)
     for stream, told in ((Screen(), painted), (io.StringIO(), words)):
         live_table._stream = stream
         live_table.say(words)
         monkeypatch.setattr(sys, "stderr", stream)
         terminal.say(words.rstrip("\n"))
         assert stream.getvalue() == told * 2
-    live_table._live = Live(console=Console(file=io.StringIO(), width=400, height=24))
-    live_table._stream = Screen()
-    live_table.say(words)
-    assert f"NOT MET, worst 60.2 at {place.rstrip()}" in live_table._live.console.file.getvalue()
+    monkeypatch.setattr(terminal, "DELAY", -1.0)
+    monkeypatch.setenv("CI", "")
+    monkeypatch.setattr(sys, "stderr", Screen())
+    with LiveTable(quiet=False) as live_table:
+        live_table.start(["s"])
+        live_table.show()
+        live_table.say(words)
+    assert f"NOT MET\x1b[0m, worst 60.2 at {place.rstrip()}" in sys.stderr.getvalue()
     monkeypatch.setenv("NO_COLOR", "1")
     assert terminal.coloured(words, Screen()) == words
 

@@ -14,8 +14,6 @@ import mechdesign
 from mechdesign.statistics import Request
 from mechdesign.work import ahead
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
-
 MODULE = "module_that_takes_long"
 FOUR_BAR = """
 mechanism:

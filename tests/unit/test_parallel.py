@@ -5,7 +5,6 @@ import os
 import pickle
 import signal
 import site
-import sys
 import threading
 import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -19,9 +18,9 @@ from mechdesign.report.tables import to_csv
 from mechdesign.work import executors, pool
 from mechdesign.work.chunks import map_chunks, on
 from mechdesign.work.pool import LOOK_AHEAD, ChunkMap, LostWorkerError, Pool
+from mechdesign.work.processes import Processes
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-forked = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -92,28 +91,31 @@ def fatal(marks, times, k):
     return k * k
 
 
+def on_processes(function, items):
+    """A map on two processes from the first item on."""
+    with on(Pool(partial(Processes, 2), 2)):
+        yield from map_chunks(function, items, travels=True)
+
+
 @pytest.mark.slow
-@forked
 def test_a_lost_worker_costs_its_chunk(tmp_path):
-    assert [*map_chunks(partial(fatal, tmp_path, 1), range(200), 2, processes=True)] == [k * k for k in range(200)]
+    assert [*on_processes(partial(fatal, tmp_path, 1), range(200))] == [k * k for k in range(200)]
     # Of the others only those are computed twice that were under way.
     assert len([*tmp_path.iterdir()]) <= 200 + 2 * LOOK_AHEAD * 8
     assert len([*tmp_path.glob("199_*")]) == 1
 
 
 @pytest.mark.slow
-@forked
 def test_a_chunk_that_is_always_lost_is_named(tmp_path):
     found = []
     with pytest.raises(LostWorkerError, match=r"^chunk 8 of the work ends each process"):
-        found.extend(map_chunks(partial(fatal, tmp_path, 99), range(200), 2, processes=True))
+        found.extend(on_processes(partial(fatal, tmp_path, 99), range(200)))
     assert len([*tmp_path.glob("7_*")]) <= 4
 
 
-@forked
 def test_an_error_in_a_process_ends_the_work():
     with pytest.raises(ZeroDivisionError):
-        list(map_chunks(partial(divmod, 1), range(1000), 2, processes=True))
+        list(on_processes(partial(divmod, 1), range(1000)))
     assert not multiprocessing.active_children()
 
 

@@ -9,6 +9,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
 import mechdesign
+from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.reliability import laws
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.laws import (
@@ -22,7 +23,7 @@ from mechdesign.questions.reliability.laws import (
     Uniform,
 )
 from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
-from mechdesign.questions.reliability.pin_laws import PIN_LAWS
+from mechdesign.questions.reliability.pin_laws import PIN_LAWS, PinLaw
 from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.reliability.simulation import generator
 from mechdesign.questions.reliability.study_sources import find_sources
@@ -44,6 +45,13 @@ U = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + 0.5 * np.diff(EDGES)[:, None] * N
 DENSITY = (0.5 * np.diff(EDGES)[:, None] * WEIGHTS).ravel() * np.exp(-0.5 * U * U) / np.sqrt(2 * np.pi)
 
 
+def drawn_by(law: Marginal | PinLaw, seed: int, parts: int = 1) -> Floats:
+    """Draws of a law; of places of pins both parts."""
+    out = np.empty((parts, SAMPLES))
+    law.draw(generator(seed, 0, 0), out if parts > 1 else out[0])
+    return out if parts > 1 else out[0]
+
+
 def test_every_declared_law_is_tested_here() -> None:
     assert {type(law) for law in LAWS.values()} == {*laws.LAWS.values()}
 
@@ -62,7 +70,7 @@ def test_moments_are_those_of_the_quantiles(law: Marginal) -> None:
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_draws_have_the_law_of_the_quantiles(law: Marginal) -> None:
     """Kolmogorov's distance; 1.95/sqrt(n) is passed once in a thousand."""
-    drawn = np.sort(law.draw(generator(1, 0, 0), SAMPLES))
+    drawn = np.sort(drawn_by(law, 1))
     u = np.linspace(-4, 4, 400)
     share = np.searchsorted(drawn, law.at(u)) / SAMPLES
     assert np.abs(share - ndtr(u)).max() < 1.95 / np.sqrt(SAMPLES)
@@ -105,7 +113,7 @@ def test_measured_values_have_their_mean_and_deviation_and_interpolated_quantile
     assert 1.0 < stretch < 1.1
     assert law.at(np.zeros(1))[0] - mean == pytest.approx(stretch * (np.median(values) - mean), rel=1e-12)
     assert law.at(np.array([-9.0, 9.0])) == pytest.approx([law.low, law.high])
-    drawn = law.draw(generator(1, 0, 0), SAMPLES)
+    drawn = drawn_by(law, 1)
     assert np.abs(np.searchsorted(np.sort(drawn), x[::1000]) / SAMPLES - shares[::1000]).max() < 0.02 + 1.95 / 447
 
 
@@ -131,7 +139,7 @@ def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
 @pytest.mark.parametrize("name", PIN_LAWS)
 def test_pins(name: str) -> None:
     law = PIN_LAWS[name]
-    x, y = law.draw(generator(2, 0, 0), SAMPLES)
+    x, y = drawn_by(law, 2, 2)
     for drawn in (x, y):
         error = np.sqrt(np.mean(drawn**4) / SAMPLES)
         assert abs(np.mean(drawn**2) - law.variance) < 4 * error
@@ -145,7 +153,7 @@ def test_pins(name: str) -> None:
 def test_pins_from_normal_variables_have_the_same_law(name: str) -> None:
     law = PIN_LAWS[name]
     x, y = law.at(*generator(3, 0, 0).standard_normal((2, SAMPLES)))
-    other = np.sort(np.hypot(*law.draw(generator(4, 0, 0), SAMPLES)))
+    other = np.sort(np.hypot(*drawn_by(law, 4, 2)))
     radius = np.sort(np.hypot(x, y))
     levels = np.linspace(0, 1.2, 200)
     gap = np.searchsorted(radius, levels) - np.searchsorted(other, levels)
@@ -170,7 +178,7 @@ def test_the_normal_law_cut_to_the_disc_has_the_variance_of_s2() -> None:
 
 
 def test_which_pins_leave_their_hole() -> None:
-    reach = {name: np.hypot(*law.draw(generator(2, 0, 0), SAMPLES)).max() for name, law in PIN_LAWS.items()}
+    reach = {name: np.hypot(*drawn_by(law, 2, 2)).max() for name, law in PIN_LAWS.items()}
     assert reach["normal"] > 1
     assert 0.99 < reach["normal_in_disc"] <= 1
     assert 0.99 < reach["uniform"] <= 1
@@ -178,7 +186,7 @@ def test_which_pins_leave_their_hole() -> None:
 
 
 def test_pins_that_are_uniform_fill_the_disc_evenly() -> None:
-    radius = np.hypot(*PIN_LAWS["uniform"].draw(generator(2, 0, 0), SAMPLES))
+    radius = np.hypot(*drawn_by(PIN_LAWS["uniform"], 2, 2))
     shares, _ = np.histogram(radius**2, 10, (0, 1))
     assert np.abs(shares / SAMPLES - 0.1).max() < 4 * np.sqrt(0.09 / SAMPLES)
 

@@ -77,7 +77,7 @@ def optimize(
         else searching.allowance(len(section.variables), len(weights), alone=bool(question.alone))
     )
     question, meanings = question.limited(MAX_KEPT_ROWS // budget), question.meanings
-    with workers(Evaluator(question), jobs, processes=True, travels=True) as compute:
+    with workers(Evaluator(question), jobs, travels=True) as compute:
         judge = Judge(question, compute, progress, journal)
         try:
             doubts = _ask(study, judge, weights, budget, study.seed if seed is None else seed)

@@ -43,15 +43,21 @@ def _normal_quantile(share: Floats | float) -> Floats:
     return np.atleast_1d(ndtri(share))
 
 
-def normal_within(radius: float, rng: np.random.Generator, dimension: int, count: int) -> Floats:
-    """Standard normal points, shape (dimension, count), drawn again where they are farther from zero than `radius`."""
-    points = rng.standard_normal((dimension, count))
-    outside = np.flatnonzero((points * points).sum(axis=0) > radius * radius)
+def normal_within(radius: float, rng: np.random.Generator, out: Floats) -> None:
+    """Fill with standard normal points, shape (dimension, count), drawn again where farther from zero than `radius`."""
+    rng.standard_normal(out=out)
+    outside = _outside(radius, out)
     while len(outside):
-        again = rng.standard_normal((dimension, len(outside)))
-        points[:, outside] = again
-        outside = outside[(again * again).sum(axis=0) > radius * radius]
-    return points
+        again = rng.standard_normal((len(out), len(outside)))
+        out[:, outside] = again
+        outside = outside[_outside(radius, again)]
+
+
+def _outside(radius: float, points: Floats) -> Ints:
+    squared = points[0] * points[0]
+    for row in points[1:]:
+        squared += row * row
+    return np.flatnonzero(squared > radius * radius)
 
 
 @dataclass(frozen=True)
@@ -110,9 +116,10 @@ class Marginal(ABC):
         """Mean, and second to fourth central moment."""
         return self.mean, self.second * self.sigma**2, 0.0, self.fourth * self.sigma**4
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Independent deviations, shape (count,)."""
-        return self.at(rng.standard_normal(count))
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        """Fill with independent deviations, shape (count,)."""
+        rng.standard_normal(out=out)
+        out[:] = self.at(out)
 
     @property
     def kinks(self) -> Floats:
@@ -148,6 +155,11 @@ class Normal(Marginal):
     name = "normal"
     meaning = "normal; the tolerance is three standard deviations"
 
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        rng.standard_normal(out=out)
+        out *= self.sigma
+        out += self.mean
+
     def at(self, u: Floats) -> Floats:
         return np.asarray(self.mean + self.sigma * u)
 
@@ -164,8 +176,10 @@ class TruncatedNormal(Marginal):
     second = 1.0 - _TAIL
     fourth = 3.0 * second - SIGMAS**2 * _TAIL
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return np.asarray(self.mean + self.sigma * normal_within(SIGMAS, rng, 1, count)[0])
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        normal_within(SIGMAS, rng, out[None])
+        out *= self.sigma
+        out += self.mean
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtri
@@ -184,8 +198,10 @@ class Uniform(Marginal):
     reach = math.sqrt(3.0)
     fourth = 1.8
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return self.low + (self.high - self.low) * rng.random(count)
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        rng.random(out=out)
+        out *= self.high - self.low
+        out += self.low
 
     def at(self, u: Floats) -> Floats:
         return self._from_ends(u, (self.high - self.low) * _normal_cdf(-np.abs(u)))
@@ -214,10 +230,8 @@ class Triangular(Marginal):
     def kinks(self) -> Floats:
         return _normal_quantile((self.mode - self.low) / (self.high - self.low) if self.high > self.low else 0.5)
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        if self.high == self.low:
-            return np.full(count, self.low)
-        return rng.triangular(self.low, self.mode, self.high, count)
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        out[:] = self.low if self.high == self.low else rng.triangular(self.low, self.mode, self.high, len(out))
 
     def at(self, u: Floats) -> Floats:
         width, rise = self.high - self.low, self.mode - self.low
@@ -315,8 +329,8 @@ class Beta(Marginal):
         excess = 6.0 * ((a - b) ** 2 * (n + 1.0) - a * b * (n + 2.0)) / (a * b * (n + 2.0) * (n + 3.0))
         return self.low + width * a / n, second, third, (3.0 + excess) * second**2
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return self.low + (self.high - self.low) * rng.beta(*self.shape, count)
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        out[:] = self.low + (self.high - self.low) * rng.beta(*self.shape, len(out))
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import betaincinv
@@ -354,8 +368,8 @@ class MeasuredLaw(Marginal):
     def kinks(self) -> Floats:
         return _normal_quantile(self._shares)
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return self._quantile(rng.random(count))
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        out[:] = self._quantile(rng.random(len(out)))
 
     def at(self, u: Floats) -> Floats:
         return self._quantile(_normal_cdf(u))

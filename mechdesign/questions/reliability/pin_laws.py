@@ -24,13 +24,15 @@ class PinLaw:
     ----------
     variance, fourth : float
         E[x^2] and E[x^4] of each coordinate.
+    draw : callable
+        Fills an array of shape (2, count) with places.
     stretch : callable
         Ratio of the pin's offset to the length of two standard normal variables, from half that length squared.
     """
 
     variance: float
     fourth: float
-    draw: Callable[[np.random.Generator, int], tuple[Floats, Floats]]
+    draw: Callable[[np.random.Generator, Floats], None]
     stretch: Callable[[Floats], Floats]
 
     @property
@@ -50,18 +52,18 @@ _CUT = 0.5 * SIGMAS**2
 _OUTSIDE = math.exp(-_CUT)
 
 
-def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tuple[Floats, Floats]:
+def _normal(rng: np.random.Generator, out: Floats, cut: float = math.inf) -> None:
     """Normal places of sigma 1/3, drawn again where they are farther than `cut` standard deviations from the middle."""
-    x, y = normal_within(cut, rng, 2, count) * (1.0 / 3.0)
-    return x, y
+    normal_within(cut, rng, out)
+    out *= 1.0 / 3.0
 
 
-def _turned(rng: np.random.Generator, count: int, *, inside: bool) -> tuple[Floats, Floats]:
+def _turned(rng: np.random.Generator, out: Floats, *, inside: bool) -> None:
     """Places uniform in the disc, or on its rim."""
-    radius = np.sqrt(rng.random(count)) if inside else 1.0
-    angle = rng.random(count)
+    radius = np.sqrt(rng.random(out.shape[1])) if inside else 1.0
+    angle = rng.random(out.shape[1])
     angle *= 2.0 * np.pi
-    return radius * np.cos(angle), radius * np.sin(angle)
+    out[:] = radius * np.cos(angle), radius * np.sin(angle)
 
 
 def _stretch(squared: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
@@ -125,9 +127,10 @@ class SlideLaw:
         """E[x^2 y^2] of both ends."""
         return self.variance**2
 
-    def draw(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
-        """Both ends, each of shape (count,)."""
-        return self.end.draw(rng, count), self.end.draw(rng, count)
+    def draw(self, rng: np.random.Generator, out: Floats) -> None:
+        """Fill with both ends, shape (2, count)."""
+        for end in out:
+            self.end.draw(rng, end)
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Both ends at values of two independent standard normal variables."""

@@ -189,21 +189,27 @@ class Sources:
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draws of `count` mechanisms, shape (variables, count)."""
+        drawn = np.empty((len(self.scalars) + 3 * len(self.pins), count))
         if self.correlation is None:
-            rows: list[Floats | float] = [scalar.law.draw(rng, count) for scalar in self.scalars]
+            for scalar, row in zip(self.scalars, drawn, strict=False):
+                scalar.law.draw(rng, row)
         else:
             normal = self.correlation.root @ rng.standard_normal((len(self.scalars), count))
-            rows = [scalar.law.at(u) for scalar, u in zip(self.scalars, normal, strict=True)]
-        for pin in self.pins:
-            radius = pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)
-            rows += [radius, *pin.laws[pin.sampled].draw(rng, count)]
-        return np.array([np.broadcast_to(row, (count,)) for row in rows])
+            for scalar, row, u in zip(self.scalars, drawn, normal, strict=False):
+                row[:] = scalar.law.at(u)
+        for pin, parts in zip(self.pins, self._by_pin(drawn), strict=True):
+            parts[0] = 0.0
+            if pin.law is not None:
+                pin.law.draw(rng, parts[0])
+            parts[0] += pin.radius
+            pin.laws[pin.sampled].draw(rng, parts[1:])
+        return drawn
 
     def redraw_pins(self, drawn: Floats, rng: np.random.Generator) -> Floats:
         """Draws of the same mechanisms with new places of their pins in their holes."""
         drawn = drawn.copy()
-        for pin, (_, *place) in zip(self.pins, self._by_pin(drawn), strict=True):
-            place[0][:], place[1][:] = pin.laws[pin.sampled].draw(rng, drawn.shape[1])
+        for pin, parts in zip(self.pins, self._by_pin(drawn), strict=True):
+            pin.laws[pin.sampled].draw(rng, parts[1:])
         return drawn
 
     def at(self, u: Floats, *, directed: bool = False) -> Floats:

@@ -1,10 +1,9 @@
-"""Figures to bytes, in two processes where that is possible; a figure that fails does not stop the others."""
+"""Figures to bytes, in two processes where they inherit them; a figure that fails does not stop the others."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from typing import ParamSpec
 
@@ -14,8 +13,9 @@ from mechdesign.errors import explain
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.marks import Picture
-from mechdesign.work.chunks import map_chunks, worker_count
-from mechdesign.work.pool import LostWorkerError
+from mechdesign.work.chunks import worker_count
+from mechdesign.work.pool import ChunkMap, LostWorkerError, Pool
+from mechdesign.work.processes import inherit
 
 # Draws one picture: the bytes of its files by their names.
 Drawing = Callable[[], dict[str, bytes]]
@@ -23,9 +23,6 @@ Arguments = ParamSpec("Arguments")
 
 # What a function that is declared as a picture gives.
 Made = Figure | Picture | Mapping[str, Figure | Picture] | None
-
-# With fewer pictures, forking costs more time than it saves.
-FEWEST = 3
 
 
 class Gallery(dict[str, Figure]):
@@ -69,7 +66,7 @@ def _draw(key: int, name: str) -> dict[str, bytes] | str:
 
 
 def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Call every drawing; on Linux in two forked processes, if two `jobs` may be done at a time.
+    """Call every drawing, in two processes where they inherit what is drawn, if two `jobs` may be done at a time.
 
     Matplotlib draws on one processor only. The bytes do not depend on where they are drawn. What a process that was
     killed left out is drawn in this one.
@@ -87,9 +84,9 @@ def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[di
     key = id(drawings)
     _here[key] = drawings
     try:
-        with suppress(LostWorkerError):
-            count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
-            for name, drawn in zip(names, map_chunks(partial(_draw, key), names, count, processes=True), strict=True):
+        count = min(2, worker_count(jobs)) if inherit() else 1
+        with suppress(LostWorkerError), closing(Pool.local(count)) as pool:
+            for name, drawn in zip(names, ChunkMap(pool, partial(_draw, key))(names), strict=True):
                 outcomes[name] = drawn
         outcomes |= {name: _draw(key, name) for name in names if name not in outcomes}
     finally:

@@ -1,0 +1,197 @@
+"""The command line where processes are not forked and signals are few, as on Windows and macOS: the same bytes.
+
+What such systems lack is taken from Python in every process of a command, those that it starts, too.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from .conftest import SLIDER
+
+LACKING = """
+import ctypes, multiprocessing, os, signal, sys
+
+for module, names in {
+    os: ("fork", "O_NOFOLLOW", "sched_getaffinity"),
+    signal: ("SIGHUP", "SIGALRM", "setitimer", "pthread_sigmask", "pthread_kill"),
+}.items():
+    for name in names:
+        delattr(module, name)
+sys.modules["fcntl"] = None
+
+
+class Library(ctypes.CDLL):
+    def __getattr__(self, name):
+        if name == "prctl":
+            raise AttributeError(name)
+        return super().__getattr__(name)
+
+
+ctypes.CDLL = Library
+multiprocessing.set_start_method("spawn")
+
+# Workers begin with the first work, however short it is.
+from mechdesign.work import pool
+
+pool._FRESH = 1e-9
+"""
+ARM = """
+mechanism:
+  parameters: {l: 90}
+  links: {ground: {O: [0, 0]}, upper: [O, A, 120], lower: [A, P, l]}
+  drives: {shoulder: {angle: upper}, elbow: {angle: lower}}
+  sketch: {A: [100, 60], P: [150, 140]}
+  limits: [{drive: shoulder, min: 0, max: 120}, {drive: elbow, min: 0, max: 150}]
+kinematics:
+  sweep: {shoulder: {from: 0, to: 90, number: 4}, elbow: {from: 10, to: 90, number: 5}}
+reliability:
+  poses: [{shoulder: 30, elbow: 60}, {shoulder: 20, elbow: 80}]
+  outputs: [P.x, P.y]
+  dimensions: {upper.length: {sigma: 0.05}, lower.length: {sigma: 0.05}}
+  limits: {P.x: 0.15, P.y: 0.15}
+  methods: [analytic, monte_carlo]
+  samples: 90000
+  sobol: 0
+workspace: {point: P, indices: []}
+optimize:
+  variables: {l: {from: 60, to: 110, step: 5}}
+  method: grid
+  maximize: [workspace.indices.area]
+matrix: {vary: {mechanism.parameters.l: [70, 80, 90, 100]}, results: [reliability.moments.sigma.max]}
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    long = ARM[: ARM.index("kinematics:")] + ARM[ARM.index("reliability:") : ARM.index("workspace:")]
+    long = long.replace("90000", "2000000000")
+    for name, text in {"arm": ARM, "long": long, "longer": long, "slider": SLIDER}.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    (tmp_path / "lacking").mkdir()
+    (tmp_path / "lacking/sitecustomize.py").write_text(LACKING)
+    return tmp_path
+
+
+def begin(*arguments):
+    """Begin a command on such a system; it leads a group of processes, as one on a terminal."""
+    paths = [str(Path("lacking").absolute()), *filter(None, [os.environ.get("PYTHONPATH")])]
+    script = [] if arguments[0].endswith(".py") else ["-m", "mechdesign"]
+    return subprocess.Popen(
+        [sys.executable, *script, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)}, start_new_session=True,
+    )  # fmt: skip
+
+
+def ended(process):
+    """Exit code, output and messages of a command, within a minute or two."""
+    try:
+        return *process.communicate(timeout=120), process.returncode
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def workers(process, busy=0.0):
+    """Processes of Python that a command has started, once there are two and each has been so busy, in seconds."""
+    end = time.monotonic() + 100
+    while time.monotonic() < end and process.poll() is None:
+        there = [each for each in psutil.Process(process.pid).children() if "spawn_main" in " ".join(each.cmdline())]
+        if len(there) == 2 and all(each.cpu_times().user > busy for each in there):
+            return there
+        time.sleep(0.05)
+    raise AssertionError(process.communicate())
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("kinematics", "slider.yaml"),
+        ("reliability", "arm.yaml", "--no-plots"),
+        ("optimize", "arm.yaml", "--no-plots"),
+        ("sweep", "arm.yaml", "--no-plots"),
+        ("run", "arm.yaml", "slider.yaml", "--no-plots"),
+    ],
+)
+def test_the_same_bytes(here, invoke, command):
+    output, told, code = ended(begin(*command, "--jobs", 2, "--out", "there"))
+    assert (code, "rror" in told) == (0, False), told
+    done = invoke(*command, "--jobs", 1, "--out", "here")
+    assert (output, told.replace("there", "here")) == (done.stdout.replace("here", "there"), done.stderr)
+    assert contents(here / "there") == contents(here / "here")
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (("reliability", "long.yaml"), "long: reliability: interrupted"),
+        (("run", "long.yaml", "longer.yaml"), "interrupted; what was finished is whole"),
+    ],
+)
+def test_ctrl_c(here, command, told):
+    """It comes to all processes of a terminal; what was simulated is kept."""
+    with begin(*command, "--no-plots", "--jobs", 2, "--out", "out") as process:
+        there = workers(process, 2.0)
+        os.killpg(process.pid, signal.SIGINT)
+        begun = time.monotonic()
+        _, said, code = ended(process)
+    assert code == 130
+    assert time.monotonic() - begun < 20
+    assert told in said
+    assert "Traceback" not in said
+    assert list((here / "out").rglob("moments.csv"))
+    assert not any(each.is_running() for each in there)
+
+
+def test_a_script_without_a_guard(here):
+    """New processes do not run it again."""
+    (here / "script.py").write_text("""
+import mechdesign
+study = mechdesign.load("arm.yaml")
+one, two = (mechdesign.reliability(study, jobs=jobs).tables["reliability"]["failure"] for jobs in (1, 2))
+print(*(one == two))
+""")
+    output, told, code = ended(begin("script.py"))
+    assert (output, told, code) == ("True True True True\n", "", 0)
+
+
+def test_a_worker_that_dies(here, invoke):
+    """Its chunks are computed again."""
+    command = ("reliability", "arm.yaml", "--set", "reliability.samples=1000000", "--no-plots", "--jobs")
+    with begin(*command, 2, "--out", "there") as process:
+        workers(process, 0.1)[0].kill()
+        assert ended(process)[2] == 0
+    assert invoke(*command, 1, "--out", "here").exit_code == 0
+    assert contents(here / "there") == contents(here / "here")
+
+
+def test_a_process_that_dies_costs_its_study(here):
+    with begin("run", "long.yaml", "slider.yaml", "--no-plots", "--jobs", 2, "--out", "out") as process:
+        time.sleep(0.5)
+        max(workers(process, 1.0), key=lambda each: each.cpu_times().user).kill()
+        output, told, code = ended(process)
+    assert code == 4, told
+    assert "long: run: the process that computed it was killed" in told
+    assert "slider,kinematics,done" in output
+
+
+def test_workers_end_with_a_command_that_is_killed(here):
+    with begin("reliability", "long.yaml", "--no-plots", "--jobs", 2) as process:
+        there = workers(process, 0.1)
+        process.kill()
+        psutil.wait_procs(there, timeout=10)
+        assert not any(each.is_running() for each in there)
+        ended(process)
