@@ -25,6 +25,8 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 BISECTIONS = 45
 # Widths of intervals (radians) that have no area, and in which rounding hides how means grow towards the ends.
 NARROWEST, NARROW = 1e-9, 1e-7
+# Samples near the ends of an interval, as parts of it: determinants go as the root of the distance.
+CLOSE = np.array([1e-9, 1e-7, 1e-5, 1e-4])
 
 
 def cross(a: Complex | complex, b: Complex | complex) -> np.ndarray:
@@ -205,11 +207,12 @@ class Robot:
         row, cell = np.nonzero(np.diff(ends, axis=1) > NARROWEST)
         begin, end = ends[row, cell], ends[row, cell + 1]
         if self.hidden(same):
-            part = 0.5 * (1 - np.cos(np.pi * np.arange(samples + 1) / samples))
+            part = 0.5 * (1 - np.cos(np.pi * (np.arange(samples) + 0.5) / samples))
+            part = np.concatenate([CLOSE, part, 1 - CLOSE[::-1]])
             z, pin = self.pose(angle[row], 0.5 * (begin + end))
             open_ = self.reached(z, pin, self.drawn) if same else self._first(z, pin) > 0
             row, begin, end = row[open_], begin[open_], end[open_]
-            places = begin[:, None] + (end - begin)[:, None] * 0.5 * (part[1:] + part[:-1])
+            places = begin[:, None] + (end - begin)[:, None] * part
             number = self.claims(angle[row][:, None], places, same)
             lane, at = np.nonzero(np.diff(number, axis=1))
             before, after, first = places[lane, at], places[lane, at + 1], number[lane, at]
