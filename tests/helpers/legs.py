@@ -1,9 +1,4 @@
-"""Arms, five-bars and 3-RRR with limits of angles, and their regions in the plane of the first leg's two angles.
-
-A place of the point is met at one pair of the crank's angle and the rod's angle beside it, for each elbow. For a row
-of crank angles the rod's angles at which anything ends are bisected, so that area and means are sums over the rows of
-exact integrals: a limit may be as narrow as it likes.
-"""
+"""Random arms, five-bars and 3-RRR with limits of angles, whose regions are known in the plane of the first leg."""
 
 from __future__ import annotations
 
@@ -12,36 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-Complex = np.ndarray
-Flags = np.ndarray
-# Sides of the elbows of the legs after the first.
-Sides = tuple[int, ...]
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
-BISECTIONS = 45
-
-
-def cross(a: Complex | complex, b: Complex | complex) -> np.ndarray:
-    return np.asarray((np.conj(a) * b).imag)
-
-
-def told(z: Complex | complex) -> str:
-    return f"[{np.real(z):.17g}, {np.imag(z):.17g}]"
-
-
-def within(angle: np.ndarray, low: float, high: float) -> Flags:
-    return np.asarray((angle - low) % (2 * np.pi) <= high - low)
-
-
-def elbow(z: Complex, base: complex, crank: float, rod: float, side: int) -> tuple[Flags, Complex]:
-    """Whether a leg reaches places, and its elbow, from which the rod turns to `side` (1: anticlockwise)."""
-    k = z - base
-    distance = np.abs(k)
-    along = (distance**2 + crank**2 - rod**2) / (2 * distance)
-    square = crank**2 - along**2
-    return square >= 0, base + k / distance * (along - 1j * side * np.sqrt(np.maximum(square, 0)))
+from helpers.joint_plane import Complex, Flags, Robot, Sides, cross, elbow, of_inverse, of_jacobian, told, within
 
 
 def random_limits(rng: np.random.Generator, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -49,189 +16,6 @@ def random_limits(rng: np.random.Generator, angles: np.ndarray) -> tuple[np.ndar
     width = np.radians(np.exp(rng.uniform(np.log(2), np.log(180), len(angles))))
     low = angles - width * rng.uniform(0.1, 0.9, len(angles))
     return low, low + width
-
-
-def of_jacobian(one: Complex, two: Complex) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse condition number and resistivity, by the point's velocities at unit rates of the two drives."""
-    size, total = np.abs(cross(one, two)), np.abs(one) ** 2 + np.abs(two) ** 2
-    return 2 * size / (total + np.sqrt(np.maximum(total**2 - 4 * size**2, 0))), 1 / size
-
-
-@dataclass(frozen=True)
-class Robot:
-    """A crank about each of `bases` and a rod at its end; the first leg's ends in the point, less `corners`.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (drives,)
-        Limits of the drives (radians).
-    point : complex
-        Place of the point in the sketch.
-    pins : ndarray
-        Ends of the cranks there.
-    """
-
-    bases: Complex
-    cranks: np.ndarray
-    rods: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    point: complex
-    pins: Complex
-    corners: Complex
-
-    @property
-    def drawn(self) -> Sides:
-        """Sides of the elbows of the other legs in the sketch."""
-        return ()
-
-    @property
-    def modes(self) -> Sequence[Sides]:
-        """All sides of the elbows of the other legs."""
-        return [()]
-
-    def reached(self, z: Complex, pin: Complex, sides: Sides, same: bool) -> Flags:
-        """Whether the other legs reach places within their limits, in the sketch's assembly if `same`."""
-        raise NotImplementedError
-
-    def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
-        """Inverse condition number and resistivity in the sketch's mode."""
-        raise NotImplementedError
-
-    def circles(self, pin: Complex) -> list[tuple[Complex, float, float, complex, float]]:
-        """Centre, radius and angle from the rod of a point that turns with it, and circles on which something ends."""
-        return []
-
-    def text(self, assembly: str) -> str:
-        raise NotImplementedError
-
-    @property
-    def turn(self) -> float:
-        """Angle from the first crank to its rod in the sketch."""
-        return float(np.angle((self.point + self.corners[0] - self.pins[0]) / (self.pins[0] - self.bases[0])))
-
-    def pose(self, angle: np.ndarray, turn: np.ndarray) -> tuple[Complex, Complex]:
-        pin = self.bases[0] + self.cranks[0] * np.exp(1j * angle)
-        return pin + self.rods[0] * np.exp(1j * (angle + turn)) - self.corners[0], pin
-
-    def share(self, angle: np.ndarray, turn: np.ndarray, same: bool) -> np.ndarray:
-        """1 where a pose counts, a half where the other elbow of the first leg reaches the place, too."""
-        z, pin = self.pose(angle, turn)
-        if same:
-            return self.reached(z, pin, self.drawn, True).astype(float)
-        other = 2 * np.angle(z + self.corners[0] - self.bases[0]) - angle
-        beside = self.bases[0] + self.cranks[0] * np.exp(1j * other)
-        here, there = (np.any([self.reached(z, a, mode, False) for mode in self.modes], axis=0) for a in (pin, beside))
-        return np.asarray(here / (1.0 + (there & within(other, self.low[0], self.high[0]))))
-
-    def turns(self, angle: np.ndarray, low: float, high: float, samples: int) -> np.ndarray:
-        """Angles of the rod that are looked at: even ones, and one between any two at which something ends."""
-        ends = []
-        for centre, radius, offset, other, distance in self.circles(
-            self.bases[0] + self.cranks[0] * np.exp(1j * angle)
-        ):
-            k = other - centre
-            half = np.arccos((radius**2 + np.abs(k) ** 2 - distance**2) / (2 * radius * np.abs(k)))
-            ends += [np.angle(k) + side * half - offset - angle for side in (1, -1)]
-        inset = 1e-9 * (high - low)
-        even = np.tile(np.linspace(low + inset, high - inset, samples), (len(angle), 1))
-        if ends:
-            between = np.sort((np.stack(ends, axis=1) - low) % (2 * np.pi) + low, axis=1)
-            between = 0.5 * (between[:, 1:] + between[:, :-1])
-            known = (between > low + inset) & (between < high - inset)
-            even = np.concatenate([even, np.where(known, between, low + inset)], axis=1)
-        return np.sort(even, axis=1)
-
-    def integrals(self, same: bool, rows: int, samples: int, parts: int, index: bool) -> np.ndarray | None:
-        """Area, and with `index` the means of inverse condition and resistivity; None where no row meets the sketch."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self._integrals(same, rows, samples, parts, index)
-
-    def _integrals(self, same: bool, rows: int, samples: int, parts: int, index: bool) -> np.ndarray | None:
-        step = (self.high[0] - self.low[0]) / rows
-        angle = self.low[0] + (np.arange(rows) + 0.5) * step
-        low, high = (-np.pi, np.pi) if not same else (0.0, np.pi) if self.turn > 0 else (-np.pi, 0.0)
-        turn = self.turns(angle, low, high, samples)
-        value = np.pad(self.share(angle[:, None], turn, same), ((0, 0), (1, 1)))
-        turn = np.pad(turn, ((0, 0), (1, 1)), constant_values=((0, 0), (low, high)))
-        row, cell = np.nonzero(np.diff(value, axis=1))
-        before, after, left, right = turn[row, cell], turn[row, cell + 1], value[row, cell], value[row, cell + 1]
-        inner = (cell > 0) & (cell < turn.shape[1] - 2)
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (before + after)
-            first = self.share(angle[row], middle, same) == left
-            before, after = np.where(inner & first, middle, before), np.where(inner & ~first, middle, after)
-        edge = np.where(cell == 0, low, np.where(inner, 0.5 * (before + after), high))
-        held = np.flatnonzero(np.append(row[1:] == row[:-1], False) & (right > 0))
-        if same:
-            own = self._with_sketch(row[held], edge[held], edge[held + 1], rows)
-            if own is None:
-                return None
-            held = held[own]
-        row, begin, end, share = row[held], edge[held], edge[held + 1], right[held]
-        # In two where the rod passes over the stretched leg.
-        row, share = np.tile(row, 2), np.tile(share, 2)
-        begin, end = (np.concatenate([np.minimum(x, 0), np.maximum(x, 0)]) for x in (begin, end))
-        scale = step * self.cranks[0] * self.rods[0] * share
-        area = float((scale * np.abs(np.cos(begin) - np.cos(end))).sum())
-        if not index:
-            return np.array([area])
-        wide = end > begin
-        row, begin, end, scale = row[wide], begin[wide], end[wide], scale[wide]
-        # Means grow like one over a root towards the ends.
-        v = np.pi * ((np.arange(parts)[:, None] + 0.5 + 0.5 * NODES) / parts).ravel()
-        at = begin[:, None] + (end - begin)[:, None] * 0.5 * (1 - np.cos(v))
-        weight = (scale * (end - begin))[:, None] * 0.25 * np.pi * np.sin(v) * np.tile(WEIGHTS / parts, parts)
-        means = [
-            (weight * np.abs(np.sin(at)) * values).sum() for values in self.indices(*self.pose(angle[row][:, None], at))
-        ]
-        return np.array([area, *(mean / area for mean in means)])
-
-    def _with_sketch(self, row: np.ndarray, begin: np.ndarray, end: np.ndarray, rows: int) -> Flags | None:
-        """Which intervals hang together with the one that is nearest to the sketch."""
-        first = np.searchsorted(row, np.arange(rows + 2))
-        most = int(np.diff(first).max(initial=0))
-        pairs = [np.zeros((2, 0), dtype=np.intp)]
-        for other in range(most):
-            beside = first[row + 1] + other
-            one = np.flatnonzero(beside < first[np.minimum(row + 2, rows + 1)])
-            two = beside[one]
-            meet = (begin[one] < end[two]) & (begin[two] < end[one])
-            pairs.append(np.stack([one[meet], two[meet]]))
-        one, two = np.concatenate(pairs, axis=1)
-        size = len(row)
-        _, piece = connected_components(coo_array((np.ones(len(one)), (one, two)), shape=(size, size)), directed=False)
-        drawn = np.angle(self.pins[0] - self.bases[0])
-        at = int((drawn - self.low[0]) % (2 * np.pi) / (self.high[0] - self.low[0]) * rows)
-        near = np.flatnonzero(np.abs(row - at) <= 1)
-        if not near.size:
-            return None
-        away = np.maximum(np.maximum(begin[near] - self.turn, self.turn - end[near]), 0) + 1e-6 * np.abs(row[near] - at)
-        return np.asarray(piece == piece[near[away.argmin()]])
-
-    def moved(self, turn: complex, shift: complex, mirrored: bool) -> Self:
-        """The same robot turned and scaled by a complex number and moved, mirrored before that."""
-
-        def place(z: Complex) -> Complex:
-            return np.conj(z) if mirrored else z
-
-        low, high = (-self.high, -self.low) if mirrored else (self.low, self.high)
-        scale, angles = abs(turn), np.angle(turn) * self.turned
-        return replace(
-            self, bases=place(self.bases) * turn + shift, pins=place(self.pins) * turn + shift,
-            point=complex(place(np.array(self.point)) * turn + shift), corners=place(self.corners) * turn,
-            cranks=self.cranks * scale, rods=self.rods * scale, low=low + angles, high=high + angles,
-        )  # fmt: skip
-
-    @property
-    def turned(self) -> np.ndarray:
-        """Which limits turn with the robot: those of angles about the ground."""
-        return np.ones(len(self.low))
-
-    @property
-    def limits(self) -> str:
-        low, high = np.degrees([self.low, self.high])
-        return "".join(f"\n    - {{drive: q{k}, min: {low[k]:.17g}, max: {high[k]:.17g}}}" for k in range(len(low)))
 
 
 @dataclass(frozen=True)
@@ -255,16 +39,19 @@ class Arm(Robot):
     def turned(self) -> np.ndarray:
         return np.array([1.0, 0.0])
 
-    def reached(self, z: Complex, pin: Complex, sides: Sides, same: bool) -> Flags:
+    def reached(self, z: Complex, pin: Complex, sides: Sides) -> Flags:
         return within(np.angle((z - pin) / (pin - self.bases[0])), self.low[1], self.high[1])
 
-    def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
+    def hidden(self, same: bool) -> bool:
+        return False
+
+    def indices(self, z: Complex, pin: Complex, sides: Sides) -> tuple[np.ndarray, np.ndarray]:
         return of_jacobian(1j * (z - self.bases[0]), 1j * (z - pin))
 
-    def turns(self, angle: np.ndarray, low: float, high: float, samples: int) -> np.ndarray:
-        middle = (0.5 * (self.low[1] + self.high[1]) - low) % (2 * np.pi) + low
-        even = Robot.turns(self, angle, low, high, samples)
-        return np.sort(np.append(even, np.full((len(angle), 1), middle if middle < high else low), axis=1), axis=1)
+    def ends(self, angle: np.ndarray, low: float, high: float) -> np.ndarray:
+        every = (np.array([self.low[1], self.high[1], -self.low[1], -self.high[1]]) - low) % (2 * np.pi) + low
+        more = np.tile(np.minimum(every, high), (len(angle), 1))
+        return np.sort(np.append(super().ends(angle, low, high), more, axis=1), axis=1)
 
     def text(self, assembly: str) -> str:
         return f"""
@@ -315,22 +102,25 @@ class FiveBar(Robot):
     def drawn(self) -> Sides:
         return (int(np.sign(cross(self.pins[1] - self.bases[1], self.joint - self.pins[1]))),)
 
-    @property
-    def modes(self) -> Sequence[Sides]:
-        return [(-1,), (1,)]
-
     def second(self, z: Complex, pin: Complex, side: int) -> tuple[Flags, Complex, Complex]:
         joint = pin + (z - pin) * self.end
         return *elbow(joint, self.bases[1], self.cranks[1], self.rods[1], side), joint
 
-    def reached(self, z: Complex, pin: Complex, sides: Sides, same: bool) -> Flags:
-        good, other, joint = self.second(z, pin, *sides)
-        good = good & within(np.angle(other - self.bases[1]), self.low[1], self.high[1])
-        drawn = cross(self.joint - self.pins[0], self.joint - self.pins[1])
-        return np.asarray(good & (cross(joint - pin, joint - other) * drawn > 0) if same else good)
+    def reached(self, z: Complex, pin: Complex, sides: Sides) -> Flags:
+        good, other, _ = self.second(z, pin, *sides)
+        return np.asarray(good & within(np.angle(other - self.bases[1]), self.low[1], self.high[1]))
 
-    def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
+    def kept(self, z: Complex, pin: Complex) -> Flags:
         _, other, joint = self.second(z, pin, *self.drawn)
+        drawn = cross(self.joint - self.pins[0], self.joint - self.pins[1])
+        return np.asarray(cross(joint - pin, joint - other) * drawn > 0)
+
+    def hidden(self, same: bool) -> bool:
+        # The joint on the other side of the line from the base to a point of the first rod.
+        return not same and abs(self.end - 1) > 1e-12
+
+    def indices(self, z: Complex, pin: Complex, sides: Sides) -> tuple[np.ndarray, np.ndarray]:
+        _, other, joint = self.second(z, pin, *sides)
         bar, size = joint - other, cross(joint - other, joint - pin)
         one = 1j * (pin - self.bases[0]) - 1j * (z - pin) * cross(bar, pin - self.bases[0]) / size
         return of_jacobian(one, 1j * (z - pin) * cross(bar, other - self.bases[1]) / size)
@@ -400,10 +190,6 @@ class Platform(Robot):
         bars = self.point + self.corners - self.pins
         return tuple(np.sign(cross(self.pins - self.bases, bars))[1:].astype(int).tolist())
 
-    @property
-    def modes(self) -> Sequence[Sides]:
-        return [(one, two) for one in (-1, 1) for two in (-1, 1)]
-
     def legs(self, z: Complex, pin: Complex, sides: Sides) -> tuple[Flags, list[Complex]]:
         two, three = (
             elbow(z + self.corners[k], self.bases[k], self.cranks[k], self.rods[k], sides[k - 1]) for k in (1, 2)
@@ -415,23 +201,28 @@ class Platform(Robot):
         bars = [z + corner - pin for corner, pin in zip(self.corners, pins, strict=True)]
         return np.asarray(sum(cross(self.corners[k], bars[k]) * cross(bars[k - 2], bars[k - 1]) for k in range(3)))
 
-    def reached(self, z: Complex, pin: Complex, sides: Sides, same: bool) -> Flags:
+    def reached(self, z: Complex, pin: Complex, sides: Sides) -> Flags:
         good, pins = self.legs(z, pin, sides)
         for k in (1, 2):
             good = good & within(np.angle(pins[k] - self.bases[k]), self.low[k], self.high[k])
-        return good & (self.determinant(z, pins) * self.determinant(self.point, list(self.pins)) > 0) if same else good
+        return good
 
-    def indices(self, z: Complex, pin: Complex) -> tuple[np.ndarray, np.ndarray]:
+    def kept(self, z: Complex, pin: Complex) -> Flags:
+        pins = self.legs(z, pin, self.drawn)[1]
+        return np.asarray(self.determinant(z, pins) * self.determinant(self.point, list(self.pins)) > 0)
+
+    def hidden(self, same: bool) -> bool:
+        # The forward determinant.
+        return same
+
+    def indices(self, z: Complex, pin: Complex, sides: Sides) -> tuple[np.ndarray, np.ndarray]:
         rows = []
-        for k, end in enumerate(self.legs(z, pin, self.drawn)[1]):
+        for k, end in enumerate(self.legs(z, pin, sides)[1]):
             bar = z + self.corners[k] - end
             by_rate = cross(end - self.bases[k], bar)
-            rows.append(
-                np.stack([bar.real, bar.imag, cross(self.corners[k], bar) / self.length], axis=-1) / by_rate[..., None]
-            )
-        inverse = np.stack(rows, axis=-2)
-        values = np.linalg.svd(inverse, compute_uv=False)
-        return values[..., 2] / values[..., 0], self.length * np.abs(np.linalg.det(inverse))
+            rows.append([bar.real / by_rate, bar.imag / by_rate, cross(self.corners[k], bar) / self.length / by_rate])
+        condition, size = of_inverse(rows)
+        return condition, self.length * size
 
     def circles(self, pin: Complex) -> list[tuple[Complex, float, float, complex, float]]:
         every = []

@@ -1,0 +1,53 @@
+"""Regions between narrow limits of angles and stretched or folded legs, against the first leg's two angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.joint_plane import elbow, told
+from helpers.legs import KINDS, FiveBar
+from helpers.regions import EFFORTS, asked, compare
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "assembly", "seed"), [("five_bar", "same", 15), ("five_bar", "same", 25),
+                         ("3-RRR", "same", 19), ("arm", "any", 11), ("arm", "any", 27)])  # fmt: skip
+def test_spikes_bumps_between_samples_and_other_elbows_are_part_of_regions(kind: str, assembly: str, seed: int) -> None:
+    compare(KINDS[kind].of(seed), assembly, "of many")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("assembly", "effort"), [("same", "alone"), ("same", "of many"),
+                         *(pytest.param("any", effort, marks=pytest.mark.nightly) for effort in EFFORTS)])  # fmt: skip
+def test_a_region_of_a_coupler_point_between_a_stretched_leg_and_narrow_limits(assembly: str, effort: str) -> None:
+    bases, cranks, at = np.array([-52 - 12.2j, 37.5 + 19.8j]), np.array([135.6, 145.6]), complex(146.3, -1.7)
+    low, high = np.radians([[82.0, 85.0], [115.0, 108.0]])
+    pins = bases + cranks * np.exp(1j * np.radians([106.14, 92.31]))
+    _, joint = elbow(pins[1], complex(pins[0]), 142.1, 130.5, -1)
+    point = complex(pins[0] + (joint - pins[0]) * at / 142.1)
+    rods = np.array([abs(at), 130.5])
+    robot = FiveBar(bases, cranks, rods, low, high, point, pins, np.zeros(1, complex), 142.1 / at)
+    compare(robot, assembly, effort)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("width", [0.5, *(pytest.param(width, marks=pytest.mark.nightly) for width in (2.0, 8.0))])
+@pytest.mark.parametrize(("shoulder", "elbow"), [(20, 90), (-70, -120)])
+def test_an_arm_whose_shoulder_hardly_turns(shoulder: float, elbow: float, width: float, effort: str) -> None:
+    """The crescent that the forearm sweeps: A = 2 w l1 l2, and the mean of 1/|det J| is w pi/A."""
+    upper = 100 * np.exp(1j * np.radians(shoulder))
+    hand = upper + 70 * np.exp(1j * np.radians(shoulder + elbow))
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, upper: [O, A, 100], fore: [A, P, 70]}}
+  drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
+  limits: [{{drive: q1, min: {shoulder - 0.5 * width}, max: {shoulder + 0.5 * width}}}]
+  sketch: {{A: {told(upper)}, P: {told(hand)}}}
+workspace: {{point: P, indices: [resistivity]}}
+"""
+    (area, mean), (error, doubt) = asked(text, effort, ("area", "GRI"))
+    true = 2 * np.radians(width) * 7000
+    assert abs(area - true) <= 2 * error
+    assert abs(mean - np.radians(width) * np.pi / true) <= 2 * doubt
