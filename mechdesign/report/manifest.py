@@ -10,9 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from typing import Any
 
 from mechdesign.errors import StudyError
 from mechdesign.files import check_own, check_writable, digest, file_names, proper, unsettled
@@ -47,85 +45,6 @@ class Extras:
     before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
-def _named(name: str) -> str:
-    if not proper(name):
-        raise ValueError(f"{name!r} is no name of a file")
-    return name
-
-
-_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-_Name = Annotated[str, AfterValidator(_named)]
-
-
-class _Column(BaseModel):
-    name: str
-    unit: str
-    meaning: str
-
-
-class _Table(BaseModel):
-    meaning: str
-    rows: int = Field(ge=0)
-    columns: list[_Column]
-
-
-class _Study(BaseModel):
-    name: str
-    sha256: _Sha256
-    resolved: dict[str, Any]
-
-
-class _Warning(BaseModel):
-    kind: str
-    message: str
-    table: str = ""
-    row: int | None = Field(None, ge=0)
-    pose: str = ""
-
-
-class _Verdict(BaseModel):
-    requirement: str
-    met: bool
-    worst: float | None
-    place: str
-    margin: float | None
-    unit: str
-    note: str
-    limit_unit: str = ""
-
-
-class _Manifest(BaseModel):
-    tool: dict[str, str]
-    libraries: dict[str, str]
-    command: str
-    study: _Study
-    inputs: dict[str, _Sha256] = {}
-    inputs_in: str = "."
-    overrides: list[str]
-    seed: int = Field(ge=0)
-    plots: bool
-    formats: str
-    animate: bool
-    all_modes: bool
-    report: bool
-    style: str
-    before: dict[str, Any] | None
-    counts: dict[str, Any]
-    warnings: list[_Warning]
-    failed: str
-    interrupted: str = ""
-    strict: bool = False
-    requirements: list[_Verdict]
-    tables: dict[_Name, _Table]
-    files: dict[_Name, _Sha256]
-
-    @model_validator(mode="after")
-    def _lists_tables(self) -> _Manifest:
-        if not self.tables.keys() <= self.files.keys():
-            raise ValueError("a table is none of the files")
-        return self
-
-
 def whole(directory: Path) -> dict[str, Any]:
     """The manifest in a folder.
 
@@ -134,9 +53,12 @@ def whole(directory: Path) -> dict[str, Any]:
     StudyError
         If what stands there is none, as it has other fields than mechdesign writes.
     """
+    # Its models are built where one is read, not by every command.
+    from mechdesign.report.written_manifest import ValidationError, WrittenManifest
+
     content = read(directory)
     try:
-        _Manifest.model_validate(content, strict=True)
+        WrittenManifest.model_validate(content, strict=True)
     except ValidationError:
         message = f"{directory / NAME}: is not a manifest that mechdesign wrote; run the study again"
         raise StudyError(message) from None
