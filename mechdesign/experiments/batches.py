@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.errors import MechdesignError
+from mechdesign.motion.group import Answers, Group
+from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics import analysis as dynamics
 from mechdesign.questions.kinematics import analysis as kinematics
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize.stacked import grouped, shared
 from mechdesign.questions.stiffness import analysis as stiffness
-from mechdesign.questions.together import Answers, Group
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
 
 # Functions of the commands that answer many designs at once.
 TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {

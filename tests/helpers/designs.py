@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from mechdesign.errors import AssemblyError
+from mechdesign.motion.rows import Poses
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
 
 Answer = Result | AssemblyError
 

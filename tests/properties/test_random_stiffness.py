@@ -21,7 +21,8 @@ from hypothesis import strategies as st
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.motion.solving import solve_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.questions.stiffness.analysis import answers, stiffness
 from mechdesign.questions.stiffness.body import ask, hold
 from mechdesign.questions.stiffness.force_method import load, twists_of
@@ -34,7 +35,7 @@ NOTHING = 1e-15
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
+    (solved,) = solve_poses(study.motion(study_poses(study, "stiffness")))
     return study, solved.configuration
 
 

@@ -14,32 +14,32 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.four_bars import four_bars
+from mechdesign.motion.followed import courses_of
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.question import evaluate
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.dynamics import analysis as dynamics
-from mechdesign.questions.dynamics.question import force_question
-from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import courses_of
+from mechdesign.questions.dynamics.analysis import Dynamics
+from mechdesign.questions.kinematics.along import KinematicAlong, along_of
+from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.loops import loops_table, measured
-from mechdesign.questions.kinematics.motion import move
-from mechdesign.questions.kinematics.question import motion_question
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
-from mechdesign.questions.poses import SolvedPoses, alike, solve_poses, study_poses
+from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
-from mechdesign.questions.stiffness import analysis as stiffness
+from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
 from mechdesign.questions.stiffness.body import ask
 from mechdesign.results import Result, Scope
 from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
 from mechdesign.study.variants import remeasured
 
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
     # A design may have more springs than another.
-    "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
-    "dynamics": dynamics.TABLES,
+    "stiffness": tuple(name for name in ORDER if name != "springs"),
+    "dynamics": (*Dynamics.a_row_a_pose, "extremes"),
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 
@@ -53,7 +53,7 @@ class Stack(NamedTuple):
         See `mechdesign.mechanism.Reason`.
     whole : bool array, shape (designs,)
         Whether the motion has no gap between the poses; True where poses are no motion.
-    along : Along, optional
+    along : KinematicAlong, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
         The solved poses.
@@ -62,7 +62,7 @@ class Stack(NamedTuple):
     result: Result
     reason: NDArray[np.int8]
     whole: Flags
-    along: Along | None
+    along: KinematicAlong | None
     solved: list[SolvedPoses]
 
 
@@ -135,32 +135,33 @@ def tables(
     absent: Mapping[str, str] = {}
     along = None
     if command == "kinematics":
-        motion = move(motion_question(study, poses), also=solved.append)
-        question, absent = motion.question, motion.question.absent
+        question = Kinematics.of(study, poses)
+        values, absent = evaluate(question, also=solved.append), question.absent
         loops = four_bars(study.mechanism) if "loops" in names else ()
         errors = question.errors if "targets" in names else ()
         along = along_of(question, outputs, loops, also=errors, requests=requests)
         scope = Scope(follow=partial(courses_of, along)) if along is not None else None
-        built = {name: replace(table, scope=scope) for name, table in pose_tables(motion, names).items()}
+        built = {name: replace(table, scope=scope) for name, table in pose_tables(values, names).items()}
         if "extremes" in names:
-            built["extremes"] = extremes(motion, along, outputs)
+            built["extremes"] = extremes(values, along, outputs)
         if loops:
             built["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
-        if motion.errors and "targets" in names:
-            built["targets"] = targets_table(motion, along)
-        reason = motion.reason
+        if study.targets and "targets" in names:
+            built["targets"] = targets_table(values, along)
+        reason = values.reason
     elif command == "dynamics":
-        motion = move(force_question(study, poses), also=solved.append)
-        built, along = dynamics.tables(motion, motion.question, names, outputs, requests)
+        forces = Dynamics.of(study, poses)
+        borne = evaluate(forces, also=solved.append)
+        built, along = forces.chosen(borne, names, outputs, requests)
         scope = Scope(follow=None if along is None else partial(courses_of, along))
         built = {name: replace(table, scope=scope) for name, table in built.items()}
-        reason = motion.reason
+        reason = borne.reason
     elif command == "reliability":
         built, reason, solved = reliability.first_order_tables(study, poses, names)
     else:
-        body, solved = ask(study), list(solve_poses(study, poses))
-        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(names))
-        built, reason = stiffness.tables(study, body, poses, held, names), held.reason
+        stiff = Stiffness(ask(study), study.motion(poses), names)
+        held = evaluate(stiff, also=solved.append)
+        built, reason = stiff.made(held, names), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
     return Stack(Result(command, built, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
 
