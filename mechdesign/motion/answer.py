@@ -89,6 +89,15 @@ def answer(question: MotionQuestion[Any], progress: Progress = NULL, jobs: int |
     return answer_of(passage, jobs)
 
 
+def alone(question: MotionQuestion[Any], progress: Progress = NULL, jobs: int | None = 1) -> Result:
+    """The answer of a single design; raises where it has none."""
+    (group,) = answer(question, progress, jobs)
+    result = group.of(0)
+    if isinstance(result, Exception):
+        raise result
+    return result
+
+
 def answer_of(passage: Passage, jobs: int | None = 1) -> list[Group]:
     """The answers after a pass over the poses; see `answer`."""
     question, designs = passage.question, passage.question.poses.designs

@@ -15,11 +15,10 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.motion.answer import Between, MotionQuestion, answer
-from mechdesign.motion.group import Answers
+from mechdesign.motion.answer import Between, MotionQuestion, alone
+from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.passage import Passage
 from mechdesign.motion.question import PoseValues
-from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
@@ -112,7 +111,7 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
 
     def chosen(
         self, values: PoseValues, names: Collection[str], outputs: Collection[str] | None = None,
-        requests: Collection[Request] = (),
+        requests: Collection[Request] = (), solved: Sequence[SolvedPoses] = (),
     ) -> tuple[dict[str, Table], KinematicAlong | None]:  # fmt: skip
         """Some tables, and the motions between their poses with the columns of `requests` besides.
 
@@ -193,17 +192,7 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     if study.dynamics is not None and study.dynamics.forward is not None:
         course, motion, shown = forward(study, progress)
         return replace(course, drawn=DrawnForces(shown, motion, None))
-    (group,) = answer(Dynamics.of(study, study_poses(study, "dynamics")), progress, jobs)
-    result = group.of(0)
-    if isinstance(result, Exception):
-        raise result
-    return result
-
-
-@one_thread()
-def answers(study: Study, poses: Poses) -> Answers:
-    """Answer `dynamics` for the poses of several designs, each as if it were asked alone, without pictures."""
-    return Answers(answer(Dynamics.of(study, poses)))
+    return alone(Dynamics.of(study, study_poses(study, "dynamics")), progress, jobs)
 
 
 def _open_moments(question: ForceQuestion, arrays: Mapping[str, Floats], rows: slice) -> list[str]:

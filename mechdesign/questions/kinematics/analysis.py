@@ -11,11 +11,9 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.motion.answer import answer, answer_of
-from mechdesign.motion.group import Answers
+from mechdesign.motion.answer import alone, answer_of
 from mechdesign.motion.passage import Passage, pass_over
 from mechdesign.motion.question import PoseValues
-from mechdesign.motion.rows import Poses
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.kinematics.columns import MODES
@@ -39,27 +37,18 @@ def kinematics(
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
-    passage = pass_over(Kinematics.of(study, poses), progress, jobs)
-    (group,) = answer_of(passage, jobs)
-    result = group.of(0)
+    question = Kinematics.of(study, poses)
+    if not all_modes:
+        return alone(question, progress, jobs)
+    passage = pass_over(question, progress, jobs)
+    result = answer_of(passage, jobs)[0].of(0)
     if isinstance(result, Exception):
         raise result
-    if not all_modes:
-        return result
     table, warnings, number, shown = _modes(passage, jobs)
     return dataclasses.replace(
         result, tables={**result.tables, "modes": table}, warnings=[*result.warnings, *warnings],
         counts={**result.counts, "modes": number}, drawn=dataclasses.replace(DrawnMotion.of(result), modes=shown),
     )  # fmt: skip
-
-
-@one_thread()
-def answers(study: Study, poses: Poses) -> Answers:
-    """Answer `kinematics` for the poses of several designs, each as if it were asked alone, without pictures.
-
-    The poses are solved together: their arrays are held as a whole. A design without a valid pose has an error.
-    """
-    return Answers(answer(Kinematics.of(study, poses)))
 
 
 def _modes(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.motion.answer import Between, MotionQuestion
 from mechdesign.motion.ends import Change
+from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.passage import Passage
 from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Flags, Floats
@@ -32,14 +33,6 @@ from mechdesign.statistics import Request
 
 # Tables in the order in which they are shown.
 ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres", "cam")
-
-
-class _OnLine(Protocol):
-    @property
-    def line(self) -> int: ...
-
-
-Own = TypeVar("Own", bound=_OnLine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +69,26 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
 
     def along(self, requests: Sequence[Request]) -> KinematicAlong | None:
         return along_of(self, (), requests=requests)
+
+    def chosen(
+        self, values: PoseValues, names: Collection[str], outputs: Collection[str] | None = None,
+        requests: Collection[Request] = (), solved: Sequence[SolvedPoses] = (),
+    ) -> tuple[dict[str, Table], KinematicAlong | None]:  # fmt: skip
+        """Some tables with as many rows for each design, and the motions between their poses with some columns besides.
+
+        Of the extremes those of some `outputs`, or all; `solved` are the poses, of designs with dimensions.
+        """
+        mechanism = self.motion.mechanism
+        loops = four_bars(mechanism) if "loops" in names else ()
+        along = along_of(self, outputs, loops, also=self.errors if "targets" in names else (), requests=requests)
+        tables = pose_tables(values, names)
+        if "extremes" in names:
+            tables["extremes"] = extremes(values, along, outputs)
+        if loops:
+            tables["loops"] = loops_table(self, measured(mechanism, loops, self.poses, solved), loops, along)
+        if self.study.targets and "targets" in names:
+            tables["targets"] = targets_table(values, along)
+        return tables, along
 
     def between(self, passage: Passage) -> Events:
         shapes = _shapes(passage)
@@ -159,9 +172,9 @@ def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:
     return [own if good else shapes[int(valid.argmax())] for own, good in zip(shapes, valid, strict=True)]
 
 
-def _by_line(events: Sequence[Own], lines: int) -> list[list[Own]]:
+def _by_line(events: Sequence[Any], lines: int) -> list[list[Any]]:
     """Events of each design."""
-    parts: list[list[Own]] = [[] for _ in range(lines)]
+    parts: list[list[Any]] = [[] for _ in range(lines)]
     for one in events:
         parts[one.line].append(one)
     return parts

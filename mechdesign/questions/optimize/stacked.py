@@ -13,18 +13,14 @@ from numpy.typing import NDArray
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.motion.followed import courses_of
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import evaluate
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.dynamics.analysis import Dynamics
-from mechdesign.questions.kinematics.along import KinematicAlong, along_of
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.answers import Kinematics
-from mechdesign.questions.kinematics.extremes import extremes, targets_table
-from mechdesign.questions.kinematics.loops import loops_table, measured
-from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
@@ -36,7 +32,7 @@ from mechdesign.study.designs import Designs
 from mechdesign.study.variants import remeasured
 
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
+    "kinematics": (*Kinematics.a_row_a_pose, "extremes", "loops", "targets"),
     # A design may have more springs than another.
     "stiffness": tuple(name for name in ORDER if name != "springs"),
     "dynamics": (*Dynamics.a_row_a_pose, "extremes"),
@@ -124,7 +120,7 @@ def tables(
 
     Parameters
     ----------
-    wanted : collection of str
+    names : collection of str
         Names of tables.
     outputs : collection of str, optional
         Of the extremes; all where left out.
@@ -132,38 +128,24 @@ def tables(
         Columns that are followed between the poses.
     """
     solved: list[SolvedPoses] = []
-    absent: Mapping[str, str] = {}
-    along = None
-    if command == "kinematics":
-        question = Kinematics.of(study, poses)
-        values, absent = evaluate(question, also=solved.append), question.absent
-        loops = four_bars(study.mechanism) if "loops" in names else ()
-        errors = question.errors if "targets" in names else ()
-        along = along_of(question, outputs, loops, also=errors, requests=requests)
-        scope = Scope(follow=partial(courses_of, along)) if along is not None else None
-        built = {name: replace(table, scope=scope) for name, table in pose_tables(values, names).items()}
-        if "extremes" in names:
-            built["extremes"] = extremes(values, along, outputs)
-        if loops:
-            built["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
-        if study.targets and "targets" in names:
-            built["targets"] = targets_table(values, along)
-        reason = values.reason
-    elif command == "dynamics":
-        forces = Dynamics.of(study, poses)
-        borne = evaluate(forces, also=solved.append)
-        built, along = forces.chosen(borne, names, outputs, requests)
-        scope = Scope(follow=None if along is None else partial(courses_of, along))
-        built = {name: replace(table, scope=scope) for name, table in built.items()}
-        reason = borne.reason
-    elif command == "reliability":
+    along: KinematicAlong | None = None
+    if command == "reliability":
         built, reason, solved = reliability.first_order_tables(study, poses, names)
-    else:
+        result = Result(command, built)
+    elif command == "stiffness":
         stiff = Stiffness(ask(study), study.motion(poses), names)
         held = evaluate(stiff, also=solved.append)
-        built, reason = stiff.made(held, names), held.reason
+        result, reason = Result(command, stiff.chosen(held, names)), held.reason
+    else:
+        question = (Kinematics if command == "kinematics" else Dynamics).of(study, poses)
+        values = evaluate(question, also=solved.append)
+        built, along = question.chosen(values, names, outputs, requests, solved)
+        scope = Scope(follow=None if along is None else partial(courses_of, along))
+        result = Result(command, {name: replace(table, scope=scope) if name in question.a_row_a_pose else table
+                                  for name, table in built.items()}, absent=question.absent)  # fmt: skip
+        reason = values.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
-    return Stack(Result(command, built, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
+    return Stack(result, reason.reshape(poses.designs, -1), whole, along, solved)
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

@@ -16,8 +16,7 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.along import PlainAlong
-from mechdesign.motion.answer import Between, MotionQuestion, answer
-from mechdesign.motion.group import Answers
+from mechdesign.motion.answer import Between, MotionQuestion, alone
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.passage import Passage
 from mechdesign.motion.question import PoseValues, unfilled
@@ -60,20 +59,7 @@ R = TypeVar("R", Held, Effects)
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Stiffness of a body or a pin at every pose of the study [S4]; see `mechdesign.stiffness`."""
     body = ask(study)
-    (group,) = answer(Stiffness(body, study.motion(study_poses(study, "stiffness"))), progress, jobs)
-    result = group.of(0)
-    if isinstance(result, Exception):
-        raise result
-    return result
-
-
-@one_thread()
-def answers(study: Study, poses: Poses) -> Answers:
-    """Stiffness at the poses of several designs, without pictures; each design has the answer that it has alone.
-
-    A design without a valid pose has an error.
-    """
-    return Answers(answer(Stiffness(ask(study), study.motion(poses))))
+    return alone(Stiffness(body, study.motion(study_poses(study, "stiffness"))), progress, jobs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +117,7 @@ class Unlooked(Between):
 
 
 def _made(name: str, values: PoseValues) -> Table:
-    table: Table = values.question.made(values, (name,))[name]
+    table: Table = values.question.chosen(values, (name,))[name]
     return table
 
 
@@ -151,6 +137,11 @@ class Stiffness(MotionQuestion[Unlooked]):
     @property
     def together(self) -> int:
         return CHUNK
+
+    @classmethod
+    def of(cls, study: Study, poses: Poses) -> Self:
+        """Read what a study asks at some poses."""
+        return cls(ask(study), study.motion(poses))
 
     def at(self, poses: Poses) -> Self:
         return replace(self, motion=self.motion.at(poses))
@@ -188,7 +179,7 @@ class Stiffness(MotionQuestion[Unlooked]):
         """Numbers of a row a pose, at solved poses."""
         values = unfilled(self.at(there.poses))
         values.fill(there)
-        tables = values.question.made(values, self.a_row_a_pose)
+        tables = values.question.chosen(values, self.a_row_a_pose)
         return {column.name: column.values.astype(float)
                 for table in tables.values() for column in table.columns if column.numeric}  # fmt: skip
 
@@ -196,9 +187,9 @@ class Stiffness(MotionQuestion[Unlooked]):
         return Unlooked(None, self.poses)
 
     def tables(self, passage: Passage, between: Unlooked) -> dict[str, Table]:
-        return self.made(passage.values, self.names)
+        return self.chosen(passage.values, self.names)
 
-    def made(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
+    def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
         """Tables of some names, as far as the study asks for them, with the rows of all designs."""
         motion, held, springs = self.motion, _read(Held, values), _springs(values)
         body = self.body.at(motion.poses, np.arange(motion.poses.count))
