@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -56,7 +56,7 @@ class MotionQuestion(PoseQuestion, Generic[B]):
         """What it has between the poses, after these were passed."""
 
     @abstractmethod
-    def along(self, requests: Sequence[Request]) -> AlongMotion | None:
+    def along(self, requests: Collection[Request]) -> AlongMotion | None:
         """Some of its columns along the motions; None where these cannot be followed."""
 
     @abstractmethod

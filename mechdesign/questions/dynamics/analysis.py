@@ -106,7 +106,7 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
             f"{_LIFTED}{coupling}": where for coupling, where in lift_off.lifted(values)
         }  # fmt: skip
 
-    def along(self, requests: Sequence[Request]) -> KinematicAlong | None:
+    def along(self, requests: Collection[Request]) -> KinematicAlong | None:
         return along_of(self, (), requests=requests)
 
     def chosen(

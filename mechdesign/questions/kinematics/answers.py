@@ -67,7 +67,7 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
     def totals(self, values: PoseValues) -> Floats:
         return totals(values)
 
-    def along(self, requests: Sequence[Request]) -> KinematicAlong | None:
+    def along(self, requests: Collection[Request]) -> KinematicAlong | None:
         return along_of(self, (), requests=requests)
 
     def chosen(

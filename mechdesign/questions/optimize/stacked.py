@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
+from mechdesign.motion.along import AlongMotion
 from mechdesign.motion.followed import courses_of
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import evaluate
@@ -24,13 +25,14 @@ from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
-from mechdesign.questions.stiffness.body import ask
-from mechdesign.results import Result, Scope
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import remeasured
 
+# Tables with a row a pose, or several, that are followed between the poses.
+A_ROW_A_POSE = {*Kinematics.a_row_a_pose, *Dynamics.a_row_a_pose, *Stiffness.a_row_a_pose}
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*Kinematics.a_row_a_pose, "extremes", "loops", "targets"),
     # A design may have more springs than another.
@@ -133,19 +135,23 @@ def tables(
         built, reason, solved = reliability.first_order_tables(study, poses, names)
         result = Result(command, built)
     elif command == "stiffness":
-        stiff = Stiffness(ask(study), study.motion(poses), names)
+        stiff = replace(Stiffness.of(study, poses), names=names)
         held = evaluate(stiff, also=solved.append)
-        result, reason = Result(command, stiff.chosen(held, names)), held.reason
+        result, reason = Result(command, _followed(stiff.chosen(held, names), stiff.along(requests))), held.reason
     else:
         question = (Kinematics if command == "kinematics" else Dynamics).of(study, poses)
         values = evaluate(question, also=solved.append)
         built, along = question.chosen(values, names, outputs, requests, solved)
-        scope = Scope(follow=None if along is None else partial(courses_of, along))
-        result = Result(command, {name: replace(table, scope=scope) if name in question.a_row_a_pose else table
-                                  for name, table in built.items()}, absent=question.absent)  # fmt: skip
+        result = Result(command, _followed(built, along), absent=question.absent)
         reason = values.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
     return Stack(result, reason.reshape(poses.designs, -1), whole, along, solved)
+
+
+def _followed(tables: Mapping[str, Table], along: AlongMotion | None) -> dict[str, Table]:
+    """Tables of which those with a row a pose are followed along the motions."""
+    scope = Scope(follow=None if along is None else partial(courses_of, along))
+    return {name: replace(table, scope=scope) if name in A_ROW_A_POSE else table for name, table in tables.items()}
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

@@ -171,7 +171,7 @@ class Stiffness(MotionQuestion[Unlooked]):
         )
         return {**vars(held), "springs": list(springs), **vars(effects)}
 
-    def along(self, requests: Sequence[Request]) -> PlainAlong | None:
+    def along(self, requests: Collection[Request]) -> PlainAlong | None:
         curve = self.curve
         return None if curve is None or curve.spent.all() else PlainAlong(curve, self._columns, requests)
 
