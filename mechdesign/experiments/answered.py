@@ -11,8 +11,8 @@ import numpy as np
 from mechdesign.cautions import fails
 from mechdesign.errors import explain
 from mechdesign.experiments.case_numbers import CaseNumber, judged
+from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result

@@ -5,24 +5,36 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from mechdesign.errors import MechdesignError
-from mechdesign.questions.dynamics import analysis as dynamics
-from mechdesign.questions.kinematics import analysis as kinematics
+from mechdesign.motion.answer import MotionQuestion, answer
+from mechdesign.motion.group import Answers, Group
+from mechdesign.motion.rows import Poses
+from mechdesign.questions.dynamics.analysis import Dynamics
+from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize.stacked import grouped, shared
-from mechdesign.questions.stiffness import analysis as stiffness
-from mechdesign.questions.together import Answers, Group
+from mechdesign.questions.stiffness.analysis import Stiffness
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
+from mechdesign.work.threads import one_thread
 
-# Functions of the commands that answer many designs at once.
-TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {
-    "kinematics": kinematics.answers, "stiffness": stiffness.answers, "dynamics": dynamics.answers
+# Questions that many designs are asked at once.
+TOGETHER: Mapping[str, Callable[[Study, Poses], MotionQuestion[Any]]] = {
+    "kinematics": Kinematics.of, "stiffness": Stiffness.of, "dynamics": Dynamics.of
 }  # fmt: skip
+
+
+@one_thread()
+def at_poses(study: Study, command: str, poses: Poses) -> Answers:
+    """Answers for the poses of several designs, each as if it were asked alone, without pictures.
+
+    The poses are solved together: their arrays are held as a whole. A design without a valid pose has an error.
+    """
+    return Answers(answer(TOGETHER[command](study, poses)))
 
 
 def answers(designs: Designs, command: str) -> Answers:
@@ -32,7 +44,7 @@ def answers(designs: Designs, command: str) -> Answers:
         # Where a group has an error, its designs are answered one by one.
         for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
             with suppress(MechdesignError):
-                groups = TOGETHER[command](study, poses).groups
+                groups = at_poses(study, command, poses).groups
                 answered += [replace(group, rows=rows[group.rows]) for group in groups]
     left = set(range(designs.count)).difference(*(group.rows.tolist() for group in answered))
     return Answers([*answered, *(_alone(designs, k, command) for k in sorted(left))])

@@ -12,9 +12,9 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
+from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look, with_fewer_rows
-from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError

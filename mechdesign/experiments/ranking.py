@@ -10,9 +10,9 @@ import numpy as np
 from mechdesign.experiments.case_numbers import CaseNumber, Numbers, incomplete
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.schema.matrix import Best
+from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
-from mechdesign.questions.together import Group
 from mechdesign.report.cases import FRONT, RANK
 from mechdesign.results import Column
 from mechdesign.terms import path_of, terms_of

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.curve.corners import curve_of
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy
+from mechdesign.motion.corners import curve_of
+from mechdesign.motion.motion import in_study_units
+from mechdesign.motion.rows import Poses, with_length
+from mechdesign.motion.solving import followed_angles
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED
@@ -19,12 +22,11 @@ from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.schema import MAX_ROWS
 from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.outputs import default_outputs, expand_outputs
-from mechdesign.questions.poses import SolvedPoses, followed_angles, in_study_units, pose_in_words, study_poses
+from mechdesign.questions.poses import pose_in_words, study_poses
 from mechdesign.report.figures.scene import ranks
 from mechdesign.report.tables import to_csv
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, with_length
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text.units import QuantityError, Units
 
@@ -55,9 +57,11 @@ def curve_csv(view: PosedStudy) -> Content:
     outputs = expand_outputs(study, (*(chosen or default_outputs(mechanism)), *points))
     names = dict.fromkeys([*given, *(output.name for output in outputs)])
     for coordinate in map(mechanism.coordinate, names):
-        values = np.broadcast_to(in_study_units(study, coordinate, track.configuration.value(coordinate)), parts.shape)
+        values = np.broadcast_to(
+            in_study_units(study.units, coordinate, track.configuration.value(coordinate)), parts.shape
+        )
         label = study.units.label(coordinate.quantity)
-        columns.append(GIVEN.column(values, label, coordinate=coordinate.name))
+        columns.append(GIVEN.column(np.broadcast_to(values, parts.shape), label, coordinate=coordinate.name))
     return Content(to_csv(Table("curve", tuple(columns))), view.unmoved)
 
 
@@ -141,23 +145,23 @@ class Timed:
             )
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         plan = mechanism.plan(poses.groups[0].names)
-        curve = curve_of(study, poses, followed_angles(mechanism, plan, drives))
+        curve = curve_of(study.motion(poses), followed_angles(mechanism, plan, drives))
         times = _instants(self._end(poses), step)
         line, places = np.zeros(len(times), dtype=np.intp), self._places(poses, times)
-        along, configuration = curve.solve(line, places)
+        solved = curve.solve(line, places)
+        along, configuration = solved.poses, solved.configuration
         if not configuration.valid.all():
             row = int(np.argmin(configuration.valid))
             raise AssemblyError(
                 f"at {times[row]:.6g} {study.units.label('time')} ({pose_in_words(study, along, row)}) the motion has "
                 "no valid pose; a controller needs all of them"
             )
-        solved = SolvedPoses(np.arange(len(times)), poses.groups[0].names, configuration)
-        rates = drive_rates(study, self.section, along, solved, mechanism.linearize(configuration))
+        rates = drive_rates(self.section, solved, mechanism.linearize(configuration))
         columns = [TIMED.column(times, study.units.label("time"))]
         for k, drive in enumerate(drives):
             values = [along.values[drive.name] if drive.name in along.names
-                      else in_study_units(study, drive, configuration.value(drive))]  # fmt: skip
-            values += [in_study_units(study, drive, part[k]) for part in (rates.velocities, rates.accelerations)]
+                      else in_study_units(study.units, drive, configuration.value(drive))]  # fmt: skip
+            values += [in_study_units(study.units, drive, part[k]) for part in (rates.velocities, rates.accelerations)]
             names = (drive.name, *(f"{drive.name}_{word}" for word in ORDERS))
             columns += [
                 DRIVE.column(np.array(np.broadcast_to(value, times.shape), dtype=float), drive=name)

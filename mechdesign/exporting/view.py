@@ -15,9 +15,11 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.model import Fixed, Plates
 from mechdesign.mechanism.plates import Sizes
+from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.kinematics.question import MotionQuestion, motion_question
-from mechdesign.questions.poses import pose_in_words, solve_poses, study_poses
+from mechdesign.questions.kinematics.question import KinematicQuestion
+from mechdesign.questions.kinematics.values import KinematicValues
+from mechdesign.questions.poses import pose_in_words, study_poses
 from mechdesign.study import Study
 from mechdesign.study.text.fields import Context, read_number
 
@@ -142,13 +144,13 @@ class PosedStudy:
         return "the pose of the sketch" if self.at is None else self.at
 
     @cached_property
-    def question(self) -> MotionQuestion | None:
+    def question(self) -> KinematicQuestion | None:
         """What the study asks of its motion; None where it gives no poses, and none can be assumed."""
         try:
             poses = study_poses(self.study, "kinematics")
         except StudyError:
             return None
-        return motion_question(self.study, poses)
+        return KinematicValues.of(self.study, poses)
 
     @property
     def unmoved(self) -> tuple[Caution, ...]:
@@ -174,7 +176,7 @@ class PosedStudy:
             return Track(still, np.zeros(0, dtype=bool), np.zeros(1))
         poses, curve = self.question.poses, self.question.curve
         if curve is None or curve.spent.any():
-            parts = [*solve_poses(self.study, poses, self.question.watched)]
+            parts = [*solve_poses(self.question.motion, self.question.watched)]
             configurations = [part.configuration for part in parts]
             whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
             wound = {name: np.concatenate([part.near[name] for part in configurations])
@@ -184,7 +186,7 @@ class PosedStudy:
         else:
             finer = -(-(LOOKS - 1) // max(poses.end, 1))
             places = np.linspace(0.0, poses.end, poses.end * finer + 1)
-            whole = curve.solve(np.zeros(len(places), dtype=np.intp), places)[1]
+            whole = curve.solve(np.zeros(len(places), dtype=np.intp), places).configuration
             follows = np.ones(len(places) - 1, dtype=bool)
         valid = np.flatnonzero(whole.valid)
         if not len(valid):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from importlib import import_module
 
 from mechdesign.commands import QUESTIONS
+from mechdesign.motion.motion import GIVEN as GIVEN
+from mechdesign.motion.motion import TIMED as TIMED
 from mechdesign.results import ColumnKind, KeyNumber, TableKind
 from mechdesign.study import Units
 
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")
-TIMED = ColumnKind("time", "time from the begin of the motion", "time")
-GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
 EFFICIENCY = (
     ColumnKind("friction_power", "power that friction takes, never positive", "power",
                "-sum of coefficient * radius * |joint force| * |relative rate|"),

@@ -16,11 +16,11 @@ from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.statics import Balance, Reaction
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
 _JAMS, _HOLDS = "jams in", "is held by"

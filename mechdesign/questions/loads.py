@@ -12,10 +12,10 @@ from mechdesign.mechanism.algebra import norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
+from mechdesign.motion.motion import in_study_units
+from mechdesign.motion.rows import TIME, Poses
 from mechdesign.numerics.arrays import Ints
-from mechdesign.questions.poses import in_study_units
 from mechdesign.study import Study
-from mechdesign.study.poses import TIME, Poses
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 from mechdesign.study.text.fields import MAX_NUMBER
 from mechdesign.study.text.units import Amount
@@ -80,7 +80,7 @@ def variable(
         return poses.times[rows]
     coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
     if coordinate.name == name:
-        return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)
+        return np.asarray(in_study_units(study.units, coordinate, configuration.value(coordinate)), dtype=np.float64)
     assert moving.velocity is not None
     rate = first(configuration, coordinate, moving.velocity)
-    return np.asarray(in_study_units(study, coordinate, rate), dtype=np.float64)
+    return np.asarray(in_study_units(study.units, coordinate, rate), dtype=np.float64)

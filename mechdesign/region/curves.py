@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.errors import AssemblyError
+from mechdesign.motion.rows import PoseGroup, Poses, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.region.patches import GRID, patches
 from mechdesign.region.pieces import counted
 from mechdesign.region.rays import SINGLE, Designs
 from mechdesign.region.regions import RAYS, regions
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
 # Approximate number of poses of all regions together: a question may be costly at each pose.
 MAX_POSES = 2000

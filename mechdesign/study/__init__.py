@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mechdesign.study.loading import Study as Study
     from mechdesign.study.loading import load as load
-    from mechdesign.study.poses import PoseGroup as PoseGroup
-    from mechdesign.study.poses import Poses as Poses
     from mechdesign.study.templates import template as template
     from mechdesign.study.templates import template_path as template_path
     from mechdesign.study.text.units import Units as Units
@@ -21,7 +19,6 @@ HELP_PAGE = "reference/study/index"
 
 _HOMES = {
     **dict.fromkeys(("Study", "load"), "loading"),
-    **dict.fromkeys(("PoseGroup", "Poses"), "poses"),
     **dict.fromkeys(("template", "template_path"), "templates"),
     "Units": "text.units",
 }

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description, Term
+from mechdesign.motion.paths import PointPath, Polyline, Round, Spline, SplineOfEach
+from mechdesign.motion.paths import bends as bends_of
+from mechdesign.motion.rows import MAX_POSES, PoseGroup, Poses, by_length, by_time, with_length
 from mechdesign.numerics.arrays import Floats, Ints, distinct
-from mechdesign.study import point_paths
-from mechdesign.study.motion_program import number_of_instants, program
-from mechdesign.study.point_paths import PointPath, Polyline, table_of
-from mechdesign.study.poses import MAX_POSES, PoseGroup, Poses, by_length, by_time, with_length
 from mechdesign.study.schema.motions import Course
-from mechdesign.study.schema.paths import PathSection
+from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
 from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, Sweep
+from mechdesign.study.text.csv_files import read_table
+from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.tables import table_of
 from mechdesign.study.text.units import Amount
+from mechdesign.study.timed import number_of_instants, program
 
 HELP_PAGE = "reference/study/kinematics"
 
@@ -162,7 +165,7 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
     columns: dict[str, Floats] = {}
     points: dict[str, PointPath] = {}
     for name, section in path.items():
-        course = point_paths.course(name, section, folder, numbers.of)
+        course = _course(name, section, folder, numbers.of)
         if isinstance(course, PointPath):
             points[name] = course
             design = np.repeat(np.arange(numbers.count), course.count)
@@ -182,7 +185,7 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
     points = {owner: course for owner, course in points.items() if course.count == count}
     listed = [column for name, column in rows.items() if name.rpartition(".")[0] not in points]
     corners = [course.corners for course in points.values()]
-    corners += [point_paths.bends(np.concatenate(listed))] if listed else []
+    corners += [bends_of(np.concatenate(listed))] if listed else []
     values = {name: column.ravel() for name, column in rows.items()}
     poses = replace(
         Poses.single(values, (count,)), designs=numbers.count, paths=points,
@@ -193,6 +196,43 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
     line, row = np.divmod(np.arange(poses.count), count)
     slopes, bends = by_length(poses, line, row.astype(float))
     return replace(poses, slopes=slopes, bends=bends)
+
+
+def _course(name: str, given: PathSection, folder: Folder, value: Callable[[float], Floats]) -> PointPath | Floats:
+    """The path of a point, or the values of a coordinate, shape (designs, count), by the numbers of each design.
+
+    Raises
+    ------
+    StudyError
+        Where a file cannot be read, or what is listed is no such path.
+    """
+    for form, count, whole in ((given.circle, CIRCLE_POSES, True), (given.arc, LINE_POSES, False)):
+        if form is not None:
+            x, y, radius, begin, end = map(value, (*form.center, form.radius, form.from_, form.to))
+            return Round(given.points or count, x + 1j * y, radius, begin, end, whole)
+    if given.line is not None:
+        start, stop = (value(x) + 1j * value(y) for x, y in given.line)
+        if (start == stop).all():
+            raise StudyError(f"path: the line of {name!r} needs two different places")
+        return Polyline.through(np.linspace(start, stop, given.points or LINE_POSES, axis=1, dtype=np.complex128))
+    point = "." not in name
+    if given.file is not None:
+        table = read_table(folder, given.file)[None]
+    else:
+        assert given.through is not None
+        table = table_of(given.through, value)
+    if point and table.shape[2] == 2:
+        places = table[..., 0] + 1j * table[..., 1]
+        if not given.spline:
+            return Polyline.through(places)
+        chords = np.abs(np.diff(places, axis=1))
+        if places.shape[1] < 3 or not (chords > APART * chords.sum(axis=1, keepdims=True)).all():
+            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
+        splines = [Spline.through(place, given.points) for place in places]
+        return splines[0] if len(splines) == 1 else SplineOfEach(splines[0].count, splines)
+    if table.shape[2] == 1:
+        return np.asarray(table[..., 0])
+    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
 def _timed(motion: Mapping[str, Course], instants: int, folder: Folder, numbers: Numbers) -> Poses:

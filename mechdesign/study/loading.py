@@ -25,12 +25,13 @@ from mechdesign.functions import RESERVED
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
+from mechdesign.motion.motion import Motion
+from mechdesign.motion.rows import Poses
 from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import Requirement, check_result
@@ -165,6 +166,10 @@ class Study:
         """Files that the study reads: path of the key, file, and its text when the study was loaded."""
         for keys, name in files(self.resolved, self.questions):
             yield keys, self.folder.path / name, self.folder.text(name)
+
+    def motion(self, poses: Poses) -> Motion:
+        """Its mechanism in some poses."""
+        return Motion(self.mechanism, self.units, poses)
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None if it is not known.

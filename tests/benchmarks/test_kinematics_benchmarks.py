@@ -21,9 +21,10 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.experiments.batches import at_poses
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
-from mechdesign.questions.kinematics.analysis import answers, kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
@@ -260,9 +261,9 @@ def test_all_tables_of_many_designs(benchmark: Any) -> None:
     study = study_of(MEASURED + TURN + "  rates: {crank: 1 rad/s}\n")
     designs = population(LENGTHS, study)
     poses = study_poses(study, "kinematics", Designs(study, designs).numbers)
-    found = benchmark.pedantic(answers, (study, poses), rounds=3, warmup_rounds=1)
+    found = benchmark.pedantic(at_poses, (study, "kinematics", poses), rounds=3, warmup_rounds=1)
     assert all({"motion", "extremes", "limits", "loops", "toggles"} <= set(each.tables) for each in found)
-    benchmark.extra_info["ms_a_design"] = processor_time(lambda: answers(study, poses))
+    benchmark.extra_info["ms_a_design"] = processor_time(lambda: at_poses(study, "kinematics", poses))
     benchmark.extra_info["alone_ms"] = DESIGNS * processor_time(lambda: kinematics(study))
 
 

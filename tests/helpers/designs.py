@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 from mechdesign.errors import AssemblyError
+from mechdesign.experiments.batches import at_poses
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
 
 Answer = Result | AssemblyError
 
 
 def assert_as_alone(
     designs: Designs,
-    answers: Callable[[Study, Poses], list[Answer]],
     ask: Callable[[Study], Result],
     tolerance: float = 1e-12,
     rounding: float = 0.0,
@@ -28,7 +27,7 @@ def assert_as_alone(
     found: dict[int, Answer] = {}
     for rows in alike(designs, ask.__name__, np.arange(designs.count)):
         poses = study_poses(designs.study, ask.__name__, designs.take(rows).numbers)
-        found |= zip(rows.tolist(), answers(designs.study, poses), strict=True)
+        found |= zip(rows.tolist(), at_poses(designs.study, ask.__name__, poses), strict=True)
     for k, answer in found.items():
         if isinstance(answer, AssemblyError):
             with pytest.raises(AssemblyError) as alone:

@@ -20,9 +20,10 @@ from helpers.newton_euler import Bodies, Jet
 from helpers.random_mechanisms import Made, mechanisms
 from helpers.studies import study_of
 from mechdesign.mechanism import Configuration
+from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.results import Result
 from mechdesign.study import Study
 
@@ -211,7 +212,7 @@ class Loaded:
     @cached_property
     def bodies(self) -> Bodies:
         """The bodies in motion at the poses."""
-        (solved,) = solve_poses(self.study, study_poses(self.study, "dynamics"))
+        (solved,) = solve_poses(self.study.motion(study_poses(self.study, "dynamics")))
         assume(solved.configuration.valid.all())
         return self.at(solved.configuration, self.rates, self.accelerations)
 

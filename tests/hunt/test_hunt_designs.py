@@ -17,10 +17,10 @@ from mechdesign.errors import MechdesignError
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
+from mechdesign.motion.group import Group
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
-from mechdesign.questions.together import Group
 from mechdesign.results import Result
 
 Seeds = Callable[[int], Iterator[int]]

@@ -21,7 +21,8 @@ from helpers.studies import study_of
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.motion.solving import solve_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.questions.stiffness.analysis import stiffness
 from mechdesign.questions.stiffness.body import ask, hold
 from mechdesign.questions.stiffness.force_method import load, twists_of
@@ -51,7 +52,7 @@ def drawn(seed: int) -> Sprung:
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
+    (solved,) = solve_poses(study.motion(study_poses(study, "stiffness")))
     return study, solved.configuration
 
 

@@ -21,8 +21,9 @@ from hypothesis import strategies as st
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
-from mechdesign.questions.poses import solve_poses, study_poses
-from mechdesign.questions.stiffness.analysis import answers, stiffness
+from mechdesign.motion.solving import solve_poses
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.stiffness.analysis import stiffness
 from mechdesign.questions.stiffness.body import ask, hold
 from mechdesign.questions.stiffness.force_method import load, twists_of
 from mechdesign.study import Study
@@ -34,7 +35,7 @@ NOTHING = 1e-15
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
+    (solved,) = solve_poses(study.motion(study_poses(study, "stiffness")))
     return study, solved.configuration
 
 
@@ -296,4 +297,4 @@ def test_many_designs_at_once_are_those_one_by_one(case: Sprung, seed: int) -> N
     designs = Designs(study, values)
     # What is measured from the sketch is read anew.
     assume(designs.alike)
-    assert_as_alone(designs, answers, stiffness, 1e-9, rounding=1e-13)
+    assert_as_alone(designs, stiffness, 1e-9, rounding=1e-13)

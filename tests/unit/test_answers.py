@@ -9,8 +9,9 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.errors import AssemblyError
+from mechdesign.experiments.batches import at_poses
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.kinematics.analysis import answers, kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.poses import study_poses
 from mechdesign.results import Column, Result
 from mechdesign.statistics import Request
@@ -114,7 +115,7 @@ STUDIES: Mapping[str, tuple[str, Mapping[str, tuple[float, float]]]] = {
 
 
 def together(study: Study, designs: Mapping[str, Floats]) -> list[Result | AssemblyError]:
-    return answers(study, study_poses(study, "kinematics", Designs(study, designs).numbers))
+    return at_poses(study, "kinematics", study_poses(study, "kinematics", Designs(study, designs).numbers))
 
 
 def alone(study: Study, designs: Mapping[str, Floats], k: int) -> Result | AssemblyError:

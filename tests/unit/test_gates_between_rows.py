@@ -322,3 +322,43 @@ kinematics:
     for lower, why in (("100", "not determined"), ("99", "cannot be assembled")):
         (warning,) = mechdesign.kinematics(mechdesign.load(text=arm.replace("LOWER", lower))).warnings
         assert why in str(warning)
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_a_gate_on_stiffness_is_that_of_the_whole_motion(step: int) -> None:
+    # A motor of the stiffness c turns an arm of the length L: k_y = c/(L cos theta)^2, least where it lies flat.
+    text = f"""
+mechanism: {{links: {{ground: {{O: [0, 0]}}, arm: [O, P, 100]}}, drives: {{theta: {{angle: arm}}}}}}
+stiffness:
+  {{link: arm, at: P, actuators: {{theta: 2e6}}, sweep: {{theta: {{from: -7.3, to: 7.7, step: {step}}}}}}}
+requirements:
+  - {{result: stiffness.k_y, at_least: 200.01}}
+  - {{result: stiffness.compliance.C22, at_most: 0.00501}}
+  - {{result: stiffness.k_y.max, at_most: 203.7}}
+"""
+    least, softest, largest = verdicts(text, "stiffness")
+    assert (least.met, softest.met, largest.met) == (False, True, True)
+    assert (least.note, softest.note) == ("", "")
+    assert least.worst == pytest.approx(2e6 / 100**2, rel=1e-12)
+    assert softest.worst == pytest.approx(100**2 / 2e6, rel=1e-12)
+    assert largest.worst == pytest.approx(2e6 / (100 * math.cos(math.radians(7.7))) ** 2, rel=1e-12)
+    assert float(least.place.removeprefix("theta ")) == pytest.approx(0, abs=1e-6)
+
+
+def test_an_optimisation_judges_stiffness_where_a_requirement_does() -> None:
+    # k_y = c/(L cos theta)^2 is least at 0, which is no row: of L the largest within the bound is sqrt(c/200).
+    text = """
+mechanism:
+  parameters: {l: 90}
+  links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: l}}
+  drives: {theta: {angle: arm}}
+stiffness: {link: arm, at: P, actuators: {theta: 2e6}, sweep: {theta: {from: -7.3, to: 7.7, step: 5}}}
+optimize:
+  variables: {l: {from: 80, to: 120}}
+  method: search
+  maximize: l
+  subject_to: [{result: stiffness.k_y, at_least: 200}]
+  evaluations: 40
+"""
+    best = mechdesign.optimize(mechdesign.load(text=text)).tables["best"]
+    assert best["l"][0] == pytest.approx(math.sqrt(2e6 / 200), rel=1e-6)

@@ -17,15 +17,14 @@ ORDER = (
     ("mechdesign.work",),
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
+    ("mechdesign.motion",),
     ("mechdesign.study.building",),
     ("mechdesign.questions.reliability.laws",),
     (
-        "mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths",
-        "mechdesign.study.motion_program",
+        "mechdesign.study.schema",
         *(f"mechdesign.questions.{name}.schema" for name in COMMANDS), "mechdesign.experiments.schema",
     ),
     ("mechdesign.study",),
-    ("mechdesign.curve",),
     ("mechdesign.questions", "mechdesign.region"),
     ("mechdesign.questions.kinematics",),
     # The force method, by which dynamics finds moments that equilibrium leaves open.

@@ -14,8 +14,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import OutputError
-from mechdesign.questions import poses
-from mechdesign.questions.kinematics import passage, remarks
+from mechdesign.motion import passage, solving
+from mechdesign.questions.kinematics import remarks
 from mechdesign.report.requirements import requirements
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import LongTable, Result
@@ -72,7 +72,7 @@ def texts(result: Result) -> dict[str, str]:
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (poses, passage, remarks):
+    for module in (solving, passage, remarks):
         monkeypatch.setattr(module, "POSES_AT_ONCE", 50)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.curve.functions import Functions
 from mechdesign.experiments.ranking import Ranking
+from mechdesign.motion.functions import Functions
 from mechdesign.report.cases import best_of
 from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
 from mechdesign.report.page.headlines import headlines

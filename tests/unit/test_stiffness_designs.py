@@ -16,7 +16,6 @@ import mechdesign
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
-from mechdesign.questions.stiffness.analysis import answers
 from mechdesign.study.designs import Designs
 
 COUNT = 7
@@ -171,7 +170,7 @@ def designs_of(text: str, *names: str, count: int = COUNT, width: float = 0.05) 
 )  # fmt: skip
 def test_every_design_is_answered_as_if_it_were_asked_alone(text: str, names: Sequence[str]) -> None:
     designs = designs_of(text, *names)
-    found = assert_as_alone(designs, answers, mechdesign.stiffness)
+    found = assert_as_alone(designs, mechdesign.stiffness)
     # Something of each differs.
     assert all(not isinstance(answer, Exception) for answer in found)
     columns = [np.concatenate([c.values for table in answer.tables.values() for c in table.columns if c.numeric])
@@ -184,12 +183,12 @@ def test_designs_that_fail_are_loose_or_nearly_so_say_it_in_their_own_words() ->
     """Legs that become parallel, or nearly; a five-bar that does not reach some of its poses, or any."""
     t = np.array([0.1, 0.25, 0.25 - 2e-5, 0.25, 0.2])
     designs = Designs(study_of(PLATFORM), {"t": t, "k": np.linspace(4e7, 6e7, 5), "h": np.linspace(0.03, 0.05, 5)})
-    found = assert_as_alone(designs, answers, mechdesign.stiffness)
+    found = assert_as_alone(designs, mechdesign.stiffness)
     said = ["; ".join(map(str, answer.warnings)) for answer in found if not isinstance(answer, Exception)]
     assert ["nearly" in text for text in said] == [False, False, True, False, False]
     assert ["1 of 2 poses are under-constrained" in text for text in said] == [False, True, False, True, False]
     designs = Designs(study_of(FIVE_BAR), {"b": np.array([0.4, 0.35, 0.1, 0.4]), "k": np.linspace(900, 1200, 4)})
-    found = assert_as_alone(designs, answers, mechdesign.stiffness)
+    found = assert_as_alone(designs, mechdesign.stiffness)
     kinds = ["none" if isinstance(answer, mechdesign.AssemblyError) else bool(answer.failed) for answer in found]
     assert {"none", True, False} == set(kinds)
 
@@ -222,11 +221,9 @@ def test_points_of_an_elastic_link_lie_in_another_order_in_each_design() -> None
     """F b x (L^2 - b^2 - x^2) / 6EIL on the way to the force [Roark, Table 8.1]; a bracket's foot lies below it."""
     place, modulus, height = np.array([30, 120, 210, 249, 251, 380.0]), np.linspace(1e5, 3e5, 6), np.linspace(30, 60, 6)
     study = study_of(GIRDER)
-    assert_as_alone(Designs(study, {"girder.T.x": place, "e": modulus, "h": height}), answers, mechdesign.stiffness)
+    assert_as_alone(Designs(study, {"girder.T.x": place, "e": modulus, "h": height}), mechdesign.stiffness)
     designs = Designs(study, {"p": place, "e": modulus, "h": height})
-    for answer, x, e, h in zip(
-        assert_as_alone(designs, answers, mechdesign.stiffness), place, modulus, height, strict=True
-    ):
+    for answer, x, e, h in zip(assert_as_alone(designs, mechdesign.stiffness), place, modulus, height, strict=True):
         assert not isinstance(answer, Exception)
         table = answer.tables["displacements"]
         moved = table["dy"][(table["link"] == "girder") & (table["point"] == "T")]
@@ -267,7 +264,7 @@ def test_a_lever_on_a_prop_before_or_behind_the_asked_point_is_that_of_finite_el
     nominal = {name: study.parameters.nominal[name] for name in ("e", "a", "i", "k", "pin")}
     values |= {name: value * rng.uniform(0.5, 2, 5) for name, value in nominal.items()}
     designs = Designs(study, values)
-    for k, answer in enumerate(assert_as_alone(designs, answers, mechdesign.stiffness)):
+    for k, answer in enumerate(assert_as_alone(designs, mechdesign.stiffness)):
         assert not isinstance(answer, Exception)
         m, x, e, a, i, motor, pin = (float(values[name][k]) for name in ("m", "x", "e", "a", "i", "k", "pin"))
         frame = Frame()
@@ -310,7 +307,7 @@ stiffness:
     area, arm = number["w"] * number["h"], number["l"]
     bent = arm**3 / (3 * number["e"] * area * number["h"] ** 2 / 12) + arm / (number["kappa"] * number["g"] * area)
     expected = bent + arm**2 * (1 / number["k"] + 1 / number["gear"]) + 1 / number["pin"]
-    for answer, soft in zip(assert_as_alone(designs, answers, mechdesign.stiffness), expected, strict=True):
+    for answer, soft in zip(assert_as_alone(designs, mechdesign.stiffness), expected, strict=True):
         assert not isinstance(answer, Exception)
         assert matrix(answer, "C")[1, 1] == pytest.approx(soft, rel=1e-12)
 
@@ -353,7 +350,7 @@ def test_a_leg_that_has_a_spring_in_one_design_only() -> None:
     section = "{variables: {q: {from: 0.1, to: 1, number: 2}}, minimize: [stiffness.springs.stiffness]}"
     study = study_of(text.replace("beam}", "beam, near: beam}"), f"optimize={section}")
     designs = Designs(study, {"q": np.array([0.45, 0.4, 0.42]), "k": np.array([4e7, 5e7, 6e7])})
-    found = assert_as_alone(designs, answers, mechdesign.stiffness)
+    found = assert_as_alone(designs, mechdesign.stiffness)
     springs = [answer.tables["springs"] for answer in found if not isinstance(answer, Exception)]
     assert [len(table) for table in springs] == [3, 4, 3]
     for text, tables in (("leg_1", springs), ("near+far", springs[1:2])):

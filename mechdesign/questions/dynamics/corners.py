@@ -16,13 +16,13 @@ import numpy as np
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.motion.rows import TIME
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.questions.dynamics.instants import Instants
 from mechdesign.questions.dynamics.schema import ForwardSection
 from mechdesign.study import Study
-from mechdesign.study.poses import TIME
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 
 # Parts of the duration in which corners in time are looked for first.

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.curve.motion import from_sketch
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration, Mechanism
@@ -30,13 +29,14 @@ from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
+from mechdesign.motion.curve import from_sketch
+from mechdesign.motion.motion import in_study_units, radians
+from mechdesign.motion.rows import Poses
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.poses import in_study_units, radians
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 
 # Below this regularity two assemblies meet. Rates there follow from poses around, each this far from the next (radians,
@@ -103,8 +103,10 @@ class EquationsOfMotion:
         followed = [*drives, *(coordinate for _, coordinate in self.crossings), *mechanism.counting, *outputs]
         if mechanism.windings:
             followed += mechanism.windings.values()
-            begin = {drive.name: np.atleast_1d(in_study_units(self.study, drive, at.value(drive))) for drive in drives}
-            wound = from_sketch(self.study, begin, {})
+            begin = {
+                drive.name: np.atleast_1d(in_study_units(self.study.units, drive, at.value(drive))) for drive in drives
+            }
+            wound = from_sketch(self.study.motion(Poses.single(begin)))
             at = replace(at, near={**at.near, **{name: angle[0] for name, angle in wound.items()}})
         self.drives, friction = drives, question.friction
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
@@ -150,9 +152,9 @@ class EquationsOfMotion:
         values, speeds = [], []
         for name in mechanism.drives:
             drive = mechanism.coordinate(name)
-            value = radians(study, drive, given[name]) if name in given else sketch.value(drive)
+            value = radians(study.units, drive, given[name]) if name in given else sketch.value(drive)
             values.append(np.asarray(value, dtype=float))
-            speeds.append(float(radians(study, drive, given.get(f"{name}{VELOCITY}", 0.0))))
+            speeds.append(float(radians(study.units, drive, given.get(f"{name}{VELOCITY}", 0.0))))
         pose = mechanism.forward.solve(values)
         if not pose.valid:
             reason = mechanism.why(int(pose.reason))
@@ -171,7 +173,7 @@ class EquationsOfMotion:
         parts = []
         for bound in mechanism.bounds:
             labels = [label for label, margin in bound.margins(pose, places) if float(margin) < 0]
-            value = in_study_units(study, bound.coordinate, pose.value(bound.coordinate))
+            value = in_study_units(study.units, bound.coordinate, pose.value(bound.coordinate))
             unit = f" {study.units.label(bound.coordinate.quantity)}".rstrip()
             parts += [f"; {bound.coordinate.name} is {float(value):.6g}{unit}, beyond {label}" for label in labels]
         return "".join(parts)

@@ -12,16 +12,16 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Vector, quiet
+from mechdesign.motion.motion import radians
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.columns import FLYWHEEL
 from mechdesign.questions.dynamics.schema import Flywheel
-from mechdesign.questions.kinematics.along import Along
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import radians
+from mechdesign.questions.kinematics.along import KinematicAlong
+from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.results import Table
 from mechdesign.statistics import Request, no_value_along
-from mechdesign.study.poses import Poses
 
 # Work over the next motion that differs by less than this part of the work of the size of the effort is the same; of an
 # effort that is rounding alone, this part of the forces that act.
@@ -29,7 +29,7 @@ SAME, ROUNDING = 1e-6, 1e-12
 
 
 @quiet
-def flywheel_table(motion: Motion, along: Along | None, wheel: Flywheel) -> tuple[Table, list[Caution]]:
+def flywheel_table(motion: PoseValues, along: KinematicAlong | None, wheel: Flywheel) -> tuple[Table, list[Caution]]:
     """The table, and a warning where the motion is no cycle or is only taken as one; nan where it is none."""
     question, study, numbers = motion.question, motion.question.study, np.full(5, np.nan)
     (drive,) = question.drives
@@ -42,7 +42,7 @@ def flywheel_table(motion: Motion, along: Along | None, wheel: Flywheel) -> tupl
         warnings.append(Caution(kind, f"the flywheel of {drive.name} {words} {problem}", "flywheel"))
     if along is not None and (kind == "assumed" or not problem):
         mean, surplus, own = _of_cycle(along, f"{drive.name}_effort", _way(question))
-        mass = study.units.inertia_factor * float(radians(study, drive, rate)) ** 2
+        mass = study.units.inertia_factor * float(radians(study.units, drive, rate)) ** 2
         inertia = 2 * own / mass
         added = max(surplus / (wheel.fluctuation * mass) - inertia, 0.0)
         numbers = np.array([mean, surplus, inertia, np.divide(surplus / mass, inertia), added])
@@ -58,7 +58,7 @@ def flywheel_table(motion: Motion, along: Along | None, wheel: Flywheel) -> tupl
     return FLYWHEEL.table(columns), warnings
 
 
-def _of_cycle(along: Along, effort: str, way: float) -> tuple[float, float, float]:
+def _of_cycle(along: KinematicAlong, effort: str, way: float) -> tuple[float, float, float]:
     """Mean effort, surplus and mean kinetic energy over a way (radians)."""
     end, pieces = along.curve.poses.end, along.functions.pieces
     mean = float(along.mean(effort)[0])
@@ -68,7 +68,7 @@ def _of_cycle(along: Along, effort: str, way: float) -> tuple[float, float, floa
     return mean, surplus, float(along.mean("kinetic_energy")[0])
 
 
-def _no_motion(question: MotionQuestion, along: Along | None) -> str:
+def _no_motion(question: MovedQuestion, along: KinematicAlong | None) -> str:
     """Why the poses are no motion of the drive at one speed; empty where they are."""
     (drive,) = question.drives
     if not question.section.rates.get(drive.name, 0.0):
@@ -86,13 +86,13 @@ def _no_motion(question: MotionQuestion, along: Along | None) -> str:
     return "" if np.isfinite(along.mean(f"{drive.name}_effort")[0]) else f"the effort of {drive.name} is not finite"
 
 
-def _another(question: MotionQuestion, along: Along) -> str:
+def _another(question: MovedQuestion, along: KinematicAlong) -> str:
     """How the effort over the next motion is another; empty where it is the same, and so the motion a cycle."""
     (drive,), study, way = question.drives, question.study, _way(question)
     effort = f"{drive.name}_effort"
     twice = _twice(question)
     assert twice.curve is not None
-    further = Along(twice, twice.curve.unlimited(), (), requests=[Request(effort, integral=True)])
+    further = KinematicAlong(twice, twice.curve.unlimited(), (), requests=[Request(effort, integral=True)])
     end, pieces = along.curve.poses.end, further.functions.pieces
     nodes = np.concatenate([pieces.nodes.ravel(), pieces.begin, pieces.end])
     places = np.append(np.where(nodes > end, nodes - end, nodes), end)
@@ -113,10 +113,10 @@ def _another(question: MotionQuestion, along: Along) -> str:
     )
 
 
-def _closes(question: MotionQuestion, along: Along) -> bool:
+def _closes(question: MovedQuestion, along: KinematicAlong) -> bool:
     """Whether positions and effort at the end of the motion are those at its begin."""
     (drive,), line, ends = question.drives, np.zeros(2, dtype=np.intp), np.array([0.0, along.curve.poses.end])
-    poses, size = along.curve.solve(line, ends, judged=False)[1], question.study.mechanism.size
+    poses, size = along.curve.solve(line, ends, judged=False).configuration, question.study.mechanism.size
     places = [*poses.rotations, *(place / size for place in (*poses.nodes, *poses.slides))]
     effort = along.at(line, ends)[f"{drive.name}_effort"]
     return all(_apart(place) <= SAME for place in places) and _apart(effort) <= SAME * np.abs(effort).max(initial=0.0)
@@ -127,20 +127,20 @@ def _apart(values: Vector) -> float:
     return float(np.abs(np.diff(np.broadcast_to(values, 2)))[0])
 
 
-def _degrees(question: MotionQuestion, place: float) -> str:
+def _degrees(question: MovedQuestion, place: float) -> str:
     """The way of the drive to a place, in the study's unit."""
     (drive,), poses = question.drives, question.poses
     values = poses.values[drive.name]
     return f"{abs(values[-1] - values[0]) * place / poses.end:.6g} {question.study.units.label('angle')}"
 
 
-def _way(question: MotionQuestion) -> float:
+def _way(question: MovedQuestion) -> float:
     """How far the drive turns (radians)."""
     (drive,), values = question.drives, question.poses.values
-    return float(radians(question.study, drive, abs(values[drive.name][-1] - values[drive.name][0])))
+    return float(radians(question.study.units, drive, abs(values[drive.name][-1] - values[drive.name][0])))
 
 
-def _twice(question: MotionQuestion) -> MotionQuestion:
+def _twice(question: MovedQuestion) -> MovedQuestion:
     """The question for a sweep that goes on as far again."""
     (name,), poses = question.poses.names, question.poses
     values = poses.values[name]
@@ -150,4 +150,4 @@ def _twice(question: MotionQuestion) -> MotionQuestion:
         return {key: np.full(longer.count, column[0]) for key, column in columns.items()}
 
     places, parameters = constant(dict(poses.places)), constant(dict(poses.parameters))
-    return replace(question, poses=replace(longer, places=places, parameters=parameters, nominal=poses.nominal))
+    return question.at(replace(longer, places=places, parameters=parameters, nominal=poses.nominal))

@@ -10,6 +10,10 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.motion.motion import SolvedPoses, in_study_units
+from mechdesign.motion.passage import MAX_SHOWN_POSES, Mark
+from mechdesign.motion.question import PoseValues, unfilled
+from mechdesign.motion.rows import PoseGroup, Poses
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress
@@ -19,24 +23,22 @@ from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
 from mechdesign.questions.dynamics.motion_in_time import Course, Integration
-from mechdesign.questions.dynamics.question import ForceQuestion, force_question
+from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestion
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.passage import Mark
+from mechdesign.questions.kinematics.moved import full
 from mechdesign.questions.outputs import expand_outputs
-from mechdesign.questions.poses import MAX_SHOWN_POSES, Shown, SolvedPoses, in_study_units
+from mechdesign.questions.poses import Shown
 from mechdesign.results import Column, Result, Scope, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.checker import ORDERS
 
 # Energies that differ from the work of what acts by more than this part of the largest are wrong.
 ENERGY = 1e-6
 
 
-def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
+def forward(study: Study, progress: Progress) -> tuple[Result, PoseValues, Shown]:
     """The motion that the efforts of `dynamics.forward` bring about, the forces along it, and what pictures show.
 
     Raises
@@ -110,7 +112,7 @@ def _cautions(study: Study, integration: Integration, course: Course) -> Iterato
         yield Caution("unconverged", message, "forward", row)
 
 
-def _lift_offs(study: Study, integration: Integration, rows: Motion) -> Iterator[Caution]:
+def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iterator[Caution]:
     """Warnings of followers that lift off their cams, at rows, or only between them."""
     contacts = lift_off.contacts(integration.equations.question)
     for coupling, where in lift_off.lifted(rows):
@@ -139,13 +141,13 @@ def _lift_offs(study: Study, integration: Integration, rows: Motion) -> Iterator
             yield Caution("cam", message, "joint_forces")
 
 
-def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
+def _forces(study: Study, course: Course) -> tuple[PoseValues, Shown]:
     """Forces along the motion: those of any motion over time, at the poses that were integrated."""
     mechanism, count = study.mechanism, len(course.times)
     drives = [mechanism.coordinate(name) for name in mechanism.drives]
 
     def of(drive: Coordinate, value: Value) -> Floats:
-        return np.array(np.broadcast_to(in_study_units(study, drive, value), (count,)), dtype=float)
+        return np.array(np.broadcast_to(in_study_units(study.units, drive, value), (count,)), dtype=float)
 
     rows = np.arange(count)
     values = {drive.name: of(drive, course.configuration.value(drive)) for drive in drives}
@@ -157,27 +159,23 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
         (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
         slopes=slopes, bends=bends,
     )  # fmt: skip
-    question = force_question(study, poses)
-    borne = question.borne
-    assert isinstance(borne, ForceQuestion)
+    question = DynamicQuestion.of(study, poses)
     if len(course.rates.friction):
-        question = replace(question, borne=replace(borne, rubbing=course.rates.friction))
-    reason = np.zeros(count, dtype=np.int8)
-    mechanism.forward.judge(replace(course.configuration, reason=reason))
-    motion = Motion(question, reason=reason)
-    motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
-    motion.smooth = np.zeros(count, dtype=bool)
+        question = replace(question, forces=replace(question.acting, rubbing=course.rates.friction))
+    motion, solved = unfilled(question), SolvedPoses(question.motion, rows, mechanism.drives, course.configuration)
+    mechanism.forward.judge(replace(course.configuration, reason=motion.reason))
+    motion.put(rows, full(question.moved(solved)[0], rows.shape))
     # Efforts are known, also where the drives are singular.
     for drive, effort in zip(drives, course.rates.efforts, strict=True):
-        motion.put(f"{drive.name}_effort", rows, effort)
+        motion.arrays[f"{drive.name}_effort"][:] = effort
         speed = course.positions.rate(drive, course.rates.velocity)
-        motion.put(f"{drive.name}_power", rows, effort * speed)
+        motion.arrays[f"{drive.name}_power"][:] = effort * speed
     some = evenly(count, MAX_SHOWN_POSES)
     return motion, Shown(study, poses, rows[some], course.configuration.take(rows[some]))
 
 
 @quiet
-def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) -> Table:
+def _forward_table(motion: PoseValues, course: Course, outputs: list[Coordinate]) -> Table:
     study, poses, label = motion.question.study, motion.question.poses, motion.question.study.units.label
     columns: list[Column] = [TIMED.column(course.times, label("time"))]
     for k, drive in enumerate(motion.question.drives):
@@ -189,7 +187,9 @@ def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) ->
         ):  # fmt: skip
             columns.append(FORWARD[f"<drive>_{word}"].column(values, unit, drive=drive.name))
     for output in outputs:
-        value = np.broadcast_to(in_study_units(study, output, course.configuration.value(output)), course.times.shape)
+        value = np.broadcast_to(
+            in_study_units(study.units, output, course.configuration.value(output)), course.times.shape
+        )
         columns.append(FORWARD["<output>"].column(value, label(output.quantity), output=output.name))
     energies = {
         "kinetic_energy": course.rates.kinetic,

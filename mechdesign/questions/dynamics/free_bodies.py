@@ -13,12 +13,12 @@ from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.joint_contacts import PIN, Contact
 from mechdesign.mechanism.wheels import Mesh
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.tables import question_of
-from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.poses import Shown, SolvedPoses
+from mechdesign.questions.poses import Shown
 from mechdesign.study import Study
 
 
@@ -70,7 +70,7 @@ def mass_centers(study: Study, configuration: Configuration, index: int) -> dict
             for body, mass in masses.items()}  # fmt: skip
 
 
-def actions_on(motion: Motion, shown: Shown) -> list[Acting]:
+def actions_on(motion: PoseValues, shown: Shown) -> list[Acting]:
     """All that acts on the links in the poses shown; of a joint what it does to both sides, unless it is one link."""
     return list(_Poses(motion, shown).acting())
 
@@ -78,13 +78,12 @@ def actions_on(motion: Motion, shown: Shown) -> list[Acting]:
 class _Poses:
     """Poses with their rates."""
 
-    def __init__(self, motion: Motion, shown: Shown) -> None:
+    def __init__(self, motion: PoseValues, shown: Shown) -> None:
         self.motion, self.question = motion, question_of(motion)
         self.study, self.poses = self.question.study, motion.question.poses
         self.rows, self.configuration = shown.rows, shown.configuration
         linear = self.study.mechanism.linearize(self.configuration)
-        solved = SolvedPoses(self.rows, self.poses.groups[0].names, self.configuration)
-        self.moving = moving_at(self.study, motion.question.section, self.poses, solved, linear)
+        self.moving = moving_at(motion.question.section, shown.solved, linear)
 
     def acting(self) -> Iterator[Acting]:
         """Those of joints first."""

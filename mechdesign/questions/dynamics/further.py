@@ -13,17 +13,17 @@ from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.statics import balance
+from mechdesign.motion.motion import radians
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import DRIVE
 from mechdesign.questions.dynamics.columns import MODES
 from mechdesign.questions.dynamics.flywheel import flywheel_table
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
-from mechdesign.questions.kinematics.along import Along
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.poses import radians
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.results import Column, Table
-from mechdesign.study.poses import Poses
 
 # Steps of the differences that give a stiffness (radians, or sizes of the mechanism), with their weights: their error
 # is about 1e-12 of the stiffness.
@@ -36,7 +36,7 @@ ROUNDING = 1e-11
 NO_INERTIA = 1e-13
 
 
-def further_tables(motion: Motion, along: Along | None) -> tuple[dict[str, Table], list[Caution]]:
+def further_tables(motion: PoseValues, along: KinematicAlong | None) -> tuple[dict[str, Table], list[Caution]]:
     """Tables that the study asks for, of a single design, and warnings about them; `along` is the motion."""
     section, tables, warnings = question_of(motion).section, dict[str, Table](), list[Caution]()
     if motion.question.poses.designs > 1:
@@ -49,13 +49,15 @@ def further_tables(motion: Motion, along: Along | None) -> tuple[dict[str, Table
 
 
 @quiet
-def _modes_table(motion: Motion) -> Table:
+def _modes_table(motion: PoseValues) -> Table:
     """A row each pose and mode."""
     question, study = question_of(motion), motion.question.study
     drives, poses = motion.question.drives, motion.question.poses
-    values = [np.asarray(radians(study, d, motion.arrays[d.name]), dtype=float) for d in drives]
+    values = [np.asarray(radians(study.units, d, motion.arrays[d.name]), dtype=float) for d in drives]
     angles = angles_of(motion.question.watched).items()
-    near = {name: radians(study, c, motion.arrays[name]) for name, c in angles if name not in study.mechanism.drives}
+    near = {
+        name: radians(study.units, c, motion.arrays[name]) for name, c in angles if name not in study.mechanism.drives
+    }
     squares, shapes = _modes(question, poses, values, near)
     count = len(drives)
     frequency = np.where(squares >= 0, np.sqrt(np.abs(squares)) / (2 * np.pi), np.nan)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.loads import Loading
-from mechdesign.study.poses import Poses
 
 if TYPE_CHECKING:
     from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion, Rates

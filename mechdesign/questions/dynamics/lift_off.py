@@ -6,16 +6,16 @@ from collections.abc import Iterator
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.cams import Cam
+from mechdesign.motion.followed import Followed
+from mechdesign.motion.passage import Mark
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
-from mechdesign.questions.kinematics.along import Along
-from mechdesign.questions.kinematics.courses import Followed
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.passage import Mark
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Part of the forces by which a contact force is rounding.
 PRESSED = 1e-9
@@ -29,14 +29,14 @@ def contacts(question: ForceQuestion) -> dict[str, str]:
     }
 
 
-def lifted(motion: Motion) -> Iterator[tuple[str, Flags]]:
+def lifted(motion: PoseValues) -> Iterator[tuple[str, Flags]]:
     """By the coupling of each cam, the poses in which its follower would have to be pulled."""
     question = question_of(motion)
     for coupling, normal in contacts(question).items():
         yield coupling, motion.valid & (motion.arrays[normal] < -PRESSED * question.size)
 
 
-def between(question: ForceQuestion, along: Along, coupling: str, design: int) -> Iterator[Caution]:
+def between(question: ForceQuestion, along: KinematicAlong, coupling: str, design: int) -> Iterator[Caution]:
     """The warning that the follower of a cam lifts off between the poses of a design."""
     column = contacts(question)[coupling]
     force, place = (end[design] for end in along.worst(column, -1))

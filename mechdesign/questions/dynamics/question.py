@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -15,25 +16,27 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import JointFriction, Slipping
-from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
+from mechdesign.questions.kinematics.moved import AT_REST, MovedQuestion, Static, watched
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
+from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.results import Strands
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import Load
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.poses import MotionSection
@@ -44,13 +47,13 @@ PARTS = ("fx", "fy", "moment", "magnitude", "angle", "normal")
 
 @dataclass(frozen=True, eq=False)
 class ForceQuestion:
-    """What a study asks of the forces of a motion; see `mechdesign.questions.kinematics.question.Borne`."""
+    """What a study asks of the forces of a motion: its columns, and their values at solved poses."""
 
     study: Study
     section: DynamicsSection
     joints: Joints
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
-    tempo: float  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
+    tempo: float  # about how fast, by which rounding between the poses is judged; see `MovedQuestion.tempo`
     subset: frozenset[str] | None = None  # columns of `statics` that are computed; None for all, with parts
     rubbing: Floats | None = None  # friction of a motion in time, shape (contacts, instants)
 
@@ -70,11 +73,6 @@ class ForceQuestion:
     def forces(self) -> list[str]:
         """Names of the contacts' forces."""
         return self.joints.names
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """The loads of the study's dynamics."""
-        return self.section.loads
 
     @cached_property
     def statics(self) -> list[Static]:
@@ -316,32 +314,86 @@ def pace(study: Study) -> MotionSection:
     return own if own is not None and own.moves else KinematicsSection.of(study)
 
 
-def force_question(study: Study, poses: Poses) -> MotionQuestion:
-    """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics.
+@dataclass(frozen=True, eq=False)
+class DynamicQuestion(MovedQuestion):
+    """What a study asks of the forces of its motion at every pose; without rates of its own those of kinematics.
 
-    Raises
-    ------
-    StudyError
-        If the study has no such section, and without what it would say nothing acts.
+    Parameters
+    ----------
+    forces : ForceQuestion or None
+        None where of some columns none is one of the forces.
     """
-    section, rated = DynamicsSection.of(study), pace(study)
-    rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
-    rates["means"] = section.means or rated.means
-    if section.forward is not None:
-        # What efforts bring about is a motion over time, whose poses are there already.
-        rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
-    motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
-    question = motion_question(replace(study.with_sections(kinematics=motion), targets={}), poses)
-    borne = ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo)
-    if study.dynamics is None and not borne.size and not (motion.rated and weighed_beams(study)):
-        message = (
-            "is missing, and without it nothing acts on the mechanism: give gravity and masses of links, loads, or "
-            "rates of kinematics; for example {gravity: [0, -9.81 m/s^2]}"
-        )
-        raise StudyError([study.problem(message, "dynamics")])
-    # The loads count among the forces, and here for the coordinates that their expressions follow.
-    return replace(
-        question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False, cams=(),
-        watched=[*question.watched, *study.mechanism.windings.values()],
-        borne=borne,
-    )  # fmt: skip
+
+    forces: ForceQuestion | None = None
+
+    @classmethod
+    def of(cls, study: Study, poses: Poses) -> Self:
+        """Read what a study asks at some poses.
+
+        Raises
+        ------
+        StudyError
+            If the study has no section 'dynamics', and without what it would say nothing acts.
+        """
+        section, rated = DynamicsSection.of(study), pace(study)
+        rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
+        rates["means"] = section.means or rated.means
+        if section.forward is not None:
+            # What efforts bring about is a motion over time, whose poses are there already.
+            rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
+        moving = KinematicsSection().model_copy(update=rates)
+        # The coordinates that the expressions of the loads follow are watched.
+        loaded = moving.model_copy(update={"loads": section.loads})
+        outputs = [output.name for output in expand_outputs(study, default_outputs(study.mechanism))]
+        question = cls(
+            replace(study.with_sections(kinematics=loaded), targets={}), moving, study.motion(poses), poses,
+            [*watched(study, loaded, outputs), *study.mechanism.windings.values()],
+            moving.inverse(study.mechanism.drives),
+        )  # fmt: skip
+        forces = ForceQuestion.of(study, moves=moving.rated, tempo=question.tempo)
+        if study.dynamics is None and not forces.size and not (moving.rated and weighed_beams(study)):
+            message = (
+                "is missing, and without it nothing acts on the mechanism: give gravity and masses of links, loads, or "
+                "rates of kinematics; for example {gravity: [0, -9.81 m/s^2]}"
+            )
+            raise StudyError([study.problem(message, "dynamics")])
+        return replace(question, forces=forces)
+
+    @property
+    def acting(self) -> ForceQuestion:
+        """The forces that are asked."""
+        assert self.forces is not None
+        return self.forces
+
+    @property
+    def statics(self) -> list[Static]:
+        return self.forces.statics if self.forces is not None else []
+
+    @property
+    def parts(self) -> Mapping[str, float]:
+        return self.forces.parts if self.forces is not None else {}
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        return self.forces.section.loads if self.forces is not None else ()
+
+    @property
+    def passes_singularities(self) -> bool:
+        return self.forces is not None and set(self.poses.names) != set(self.study.mechanism.drives)
+
+    def lean(self, names: Collection[str]) -> Self:
+        forced = any(name in names for name in (*(static.name for static in self.statics), *self.parts))
+        if forced:
+            return replace(self, forces=self.acting.lean(names))
+        return replace(
+            self, forces=None, inverse=False, section=self.section.model_copy(update=AT_REST),
+            watched=[coordinate for coordinate in self.watched if coordinate.name in names],
+        )  # fmt: skip
+
+    def moved(self, solved: SolvedPoses) -> tuple[Mapping[str, Value], Linearization]:
+        arrays, linear, moving = self.positions(solved)
+        if self.forces is not None:
+            regular = np.asarray(arrays["conditioning"]) >= STALLED
+            columns = self.forces.columns(solved.poses, linear, solved.rows, moving)
+            arrays |= {name: np.where(regular, values, np.nan) for name, values in columns.items()}
+        return arrays, linear

@@ -10,28 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import quiet
+from mechdesign.motion.along import of_swept
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.rounding import STILL, cleared, larger
 from mechdesign.questions.columns import VALID
 from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
 from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
-from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.extremes import gaps_in_words
-from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.tables import pose_columns
 from mechdesign.results import Table
 
 # Places among the numbers of an extreme that are values.
 VALUES = [0, 2, 4, 6, 7]
 
 
-def question_of(motion: Motion) -> ForceQuestion:
+def question_of(motion: PoseValues) -> ForceQuestion:
     """The question about the forces of a motion."""
-    question = motion.question.borne
-    assert isinstance(question, ForceQuestion)
+    question: ForceQuestion = motion.question.acting
     return question
 
 
-def dynamics_table(motion: Motion) -> Table:
+def dynamics_table(motion: PoseValues) -> Table:
     """``dynamics.csv``: efforts, powers, shaking forces and energies of every pose."""
     question = question_of(motion)
     hidden, labels = {"shaking", *question.forces}, motion.question.study.units.labels
@@ -40,10 +41,10 @@ def dynamics_table(motion: Motion) -> Table:
         if static.name not in hidden:
             values = {static.kind: motion.arrays[static.name]}
             columns += DYNAMICS.columns({**labels, **static.words, "force or moment": static.unit}, **values)
-    return DYNAMICS.table([*motion.pose_columns(), *columns, VALID.column(motion.valid)])
+    return DYNAMICS.table([*pose_columns(motion), *columns, VALID.column(motion.valid)])
 
 
-def joint_table(motion: Motion) -> Table:
+def joint_table(motion: PoseValues) -> Table:
     """``joint_forces.csv``: what every joint bears, a row a pose and joint."""
     question = question_of(motion)
     rows = question.borne_by
@@ -58,14 +59,14 @@ def joint_table(motion: Motion) -> Table:
         key: np.tile(np.array([row[k] for row in rows], dtype=str), count)
         for k, key in enumerate(("joint", "on", "by"), 1)
     }
-    pose_columns = [replace(column, values=per_joint(column.values)) for column in motion.pose_columns()]
+    poses = [replace(column, values=per_joint(column.values)) for column in pose_columns(motion)]
     columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)
-    bears = JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
+    bears = JOINT_FORCES.table([*poses, *columns, VALID.column(per_joint(motion.valid))])
     return replace(bears, strands=question.strands)
 
 
 @quiet
-def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) -> Table:
+def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Collection[str]) -> Table:
     """``extremes.csv``: smallest and largest values, peaks and means of some columns over the motion.
 
     Along a motion they are those of all of it, between its poses too; elsewhere those of the valid poses.
@@ -90,7 +91,7 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
     low, low_at, high, high_at, peak, peak_at, mean, rms = numbers.transpose(2, 1, 0).reshape(8, -1)
     names, units = ([getattr(static, key) for static in statics] * poses.designs for key in ("name", "unit"))
     columns = EXTREMES.columns(
-        of_swept(question.study, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
+        of_swept(question.motion, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
         max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, unit=np.array(units, dtype=str),
     )  # fmt: skip
     lacking = np.array([gaps_in_words(motion, along, static.name) for static in statics]).reshape(len(statics), -1)
@@ -111,7 +112,7 @@ def _of_poses(values: Floats, at: Floats) -> Floats:
     return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
 
 
-def _between(along: Along, name: str, poses: Floats, size: float) -> Floats:
+def _between(along: KinematicAlong, name: str, poses: Floats, size: float) -> Floats:
     """The same over the motion between its poses."""
     lines = np.arange(along.curve.lines)
     still = STILL * np.fmax(np.nan_to_num(poses[:, 4]), size)

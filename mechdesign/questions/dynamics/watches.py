@@ -11,12 +11,12 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Bound
+from mechdesign.motion.motion import radians
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.corners import Corners
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
 from mechdesign.questions.dynamics.instants import Instants
-from mechdesign.questions.poses import radians
 
 # A step passes at most so many rows of a coupling's table, so that none of its lobes is stepped over.
 ROWS_PASSED = 2
@@ -104,7 +104,7 @@ class Watches:
     def _events(self) -> Iterator[Watch]:
         section, study = self.equations.section, self.equations.study
         for name, coordinate in self.equations.crossings:
-            value = radians(study, coordinate, float(section.events[name].value))
+            value = radians(study.units, coordinate, float(section.events[name].value))
             yield Watch("event", name, partial(_beyond, coordinate, value))
 
     def _limits(self) -> Iterator[Watch]:

@@ -11,20 +11,17 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.motion.answer import alone, answer_of
+from mechdesign.motion.passage import Passage, pass_over
+from mechdesign.motion.question import PoseValues
 from mechdesign.progress import NULL, Progress
-from mechdesign.questions.kinematics.answers import answers_of
+from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.kinematics.columns import MODES
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.passage import Passage, pass_over
-from mechdesign.questions.kinematics.question import motion_question
-from mechdesign.questions.kinematics.remarks import marks_of
-from mechdesign.questions.kinematics.tables import A_ROW_A_POSE
-from mechdesign.questions.poses import Shown, study_poses
-from mechdesign.questions.together import Answers
+from mechdesign.questions.kinematics.tables import motion_columns
+from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.work.threads import one_thread
 
 # Assembly modes that a picture shows at most.
@@ -40,37 +37,18 @@ def kinematics(
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
-    progress.start(poses.count, "poses")
-    question = motion_question(study, poses)
-    passage = pass_over(question, marks_of, progress, jobs)
-    (group,) = answers_of(passage)
-    result = group.of(0)
+    question = Kinematics.of(study, poses)
+    if not all_modes:
+        return alone(question, progress, jobs)
+    passage = pass_over(question, progress, jobs)
+    result = answer_of(passage, jobs)[0].of(0)
     if isinstance(result, Exception):
         raise result
-    if all_modes:
-        table, warnings, number, shown = _modes(passage, jobs)
-        result = dataclasses.replace(
-            result, tables={**result.tables, "modes": table}, warnings=[*result.warnings, *warnings],
-            counts={**result.counts, "modes": number},
-            drawn=dataclasses.replace(DrawnMotion.of(result), modes=shown),
-        )  # fmt: skip
-    if not passage.long:
-        return result
-    long: dict[str, Table] = {
-        name: passage.table(make, jobs, result.tables[name].scope)
-        for name, make in A_ROW_A_POSE.items()
-        if name in result.tables
-    }
-    return dataclasses.replace(result, tables={**result.tables, **long})
-
-
-@one_thread()
-def answers(study: Study, poses: Poses) -> Answers:
-    """Answer `kinematics` for the poses of several designs, each as if it were asked alone, without pictures.
-
-    The poses are solved together: their arrays are held as a whole. A design without a valid pose has an error.
-    """
-    return Answers(answers_of(pass_over(motion_question(study, poses), marks_of, NULL, 1)))
+    table, warnings, number, shown = _modes(passage, jobs)
+    return dataclasses.replace(
+        result, tables={**result.tables, "modes": table}, warnings=[*result.warnings, *warnings],
+        counts={**result.counts, "modes": number}, drawn=dataclasses.replace(DrawnMotion.of(result), modes=shown),
+    )  # fmt: skip
 
 
 def _modes(
@@ -85,17 +63,19 @@ def _modes(
     for assembly in sorted(every, key=lambda assembly: not assembly.drawn):
         passage = drawn
         if not assembly.drawn:
-            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism), poses)
-            passage = pass_over(other, marks_of, NULL, jobs)
+            other = Kinematics.of(dataclasses.replace(study, mechanism=assembly.mechanism), poses)
+            passage = pass_over(other, NULL, jobs)
         if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
-            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = passage.shown
+            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = shown_of(
+                study, passage.shown
+            )
         passages[assembly.label] = passage
         bad = int(np.count_nonzero(passage.reason))
         if bad:
             none = f"mode {assembly.label}: no pose is valid in this assembly"
             some = f"mode {assembly.label}: {bad} of {poses.count} poses are not valid in this assembly"
             warnings.append(Caution("unassembled", none if bad == poses.count else some, "modes"))
-    parts = [_mode(label, passage.motion) for label, passage in passages.items()]
+    parts = [_mode(label, passage.values) for label, passage in passages.items()]
     columns = [
         dataclasses.replace(same[0], values=np.concatenate([column.values for column in same]))
         for same in zip(*(part.columns for part in parts), strict=True)
@@ -107,7 +87,7 @@ def _modes(
     return table, warnings, len(parts), pictured
 
 
-def _mode(label: str, motion: Motion) -> Table:
+def _mode(label: str, motion: PoseValues) -> Table:
     """The motion of one assembly."""
     labels = np.full(len(motion.reason), label)
-    return MODES.table([*MODES.columns({}, mode=labels), *motion.columns()])
+    return MODES.table([*MODES.columns({}, mode=labels), *motion_columns(motion)])

@@ -1,150 +1,163 @@
-"""Results of motions from a pass over their poses: tables, warnings and counts, of many designs at once."""
+"""What kinematics has of a motion: tables, warnings and pictures, of many designs at once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.curve.ends import Change
-from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
-from mechdesign.numerics.arrays import Flags
-from mechdesign.progress import NULL
-from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.motion.answer import Between, MotionQuestion
+from mechdesign.motion.ends import Change
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.passage import Passage
+from mechdesign.motion.question import PoseValues
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
-from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
-from mechdesign.questions.kinematics.passage import Passage, pass_over
-from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, valued, without_centre, without_value
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
+from mechdesign.questions.kinematics.targets import totals
+from mechdesign.questions.kinematics.values import KinematicValues
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
-from mechdesign.questions.poses import invalid_in_words, judge_failures
-from mechdesign.questions.together import End, Group
-from mechdesign.results import Result, Scope
+from mechdesign.questions.poses import shown_of
+from mechdesign.results import Table
+from mechdesign.statistics import Request
 
 # Tables in the order in which they are shown.
 ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres", "cam")
 
 
-class _OnLine(Protocol):
-    @property
-    def line(self) -> int: ...
-
-
-Own = TypeVar("Own", bound=_OnLine)
-
-
 @dataclass(frozen=True, eq=False)
-class _Events:
-    """Motions between their poses, if they can be followed there; by design limits and change points; and cams."""
+class Events(Between):
+    """Limits, toggles and change points of motions that can be followed; and the loops and cams of each design."""
 
-    along: Along | None
-    limits: Sequence[Sequence[Limit]]
-    changes: Sequence[Sequence[Change]]
+    along: KinematicAlong | None
+    shapes: Sequence[Sequence[FourBar]]
+    limits: Sequence[Limit]
+    toggles: Sequence[Toggle]
+    changes: Sequence[Change]
     cams: Sequence[CamSide]
 
+    @property
+    def loops(self) -> Sequence[FourBar]:
+        """The loops of all designs, whatever their lengths."""
+        return max(self.shapes, key=len)
 
-def answers_of(passage: Passage) -> list[Group]:
-    """The answers of all designs, in groups of those of one kind; an error where no pose is valid.
 
-    Of a single design it holds what pictures show.
-    """
-    question, motion, designs = passage.question, passage.motion, passage.question.poses.designs
-    shapes = _shapes(passage)
-    loops = max(shapes, key=len)
-    along = along_of(question, loops=loops, toggles=True, passages=True)
-    kinds = _kinds(shapes, along)
-    if len(set(kinds)) > 1:
-        return _in_groups(question, kinds)
-    tables = pose_tables(motion)
-    tables["extremes"] = extremes(motion, along)
-    limits: list[Limit] = []
-    toggles: list[Toggle] = []
-    changes: list[Change] = []
-    if along is not None:
-        limits, toggles, changes = limits_of(along), toggles_of(loops, along), along.ends.changes()
-        tables["limits"] = limits_table(limits, along)
-    if loops:
-        tables["loops"] = loops_table(question, shapes, loops, along)
-        if along is not None:
-            tables["toggles"] = toggles_table(toggles, along)
-    if motion.errors:
-        tables["targets"] = targets_table(motion, along)
-    sides = profiles(question.study, question.poses)
-    if sides:
-        tables["cam"] = cam_table(question.study, sides)
-    events = _Events(along, _by_line(limits, designs), _by_line(changes, designs), sides)
-    ends = [_end(passage, events, k) for k in range(designs)]
-    closely = along is not None and not along.functions.unresolved.any()
-    whole = Scope(not closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, follow=Courses(question))
+class Kinematics(KinematicValues, MotionQuestion[Events]):
+    """How does it move?"""
+
+    command: ClassVar[str] = "kinematics"
+    lead: ClassVar[str] = "motion"
+    a_row_a_pose: ClassVar = A_ROW_A_POSE
     # Rows of a cam are places of its profile.
-    scopes = {**dict.fromkeys(A_ROW_A_POSE, a_pose), "cam": replace(whole, poses_only=True)}
-    scoped = {name: replace(tables[name], scope=scopes.get(name, whole)) for name in ORDER if name in tables}
-    uneven = {"limits": [*map(len, events.limits)], "toggles": [*map(len, _by_line(toggles, designs))]}
-    result = Result("kinematics", scoped, absent=question.absent)
-    if designs == 1:
-        drawn = DrawnMotion(passage.shown, motion, along, limits, toggles)
-        (end,) = ends
-        result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
-    return [Group(np.arange(designs), result, ends, uneven)]
+    poses_only: ClassVar[Sequence[str]] = ("cam",)
 
+    def marks(self, values: PoseValues) -> Mapping[str, Flags]:
+        return marks_of(values)
 
-def _end(passage: Passage, events: _Events, k: int) -> End:
-    """How design `k` was answered."""
-    question, along, designs = passage.question, events.along, passage.question.poses.designs
-    reason = passage.reason.reshape(designs, -1)[k]
-    counts = {"poses": len(reason), "invalid": int(np.count_nonzero(reason))}
-    own = question if designs == 1 else replace(question, poses=question.poses.some(np.array([k])))
-    try:
-        warnings, failed = _warnings(own, passage, events, k, reason == 0)
-    except AssemblyError as error:
-        return End(counts=counts, error=error)
-    missing = [invalid_in_words(question.study, reason), along.missing(k) if along is not None else ""]
-    return End(warnings, failed, " and ".join(filter(None, missing)), counts)
+    def totals(self, values: PoseValues) -> Floats:
+        return totals(values)
 
+    def along(self, requests: Collection[Request]) -> KinematicAlong | None:
+        return along_of(self, (), requests=requests)
 
-def _warnings(
-    question: MotionQuestion, passage: Passage, events: _Events, k: int, valid: Flags
-) -> tuple[list[Caution], str]:  # fmt: skip
-    """Warnings of design `k`, the poses of which are those of its own question; and the error where poses fail.
+    def chosen(
+        self, values: PoseValues, names: Collection[str], outputs: Collection[str] | None = None,
+        requests: Collection[Request] = (), solved: Sequence[SolvedPoses] = (),
+    ) -> tuple[dict[str, Table], KinematicAlong | None]:  # fmt: skip
+        """Some tables with as many rows for each design, and the motions between their poses with some columns besides.
 
-    Raises
-    ------
-    AssemblyError
-        If no pose is valid.
-    """
-    along, marks = events.along, passage.marks[k]
-    reason = passage.reason.reshape(-1, len(valid))[k]
-    warnings, failed = judge_failures(question.study, question.poses, reason, table="motion")
-    warnings += remarks(question, marks)
-    jumps = velocity_jumps(passage.question, question.study.mechanism.description.links, k)
-    if len(jumps):
-        warnings.append(jumps_in_words(passage.question, jumps, "motion", k))
-    if along is None:
-        warnings += unfollowed(question.poses)
-    else:
-        warnings += hidden(events.limits[k], along, valid) + passed(events.limits[k], along)
-        warnings += change_points(events.changes[k], along)
-        if along.functions.unresolved.any():
-            warnings.append(Caution(
-                "unconverged",
-                "the motion between the poses is too long, or too rough, to be followed closely: its limits are known, "
-                "but extremes may lie between the places that were looked at; sweep less of it",
-                "extremes",
-            ))  # fmt: skip
-    names = [name for name in valued(question) if along is not None and name in along.columns]
-    between = {} if along is None or along.curve.spent[k] else {name: float(along.lost(name)[k]) for name in names}
-    warnings += without_value(question, marks, between)
-    return [*warnings, *without_centre(question, marks), *cautions(question.study, events.cams, k)], failed
+        Of the extremes those of some `outputs`, or all; `solved` are the poses, of designs with dimensions.
+        """
+        mechanism = self.motion.mechanism
+        loops = four_bars(mechanism) if "loops" in names else ()
+        along = along_of(self, outputs, loops, also=self.errors if "targets" in names else (), requests=requests)
+        tables = pose_tables(values, names)
+        if "extremes" in names:
+            tables["extremes"] = extremes(values, along, outputs)
+        if loops:
+            tables["loops"] = loops_table(self, measured(mechanism, loops, self.poses, solved), loops, along)
+        if self.study.targets and "targets" in names:
+            tables["targets"] = targets_table(values, along)
+        return tables, along
+
+    def between(self, passage: Passage) -> Events:
+        shapes = _shapes(passage)
+        loops = max(shapes, key=len)
+        along = along_of(self, loops=loops, toggles=True, passages=True)
+        cams = profiles(self.study, self.poses)
+        if along is None:
+            return Events(along, shapes, (), (), (), cams)
+        return Events(along, shapes, limits_of(along), toggles_of(loops, along), along.ends.changes(), cams)
+
+    def kinds(self, passage: Passage, between: Events) -> Sequence[object]:
+        """By design which loops it has, and how closely it can be followed."""
+        names = [tuple(loop.joints for loop in own) for own in between.shapes]
+        if between.along is None:
+            return names
+        spent, unresolved = between.along.curve.spent.tolist(), between.along.functions.unresolved.tolist()
+        return [*zip(names, spent, unresolved, strict=True)]
+
+    def tables(self, passage: Passage, between: Events) -> dict[str, Table]:
+        values, along, loops = passage.values, between.along, between.loops
+        tables = {**pose_tables(values), "extremes": extremes(values, along)}
+        if along is not None:
+            tables["limits"] = limits_table(between.limits, along)
+        if loops:
+            tables["loops"] = loops_table(self, between.shapes, loops, along)
+        if loops and along is not None:
+            tables["toggles"] = toggles_table(between.toggles, along)
+        if self.study.targets:
+            tables["targets"] = targets_table(values, along)
+        if between.cams:
+            tables["cam"] = cam_table(self.study, between.cams)
+        return {name: tables[name] for name in ORDER if name in tables}
+
+    def uneven(self, passage: Passage, between: Events) -> Mapping[str, Sequence[int]]:
+        designs = self.poses.designs
+        return {
+            "limits": [*map(len, _by_line(between.limits, designs))],
+            "toggles": [*map(len, _by_line(between.toggles, designs))],
+        }
+
+    def say(self, passage: Passage, between: Events, design: int) -> tuple[list[Caution], list[str]]:
+        designs, along, marks = self.poses.designs, between.along, passage.marks[design]
+        own = self if designs == 1 else self.at(self.poses.some(np.array([design])))
+        valid = passage.reason.reshape(designs, -1)[design] == 0
+        warnings = remarks(own, marks)
+        jumps = velocity_jumps(self, self.study.mechanism.description.links, design)
+        if len(jumps):
+            warnings.append(jumps_in_words(self, jumps, "motion", design))
+        if along is None:
+            warnings += unfollowed(own.poses)
+        else:
+            limits, changes = _by_line(between.limits, designs)[design], _by_line(between.changes, designs)[design]
+            warnings += hidden(limits, along, valid) + passed(limits, along) + change_points(changes, along)
+            if along.functions.unresolved.any():
+                warnings.append(Caution(
+                    "unconverged",
+                    "the motion between the poses is too long, or too rough, to be followed closely: its limits are "
+                    "known, but extremes may lie between the places that were looked at; sweep less of it",
+                    "extremes",
+                ))  # fmt: skip
+        lost: dict[str, float] = {}
+        if along is not None and not along.curve.spent[design]:
+            lost = {name: float(along.lost(name)[design]) for name in valued(own) if name in along.columns}
+        warnings += without_value(own, marks, lost) + without_centre(own, marks)
+        return [*warnings, *cautions(self.study, between.cams, design)], []
+
+    def drawn(self, passage: Passage, between: Events) -> DrawnMotion:
+        shown = shown_of(self.study, passage.shown)
+        return DrawnMotion(shown, passage.values, between.along, between.limits, between.toggles)
 
 
 def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:
@@ -159,27 +172,9 @@ def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:
     return [own if good else shapes[int(valid.argmax())] for own, good in zip(shapes, valid, strict=True)]
 
 
-def _kinds(shapes: Sequence[Sequence[FourBar]], along: Along | None) -> list[tuple[object, ...]]:
-    """By design, what its answer depends on as a whole: which loops it has, and how closely it can be followed."""
-    names = [tuple(loop.joints for loop in own) for own in shapes]
-    if along is None:
-        return [(own,) for own in names]
-    spent, unresolved = along.curve.spent.tolist(), along.functions.unresolved.tolist()
-    return [*zip(names, spent, unresolved, strict=True)]
-
-
-def _in_groups(question: MotionQuestion, kinds: Sequence[tuple[object, ...]]) -> list[Group]:
-    """Answers of designs of several kinds, those of a kind together."""
-    groups = []
-    for kind in dict.fromkeys(kinds):
-        some = np.array([k for k, own in enumerate(kinds) if own == kind])
-        part = replace(question, poses=question.poses.some(some))
-        groups += [replace(group, rows=some[group.rows]) for group in answers_of(pass_over(part, marks_of, NULL, 1))]
-    return groups
-
-
-def _by_line(events: Sequence[Own], lines: int) -> list[list[Own]]:
-    parts: list[list[Own]] = [[] for _ in range(lines)]
+def _by_line(events: Sequence[Any], lines: int) -> list[list[Any]]:
+    """Events of each design."""
+    parts: list[list[Any]] = [[] for _ in range(lines)]
     for one in events:
         parts[one.line].append(one)
     return parts

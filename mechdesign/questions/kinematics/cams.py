@@ -12,14 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import Cam
+from mechdesign.motion.motion import in_study_units
+from mechdesign.motion.passage import Mark
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM
-from mechdesign.questions.kinematics.motion import OUTSIDE, Motion
-from mechdesign.questions.kinematics.passage import Mark
-from mechdesign.questions.poses import in_study_units, pose_in_words
+from mechdesign.questions.kinematics.moved import OUTSIDE
+from mechdesign.questions.poses import pose_in_words
 from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.
 SLIDING, TURNING = 30.0, 45.0
@@ -62,7 +64,7 @@ def profiles(study: Study, poses: Poses) -> list[CamSide]:
             return np.array(np.broadcast_to(np.real(values), shape))
 
         coordinates = {
-            c.name: whole(in_study_units(study, c, configuration.value(c))) for c in (cam.followed, cam.follower)
+            c.name: whole(in_study_units(study.units, c, configuration.value(c))) for c in (cam.followed, cam.follower)
         }
         for side in cam.sides:
             touch = cam.touch(configuration, side)
@@ -77,7 +79,7 @@ def profiles(study: Study, poses: Poses) -> list[CamSide]:
     return sides
 
 
-def outside(motion: Motion) -> dict[str, Flags]:
+def outside(motion: PoseValues) -> dict[str, Flags]:
     """Valid poses beyond the profile of a cam, by the name of the mark."""
     marks = (f"{OUTSIDE}{cam.coupling}" for cam in motion.question.study.mechanism.cams)
     return {name: motion.valid & (motion.arrays[name] == 1.0) for name in marks}
@@ -91,7 +93,7 @@ def beyond_profile(
     for cam in study.mechanism.cams:
         number, row = marks.get(f"{OUTSIDE}{cam.coupling}", Mark(0, 0))
         if number:
-            low, high = (float(in_study_units(study, cam.followed, end)) for end in cam.given.span)
+            low, high = (float(in_study_units(study.units, cam.followed, end)) for end in cam.given.span)
             pose = pose_in_words(study, poses, row + design * count)
             words = (
                 f"cam {cam.coupling}: {number} of {count} poses lie outside of its range, {cam.followed.name} from "

@@ -8,28 +8,27 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.curve.corners import Variables, divide, switched
-from mechdesign.curve.motion import Curve
-from mechdesign.curve.series import Evaluate
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
+from mechdesign.motion.corners import Variables, divide, switched
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.series import Evaluate
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics import targets as targeted
-from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.questions.kinematics.rates import moving_at
-from mechdesign.questions.loads import coordinates_in, corners_in, variable
-from mechdesign.questions.poses import SolvedPoses
+from mechdesign.questions.loads import corners_in, variable
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.schema.targets import Target
 
 
-def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
+def divided(question: MovedQuestion, curve: Curve, *, errors: bool) -> Curve:
     """The curve of a question with pieces on which its measures, its loads and, for errors, its targets are smooth."""
     study, loads = question.study, question.loads
     targets = study.targets.values() if errors else ()
-    expressions = expressions_of(evaluated(question))
+    expressions = expressions_of(question.evaluated)
     corners = [*corners_of(expressions.values()), *corners_in(loads)]
     written = [target.expression for target in targets if target.expression is not None]
     corners += [corner for expression in written for corner in expression.corners()]
@@ -39,15 +38,7 @@ def divided(question: MotionQuestion, curve: Curve, *, errors: bool) -> Curve:
     for target in targets:
         if targeted.path(target, question.poses):
             divided = switched(divided, partial(_side, question, curve, target))
-    return switched(divided, partial(_sign, study, curve)) if passes_singularities(question) else divided
-
-
-def evaluated(question: MotionQuestion) -> list[Coordinate]:
-    """Coordinates that a question evaluates, or takes rates of: its own, those of its loads, of its Jacobian."""
-    coordinates = [*question.watched, *coordinates_in(question.study, question.loads)]
-    coordinates += question.listed if question.square else ()
-    coordinates += question.rated.values() if question.section.rated else ()
-    return coordinates + [question.study.mechanism.coordinate(name) for name in question.section.mechanical_advantage]
+    return switched(divided, partial(_sign, study, curve)) if question.passes_singularities else divided
 
 
 def variables_of(
@@ -56,27 +47,20 @@ def variables_of(
     """Variables of these expressions, and of loads, along a curve whose rates a section gives."""
 
     def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
-        poses, configuration = curve.solve(line, s, judged=False)
+        there = curve.solve(line, s, judged=False)
+        configuration = there.configuration
         moving = Moving()
         if any(name.endswith(VELOCITY) for name in names):
-            linear = study.mechanism.linearize(configuration)
-            solved = SolvedPoses(np.arange(len(s)), curve.poses.groups[0].names, configuration)
-            moving = moving_at(study, section, poses, solved, linear)
+            moving = moving_at(section, there, study.mechanism.linearize(configuration))
         parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
         return {
-            name: parts[name] if name in parts else variable(study, name, poses, slice(None), configuration, moving)
+            name: parts[name]
+            if name in parts
+            else variable(study, name, there.poses, slice(None), configuration, moving)
             for name in names
         }
 
     return variables
-
-
-def passes_singularities(question: MotionQuestion) -> bool:
-    """Whether forces are asked of a motion that the poses may lead through places where the drives hold it no longer.
-
-    There the determinant of the loop equations changes its sign, and the size of a force does not.
-    """
-    return question.borne is not None and set(question.poses.names) != set(question.study.mechanism.drives)
 
 
 def _sign(study: Study, curve: Curve, line: Ints, s: Floats) -> Ints:
@@ -88,15 +72,15 @@ def determinant(study: Study, curve: Curve) -> Evaluate:
     """Determinant of the loop equations along motions, zero where the drives hold the mechanism no longer."""
 
     def evaluate(line: Ints, s: Floats) -> tuple[Floats, Floats]:
-        linear = study.mechanism.linearize(curve.solve(line, s, judged=False, turning=False)[1])
+        linear = study.mechanism.linearize(curve.solve(line, s, judged=False, turning=False).configuration)
         signed = np.broadcast_arrays(np.ones(len(s)), *linear.conditionings.values())
         return np.prod(signed, axis=0)[None], np.ones(len(s))
 
     return evaluate
 
 
-def _side(question: MotionQuestion, curve: Curve, target: Target, line: Ints, s: Floats) -> Ints:
+def _side(question: MovedQuestion, curve: Curve, target: Target, line: Ints, s: Floats) -> Ints:
     """Side or corner of the path that a point should follow that is nearest to it."""
-    configuration = curve.solve(line, s, judged=False, turning=False)[1]
+    configuration = curve.solve(line, s, judged=False, turning=False).configuration
     x, y = (configuration.value(question.study.mechanism.coordinate(name)) for name in target.coordinates)
     return targeted.owner(target, question.poses, np.asarray(x + 1j * np.asarray(y)), line)

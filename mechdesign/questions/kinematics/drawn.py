@@ -11,16 +11,16 @@ import numpy as np
 
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.limits import Limit
 from mechdesign.questions.kinematics.loops import Toggle
-from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.special_poses import SpecialPoses, special_poses
 from mechdesign.questions.kinematics.tables import motion_table
 from mechdesign.questions.outputs import default_outputs, expand_outputs
-from mechdesign.questions.poses import Shown, SolvedPoses
+from mechdesign.questions.poses import Shown
 from mechdesign.results import Drawn, Table
 
 # What a vector is of, the point or the places (n,) where it is, and its values (n,), nan where it has none.
@@ -52,31 +52,30 @@ class DrawnPoses(Drawn):
     ----------
     shown : Shown
         The solved poses; of a long motion some, evenly spread.
-    motion : Motion
+    motion : PoseValues
         The motion with a value of every column at each pose.
-    along : Along or None
+    along : KinematicAlong or None
         The motion between its poses; None of listed poses and grids.
     """
 
     shown: Shown
-    motion: Motion
-    along: Along | None
+    motion: PoseValues
+    along: KinematicAlong | None
     #: Name of the table with a row a pose.
     name: ClassVar[str] = "motion"
 
-    def table(self, motion: Motion) -> Table:
+    def table(self, motion: PoseValues) -> Table:
         """The table with a row a pose of a motion of this question."""
         return motion_table(motion)
 
-    def vectors(self, motion: Motion, shown: Shown) -> Iterable[Vectors]:
+    def vectors(self, motion: PoseValues, shown: Shown) -> Iterable[Vectors]:
         """Vectors at shown poses of a motion of this question: velocities of the points, where there are rates."""
         question, configuration = motion.question, shown.configuration
         if not question.section.rated:
             return
         study = question.study
         linear = study.mechanism.linearize(configuration)
-        solved = SolvedPoses(shown.rows, shown.poses.groups[0].names, configuration)
-        velocity = moving_at(study, question.section, shown.poses, solved, linear).velocity
+        velocity = moving_at(question.section, shown.solved, linear).velocity
         assert velocity is not None
         regular = configuration.valid & (regularity(linear) >= STALLED)
         arrows = []

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.motion.along import of_swept
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.rounding import STILL, cleared
-from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
-from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.targets import of_values
 from mechdesign.results import Table
 from mechdesign.statistics import no_value, no_value_along
 
@@ -19,7 +21,7 @@ from mechdesign.statistics import no_value, no_value_along
 AT_ROW = 1e-9
 
 
-def gaps_in_words(motion: Motion, along: Along | None, name: str) -> list[str]:
+def gaps_in_words(motion: PoseValues, along: KinematicAlong | None, name: str) -> list[str]:
     """Of each design, where a column has no value though the mechanism assembles, in words; empty where it has one."""
     poses, valid = motion.question.poses, motion.valid
     lost = (valid & np.isnan(motion.arrays[name])).reshape(poses.designs, -1).sum(axis=1)
@@ -35,7 +37,7 @@ def gaps_in_words(motion: Motion, along: Along | None, name: str) -> list[str]:
     ]
 
 
-def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
+def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection[str] | None = None) -> Table:
     """Smallest and largest value of outputs and other columns over the motion, and the ratio of times between.
 
     Along a motion they are those of all of it, from limit to limit, between its poses too; elsewhere those of the valid
@@ -51,14 +53,15 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     turn = sizes["angle"]
     # Of each column, the size that rounding is compared with, and the unit.
     curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
-    curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
+    errors = of_values(motion)
+    curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in errors}
     curves |= {static.name: (static.size, static.unit) for static in question.statics}
     curves |= {name: (sizes["length"], label("length")) for name in question.clearances}
     for name, (quantity, order) in question.orders.items():
         curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]
     if names is not None:
         curves = {name: curve for name, curve in curves.items() if name in names}
-    arrays = motion.arrays | {error.name: error.values for error in motion.errors}
+    arrays = motion.arrays
     units = [unit for _, unit in curves.values()]
     swept = poses.swept
     # Values by column, design and pose; `ends` will have value and place of both extremes.
@@ -107,16 +110,17 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
         span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
-    targeted = {error.name: error.output for error in motion.errors}
+    targeted = {error.name: error.output for error in errors}
     lacking = _lacking(motion, along, [targeted.get(name, name) for name in curves])
     return replace(EXTREMES.table(EXTREMES.columns(
-        of_swept(study, swept, "place in rows (from 0)"), output=np.tile(np.array(list(curves)), poses.designs),
+        of_swept(question.motion, swept, "place in rows (from 0)"),
+        output=np.tile(np.array(list(curves)), poses.designs),
         min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
         range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
     ), **over(along, list(curves))), lacking=lacking)  # fmt: skip
 
 
-def _lacking(motion: Motion, along: Along | None, outputs: Sequence[str]) -> NDArray[np.str_]:
+def _lacking(motion: PoseValues, along: KinematicAlong | None, outputs: Sequence[str]) -> NDArray[np.str_]:
     """Where outputs, or coordinates of points, have no value: a row each, design by design."""
     parts = [[name] if name in motion.arrays else [f"{name}.{axis}" for axis in "xy"] for name in outputs]
     words = [[max(pair) for pair in zip(*(gaps_in_words(motion, along, name) for name in part), strict=True)]
@@ -124,12 +128,12 @@ def _lacking(motion: Motion, along: Along | None, outputs: Sequence[str]) -> NDA
     return np.array(words, dtype=str).reshape(len(outputs), -1).T.ravel()
 
 
-def targets_table(motion: Motion, along: Along | None) -> Table:
+def targets_table(motion: PoseValues, along: KinematicAlong | None) -> Table:
     """Mean and largest errors of each design over the motion, or over the valid poses that have a target.
 
     `along` is the motion between the poses, None of listed poses and grids.
     """
-    study, poses, errors, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
+    study, poses, errors, valid = motion.question.study, motion.question.poses, of_values(motion), motion.valid
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
     at = poses.abscissa
     numbers = np.full((4, poses.designs, len(errors)), np.nan)
@@ -138,7 +142,7 @@ def targets_table(motion: Motion, along: Along | None) -> Table:
         some = counted.any(axis=1)
         values = np.where(counted, error.values.reshape(shape), 0.0)[some]
         worst = np.where(counted[some], np.abs(values), -1.0).argmax(axis=1)
-        lane, (count, total, squares) = np.arange(len(worst)), motion.sums[:, some, k]
+        lane, (count, total, squares) = np.arange(len(worst)), motion.totals[:, some, k]
         numbers[:, some, k] = (
             np.sqrt(squares / count),
             total / count,
@@ -156,7 +160,7 @@ def targets_table(motion: Motion, along: Along | None) -> Table:
         numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * motion.question.sizes.get(error.quantity, 1.0))
         numbers[3, numbers[2, :, k] == 0, k] = np.nan
     rms, mean, largest, where = numbers.reshape(4, -1)
-    words = of_swept(study, swept, "row (from 0)")
+    words = of_swept(motion.question.motion, swept, "row (from 0)")
     units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
     outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
     columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.curve.ends import Change, End
 from mechdesign.mechanism.margins import Cause
+from mechdesign.motion.ends import Change, End
 from mechdesign.numerics.arrays import Flags
-from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.columns import LIMITS
-from mechdesign.questions.poses import pose_in_words, unit_of
 from mechdesign.results import Table
 
 # Places that a warning names.
@@ -33,7 +32,7 @@ class Limit:
     end: End | None = None
 
 
-def limits_of(along: Along) -> list[Limit]:
+def limits_of(along: KinematicAlong) -> list[Limit]:
     """Limits and singularities of motions, one after the other, in the order of their places."""
     limits = [Limit(end.line, end.place, end.cause, end) for end in along.ends.ends]
     limits += [Limit(line, place, cause) for line, place, cause in along.passages()]
@@ -42,7 +41,7 @@ def limits_of(along: Along) -> list[Limit]:
     return sorted(limits, key=lambda limit: (limit.line, limit.place))
 
 
-def limits_table(limits: Sequence[Limit], along: Along) -> Table:
+def limits_table(limits: Sequence[Limit], along: KinematicAlong) -> Table:
     """The places at which the motions end or pass a singularity, and the outputs there.
 
     `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`.
@@ -69,15 +68,15 @@ def limits_table(limits: Sequence[Limit], along: Along) -> Table:
     return LIMITS.table(columns)
 
 
-def place_in_words(along: Along, line: int, place: float) -> str:
+def place_in_words(along: KinematicAlong, line: int, place: float) -> str:
     """``theta = 30 deg``, or the row and the coordinates of a path."""
-    study, poses, lines, s = along.question.study, along.question.poses, np.array([line]), np.array([place])
+    motion, poses, lines, s = along.question.motion, along.question.poses, np.array([line]), np.array([place])
     if poses.swept is not None:
-        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {unit_of(study, poses.swept)}".rstrip()
-    return f"row {place:.6g} ({pose_in_words(study, poses.along(lines, s), 0)})"
+        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {motion.unit_of(poses.swept)}".rstrip()
+    return f"row {place:.6g} ({motion.at(poses.along(lines, s)).in_words(0)})"
 
 
-def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[Caution]:
+def hidden(limits: Sequence[Limit], along: KinematicAlong, valid: Flags) -> list[Caution]:
     """A warning where a motion ends between neighbouring poses that are both valid: the motion table hides it."""
     places = [
         place_in_words(along, limit.line, limit.place)
@@ -93,7 +92,7 @@ def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[Caution]
     return [Caution("unassembled", words, "limits", pose=places[0])]
 
 
-def passed(limits: Sequence[Limit], along: Along) -> list[Caution]:
+def passed(limits: Sequence[Limit], along: KinematicAlong) -> list[Caution]:
     """A warning where a motion passes a forward singularity."""
     places = [place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None]
     if not places:
@@ -112,7 +111,7 @@ def _first(places: Sequence[str]) -> str:
     return "; ".join(places[:MOST_NAMED]) + more
 
 
-def change_points(changes: Sequence[Change], along: Along) -> list[Caution]:
+def change_points(changes: Sequence[Change], along: KinematicAlong) -> list[Caution]:
     """A warning for each place of a motion at which two assemblies meet, where the study keeps joints on their sides.
 
     `changes` are those of the motion.

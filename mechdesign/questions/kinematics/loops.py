@@ -7,18 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.curve.functions import Zeros
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
+from mechdesign.motion.along import of_swept
+from mechdesign.motion.functions import Zeros
+from mechdesign.motion.motion import Motion, SolvedPoses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
-from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import LOOPS, TOGGLES
-from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import SolvedPoses, solve_poses
+from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.results import Table
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Angles nearer than this are the same (radians).
 SAME_ANGLE = 1e-12
@@ -51,7 +52,8 @@ def measured(
 
 
 def loops_table(
-    question: MotionQuestion, designs: Sequence[Sequence[FourBar]], loops: Sequence[FourBar], along: Along | None
+    question: MovedQuestion, designs: Sequence[Sequence[FourBar]], loops: Sequence[FourBar],
+    along: KinematicAlong | None,
 ) -> Table:  # fmt: skip
     """Every loop of every design: its links and lengths, and how well it transmits.
 
@@ -61,12 +63,12 @@ def loops_table(
         The loops of each design, as many of each.
     loops : sequence of FourBar
         The same for all designs, whatever their lengths.
-    along : Along, optional
+    along : KinematicAlong, optional
         The motion with the loops; None of listed poses and grids.
     """
     study, poses = question.study, question.poses
     every = [loop for own in designs for loop in own]
-    words = study.units.labels | of_swept(study, None if along is None else poses.swept, "row")
+    words = study.units.labels | of_swept(question.motion, None if along is None else poses.swept, "row")
     columns = [
         *LOOPS.columns(words, kind=[loop.kind for loop in every]),
         *(LOOPS["<part>"].column([loop.links[k] for loop in every], part=part) for k, part in enumerate(ROLES)),
@@ -76,7 +78,7 @@ def loops_table(
         *LOOPS.columns(words, offset=[loop.offset for loop in every], **{"class": [loop.type for loop in every]},
                        excess=[loop.excess for loop in every]),
     ]  # fmt: skip
-    both = _at_poses(study, poses, loops) if along is None else _between(along, len(loops))
+    both = _at_poses(question.motion, loops) if along is None else _between(along, len(loops))
     for (values, places), end in zip(both, ("min", "max"), strict=True):
         columns += LOOPS.columns(words, **{f"transmission_{end}": values.T.ravel() / study.units.angle_factor})
         columns += LOOPS.columns(words, **{f"transmission_{end}_at": places.T.ravel()})
@@ -84,10 +86,11 @@ def loops_table(
 
 
 @quiet
-def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
+def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over the poses, and its row; shape (loops, designs)."""
+    poses = motion.poses
     angle = np.full((len(loops), poses.count), np.nan)
-    for solved in solve_poses(study, poses):
+    for solved in solve_poses(motion):
         valid = solved.configuration.valid
         for row, loop in zip(angle, loops, strict=True):
             row[solved.rows] = np.where(valid, loop.transmission(solved.configuration), np.nan)
@@ -101,7 +104,7 @@ def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tupl
     return ends
 
 
-def _between(along: Along, count: int) -> list[tuple[Floats, Floats]]:
+def _between(along: KinematicAlong, count: int) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over motions, and their places; shape (loops, designs)."""
     names = [f"{name} {k} 3" for name in ("sine", "cosine") for k in range(count)]
     values, places = (part.reshape(2, count, -1) for part in along.least(names, SAME_ANGLE))
@@ -124,14 +127,16 @@ class Toggle:
     loop: str
 
 
-def toggles_of(loops: Sequence[FourBar], along: Along) -> list[Toggle]:
+def toggles_of(loops: Sequence[FourBar], along: KinematicAlong) -> list[Toggle]:
     """Every toggle of motions, one after the other, in the order of its places."""
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     zeros = along.functions.zeros([f"sine {k} {end}" for k, end in which], IN_LINE)
     zeros = zeros.take(_once(zeros, along.snapped(zeros.place)))
     if not len(zeros.place):
         return []
-    configuration = along.curve.solve(zeros.line, along.curve.inside(zeros.line, zeros.place), judged=False)[1]
+    configuration = along.curve.solve(
+        zeros.line, along.curve.inside(zeros.line, zeros.place), judged=False
+    ).configuration
     together = _together(zeros.place, zeros.function % len(loops) + len(loops) * zeros.line)
     cosines = {end: [loop.squareness(configuration, end)[1] for loop in loops] for end in (0, 3)}
     toggles, lanes = [], (zeros.function, zeros.line, along.snapped(zeros.place), together)
@@ -141,7 +146,7 @@ def toggles_of(loops: Sequence[FourBar], along: Along) -> list[Toggle]:
     return toggles
 
 
-def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
+def toggles_table(toggles: Sequence[Toggle], along: KinematicAlong) -> Table:
     """Every place at which the coupler of a loop comes into line with its input or its output."""
     line, place = (np.array([getattr(toggle, name) for toggle in toggles], dtype=kind)
                    for name, kind in (("line", np.intp), ("place", float)))  # fmt: skip

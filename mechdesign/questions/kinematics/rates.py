@@ -14,11 +14,10 @@ from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import second
+from mechdesign.motion.motion import SolvedPoses, radians
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.poses import SolvedPoses, radians
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text.units import Units
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +36,7 @@ class DriveRates:
 
 
 def drive_rates(
-    study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses,
-    linear: Linearization,
+    section: MotionSection, solved: SolvedPoses, linear: Linearization
 ) -> DriveRates:  # fmt: skip
     """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
 
@@ -47,38 +45,37 @@ def drive_rates(
 
     `linear` is the mechanism at the solved poses.
     """
+    mechanism, units, poses = solved.motion.mechanism, solved.motion.units, solved.poses
     section = poses.section(section, solved.rows)
-    inverse = section.inverse(study.mechanism.drives)
-    names = solved.names if inverse else study.mechanism.drives
-    coordinates = [study.mechanism.coordinate(name) for name in names]
+    inverse = section.inverse(mechanism.drives)
+    names = solved.names if inverse else mechanism.drives
+    coordinates = [mechanism.coordinate(name) for name in names]
     if section.speed is None and section.motion is None:
-        rates = constant_rates(study, section, names)
+        rates = constant_rates(mechanism, units, section, names)
     else:
         pace = 1.0 if section.speed is None else section.speed
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
-            [radians(study, c, derivatives.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
+            [radians(units, c, derivatives.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
             for order, derivatives in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
-    return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
+    return inverse_rates(mechanism, linear, coordinates, rates) if inverse else rates
 
 
-def moving_at(
-    study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses, linear: Linearization
-) -> Moving:  # fmt: skip
+def moving_at(section: MotionSection, solved: SolvedPoses, linear: Linearization) -> Moving:
     """Velocities and accelerations of a mechanism at some poses; it stands still where a section has no rates."""
     if not section.rated:
         return Moving()
-    drives = drive_rates(study, section, poses, solved, linear)
+    drives = drive_rates(section, solved, linear)
     velocity = linear.velocity(drives.velocities)
     return Moving(velocity, linear.acceleration(velocity, drives.accelerations))
 
 
-def constant_rates(study: Study, section: MotionSection, names: Sequence[str]) -> DriveRates:
+def constant_rates(mechanism: Mechanism, units: Units, section: MotionSection, names: Sequence[str]) -> DriveRates:
     """Rates of some coordinates, as a section gives them in numbers."""
-    coordinates = [study.mechanism.coordinate(name) for name in names]
+    coordinates = [mechanism.coordinate(name) for name in names]
     return DriveRates(*(
-        [radians(study, c, numbers.get(c.name, 0.0)) for c in coordinates]
+        [radians(units, c, numbers.get(c.name, 0.0)) for c in coordinates]
         for numbers in (section.rates, section.accelerations)
     ))  # fmt: skip
 

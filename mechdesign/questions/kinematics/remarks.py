@@ -8,16 +8,19 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.motion.passage import Mark
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import POSES_AT_ONCE
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.cams import beyond_profile, outside
 from mechdesign.questions.kinematics.instant_centres import REST, TRANSLATION
-from mechdesign.questions.kinematics.motion import RESTS, SINGULAR, Motion
-from mechdesign.questions.kinematics.passage import Mark
-from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
+from mechdesign.questions.kinematics.moved import THROUGH
+from mechdesign.questions.kinematics.question import KinematicQuestion
+from mechdesign.questions.kinematics.values import RESTS, SINGULAR
+from mechdesign.questions.poses import pose_in_words
 from mechdesign.statistics import no_value, no_value_along
-from mechdesign.study.poses import Poses
 
 _TABLE = "motion"  # whose rows are the poses
 # Poses that warnings are about.
@@ -36,7 +39,7 @@ _CENTRELESS = {
 ASTRAY = 1e-3
 
 
-def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
+def remarks(question: KinematicQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """Warnings about the poses of one design, and about its rates."""
     cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
     if question.friction is not None:
@@ -57,7 +60,7 @@ def unfollowed(poses: Poses) -> list[Caution]:
     )]  # fmt: skip
 
 
-def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
+def without_centre(question: KinematicQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """What is to be known of poses in which two links have no instant centre within reach."""
     study, poses, warnings = question.study, question.poses, []
     for centre in question.centres:
@@ -71,14 +74,16 @@ def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[
     return warnings
 
 
-def valued(question: MotionQuestion) -> list[str]:
+def valued(question: KinematicQuestion) -> list[str]:
     """Columns that have a value in every regular pose: outputs, and without friction the efforts."""
     statics = question.statics if question.friction is None else ()
     efforts = [static.name for static in statics if static.name.endswith("_effort")]
     return [*(output.name for output in question.outputs), *efforts]
 
 
-def without_value(question: MotionQuestion, marks: Mapping[str, Mark], between: Mapping[str, float]) -> list[Caution]:
+def without_value(
+    question: KinematicQuestion, marks: Mapping[str, Mark], between: Mapping[str, float]
+) -> list[Caution]:
     """Warnings of outputs that have no value at valid poses, or on parts of the motion `between` them."""
     study, poses, warnings = question.study, question.poses, []
     for name in valued(question):
@@ -92,7 +97,7 @@ def without_value(question: MotionQuestion, marks: Mapping[str, Mark], between: 
     return warnings
 
 
-def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
+def _untargeted(question: KinematicQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """A warning where a valid pose has no target."""
     study, poses, warnings = question.study, question.poses, []
     for mark, (count, row) in marks.items():
@@ -108,11 +113,11 @@ def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Cau
     return warnings
 
 
-def marks_of(motion: Motion) -> dict[str, Flags]:
+def marks_of(motion: PoseValues) -> dict[str, Flags]:
     """Poses that warnings are about."""
     question, valid, arrays = motion.question, motion.valid, motion.arrays
     steady = arrays["conditioning"] >= STALLED
-    stalled = valid & ~motion.smooth & ~steady
+    stalled = valid & ~arrays[THROUGH] & ~steady
     marks = {_STALLED: stalled}
     if question.inverse:
         marks[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
@@ -122,7 +127,7 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     if question.friction is not None:
         marks |= {name: valid & where for name, where in question.friction.marks(arrays).items()}
     marks |= outside(motion)
-    for output, where in targets.untargeted(question.study, motion.errors, valid).items():
+    for output, where in targets.untargeted(motion).items():
         marks[f"{output}{_WITHOUT_TARGET}"] = where
     for name in valued(question):
         if (lost := valid & steady & np.isnan(arrays[name])).any():
@@ -133,11 +138,11 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     return marks
 
 
-def _near(motion: Motion) -> Flags:
+def _near(motion: PoseValues) -> Flags:
     """Poses at or near a singularity of the Jacobian."""
     question, arrays = motion.question, motion.arrays
     if len(question.drives) > 1:
-        return ~(arrays["inverse_condition"] >= SINGULAR)
+        return np.asarray(~(arrays["inverse_condition"] >= SINGULAR))
     # A Jacobian of one entry has no condition: it is compared with a whole size of the mechanism a radian.
     (output,), (drive,) = question.listed, question.drives
     size = {"length": question.study.mechanism.size}
@@ -146,7 +151,7 @@ def _near(motion: Motion) -> Flags:
     return np.asarray((still < SINGULAR) & (arrays.get(RESTS, 0.0) != 1.0))
 
 
-def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
+def _conditioning(question: KinematicQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     if _REGULAR not in marks:
         return []
     if marks[_REGULAR].number and question.mixed:
@@ -165,7 +170,7 @@ def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[C
     return [Caution("singular", near, *place)]
 
 
-def _astray(question: MotionQuestion) -> list[Caution]:
+def _astray(question: KinematicQuestion) -> list[Caution]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
     study, section, poses = question.study, question.section, question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
@@ -193,7 +198,7 @@ def _astray(question: MotionQuestion) -> list[Caution]:
     )]  # fmt: skip
 
 
-def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
+def _stalled(question: KinematicQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     texts = {
         _STALLED: "at a dead centre or change point, where the drives do not move the mechanism in one way "
         f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "

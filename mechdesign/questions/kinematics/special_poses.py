@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,16 +12,16 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Ints, distinct
-from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.limits import Limit
 from mechdesign.questions.kinematics.loops import Toggle
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.question import KinematicQuestion
 from mechdesign.questions.kinematics.rates import drive_rates
-from mechdesign.questions.poses import Shown, SolvedPoses, pose_in_words
-from mechdesign.study.poses import Poses
+from mechdesign.questions.poses import Shown, pose_in_words
 
 # Poses that are shown at most, and at least along a motion.
 MOST = 6
@@ -75,7 +75,7 @@ class SpecialPoses:
 
 
 def special_poses(
-    motion: Motion, kept: Shown, along: Along | None, limits: Sequence[Limit], toggles: Sequence[Toggle]
+    motion: PoseValues, kept: Shown, along: KinematicAlong | None, limits: Sequence[Limit], toggles: Sequence[Toggle]
 ) -> SpecialPoses:  # fmt: skip
     """The limits of a motion and its toggles, with evenly spread poses where these are few; else listed poses.
 
@@ -88,8 +88,8 @@ def special_poses(
         return SpecialPoses((), 0, rates)
     special, more = list[SpecialPose](), 0
     if along is not None:
-        events = _events(along, limits, toggles)
-        special, more = _distinct(motion, _at_events(along, events[:COMPARED])), len(events[COMPARED:])
+        events = _events(motion.question, along, limits, toggles)
+        special, more = _distinct(motion, _at_events(motion.question, along, events[:COMPARED])), len(events[COMPARED:])
     valid = np.flatnonzero(kept.configuration.valid)
     some, left_out = valid[:MOST], max(len(valid), len(special)) - MOST
     if poses.motion:
@@ -99,13 +99,13 @@ def special_poses(
         (float(poses.numbers[k]), float(poses.abscissa[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
         for k in kept.rows[some].tolist()
     ]
-    solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)
-    special += _moving(motion.question, poses, solved, words)
+    solved = replace(kept.solved, rows=kept.rows[some], configuration=configuration)
+    special += _moving(motion.question, solved, words)
     special.sort(key=lambda pose: pose.row)
     return SpecialPoses(special[:MOST], max(left_out, 0), rates)
 
 
-def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
+def _spread(motion: PoseValues, kept: Shown, special: Sequence[float]) -> Ints:
     """Further poses of a motion, up to `FEW` of all: evenly spread, or where the gaps between special ones are widest.
 
     A motion that goes round has no ends.
@@ -128,7 +128,9 @@ def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
     return np.asarray(valid[distinct((np.array(parts) * (len(valid) - 1)).round().astype(int))])
 
 
-def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) -> list[Event]:
+def _events(
+    question: KinematicQuestion, along: KinematicAlong, limits: Sequence[Limit], toggles: Sequence[Toggle]
+) -> list[Event]:  # fmt: skip
     """Limits, singularities and toggles in the order of the motion; those at one place are one."""
     events = []
     for limit in limits:
@@ -141,7 +143,7 @@ def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) ->
         state = toggle.state.replace("perpendicular", "perpendicular to the slide")
         whole = toggle.effect == "change point"
         events.append(Event(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
-    events += [Event(place, (SINGULAR,)) for place in _singular(along)]
+    events += [Event(place, (SINGULAR,)) for place in _singular(question, along)]
     events.sort(key=lambda event: event.place)
     merged: list[Event] = []
     for event in events:
@@ -152,35 +154,34 @@ def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) ->
     return merged
 
 
-def _singular(along: Along) -> list[float]:
+def _singular(question: KinematicQuestion, along: KinematicAlong) -> list[float]:
     """Where the determinant of a Jacobian of several outputs is zero along a motion, in rows.
 
     Of one output and one drive that is where the output turns back.
     """
-    question = along.question
     if not question.square or len(question.drives) < 2:
         return []
-    own = Along(question, along.curve, ["det_J"])
+    own = KinematicAlong(question, along.curve, ["det_J"])
     return [float(place) for place in own.functions.zeros(["det_J"], 0.0).place]
 
 
-def _at_events(along: Along, events: Sequence[Event]) -> list[SpecialPose]:
+def _at_events(question: KinematicQuestion, along: KinematicAlong, events: Sequence[Event]) -> list[SpecialPose]:
     """The poses of events; those that cannot be assembled (at infinity) are left out."""
     if not events:
         return []
     line, s = np.zeros(len(events), dtype=np.intp), np.array([event.place for event in events])
-    poses, configuration = along.curve.solve(line, along.curve.inside(line, s), judged=False)
-    at, shown, special = along.curve.poses.along(line, s), along.shown(line, s), []
-    for k in np.flatnonzero(configuration.reason == 0).tolist():
+    there = along.curve.solve(line, along.curve.inside(line, s), judged=False)
+    at, shown, special = along.curve.motion.at(along.curve.poses.along(line, s)), along.shown(line, s), []
+    for k in np.flatnonzero(there.configuration.reason == 0).tolist():
         # Of a pose at a limit the words have the limit.
-        where = pose_in_words(along.question.study, at, k, DIGITS)
+        where = at.in_words(k, DIGITS)
         words = [(events[k].place, float(shown[k]), where, "; ".join(events[k].words))]
-        one = SolvedPoses(np.array([k]), along.question.poses.groups[0].names, configuration.take(np.array([k])))
-        special += _moving(along.question, poses, one, words)
+        one = replace(there, rows=np.array([k]), configuration=there.configuration.take(np.array([k])))
+        special += _moving(question, one, words)
     return special
 
 
-def _distinct(motion: Motion, poses: Iterable[SpecialPose]) -> list[SpecialPose]:
+def _distinct(motion: PoseValues, poses: Iterable[SpecialPose]) -> list[SpecialPose]:
     """Poses without those that a full turn of the drive brings back."""
     size, kept = motion.question.study.mechanism.size, list[tuple[dict[str, complex], SpecialPose]]()
     for pose in poses:
@@ -194,13 +195,14 @@ def _same(one: Mapping[str, complex], other: Mapping[str, complex], size: float)
     return all(abs(one[point] - other[point]) <= SAME * size for point in one)
 
 
-def _points(motion: Motion) -> Sequence[str]:
-    return motion.question.study.mechanism.points
+def _points(motion: PoseValues) -> Sequence[str]:
+    points: Sequence[str] = motion.question.study.mechanism.points
+    return points
 
 
 @quiet
 def _moving(
-    question: MotionQuestion, poses: Poses, solved: SolvedPoses, words: Sequence[tuple[float, float, str, str]]
+    question: KinematicQuestion, solved: SolvedPoses, words: Sequence[tuple[float, float, str, str]]
 ) -> list[SpecialPose]:  # fmt: skip
     """Solved poses with the rates of all points and the instant centres asked; `words` are where and what each is."""
     configuration = solved.configuration
@@ -208,7 +210,7 @@ def _moving(
     linear = mechanism.linearize(configuration)
     regular = np.broadcast_to(regularity(linear) >= STALLED, configuration.shape)
     lost = complex(np.nan, np.nan)
-    drives = drive_rates(question.study, section, poses, solved, linear)
+    drives = drive_rates(section, solved, linear)
     velocity = linear.velocity(drives.velocities)
     acceleration = linear.acceleration(velocity, drives.accelerations)
     velocities, accelerations = (

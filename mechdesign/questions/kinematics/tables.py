@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.questions.columns import VALID
+from mechdesign.mechanism.plates import CLEARANCE
+from mechdesign.motion.question import PoseValues
+from mechdesign.questions.columns import DRIVE, VALID, power_of_length
 from mechdesign.questions.kinematics.columns import INSTANT_CENTRES, JACOBIAN, MOTION
 from mechdesign.questions.kinematics.instant_centres import MOTIONS
-from mechdesign.questions.kinematics.motion import Motion, entry
-from mechdesign.results import Table
+from mechdesign.questions.kinematics.targets import Error, of_values
+from mechdesign.questions.kinematics.values import entry
+from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 
-def motion_table(motion: Motion) -> Table:
+def motion_table(motion: PoseValues) -> Table:
     """Every pose with all outputs."""
-    return MOTION.table(motion.columns())
+    return MOTION.table(motion_columns(motion))
 
 
-def jacobian_table(motion: Motion) -> Table:
+def jacobian_table(motion: PoseValues) -> Table:
     """Every entry of the Jacobian, a row a pose."""
     question, derivative = motion.question, JACOBIAN["<output>_by_<drive>"]
-    columns = motion.pose_columns()
+    columns = pose_columns(motion)
     for output in question.listed:
         for drive in question.drives:
             values, unit = motion.arrays[entry(output, drive)], _per(question.study, output, drive)
@@ -31,9 +35,9 @@ def jacobian_table(motion: Motion) -> Table:
     return JACOBIAN.table([*columns, VALID.column(motion.valid)])
 
 
-def centres_table(motion: Motion) -> Table:
+def centres_table(motion: PoseValues) -> Table:
     """Instant centres of pairs of links, a row a pose."""
-    columns = motion.pose_columns()
+    columns = pose_columns(motion)
     for centre in motion.question.centres:
         words = motion.question.study.units.labels | {"a": centre.one, "b": centre.other}
         x, y, number = (motion.arrays[f"{centre.name}.{part}"] for part in ("x", "y", "motion"))
@@ -41,6 +45,57 @@ def centres_table(motion: Motion) -> Table:
         values = {"<a>.<b>.x": x, "<a>.<b>.y": y, "<a>.<b>.motion": motions}
         columns += INSTANT_CENTRES.columns(words, **values)
     return INSTANT_CENTRES.table([*columns, VALID.column(motion.valid)])
+
+
+def motion_columns(motion: PoseValues) -> list[Column]:
+    """The columns of the motion table, `valid` last."""
+    question, arrays, label = motion.question, motion.arrays, motion.question.study.units.label
+    rates, errors = question.rates, of_values(motion)
+    shown = {output.name: output for output in question.outputs}
+    drives = {drive.name: drive for drive in question.drives}
+    columns = [column for column in pose_columns(motion) if column.name in drives or column.name not in shown]
+    for name, output in question.rated.items():
+        if name not in drives:
+            columns.append(MOTION["<output>"].column(arrays[name], label(output.quantity), output=name))
+        for order in ("velocity", "acceleration"):
+            rate = f"{name}_{order}"
+            if rate in rates:
+                columns.append(MOTION[f"<output>_{order}"].column(arrays[rate], rates[rate], output=name))
+        point, _, axis = name.rpartition(".")
+        columns += [
+            _error(question.study, e) for e in errors if e.output == name or (axis == "y" and e.output == point)
+        ]
+    rows = ", ".join(output.name for output in question.listed)
+    lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
+    area = power_of_length(question.study.units, lengths[0] - lengths[1])
+    words = {"outputs": rows, "as its outputs over the drives, multiplied": area}
+    names = ("det_J", "inverse_condition", "conditioning")
+    columns += MOTION.columns(words, **{name: arrays[name] for name in names if name in arrays})
+    columns += [MOTION[s.kind].column(arrays[s.name], s.unit, **s.words) for s in question.statics]
+    gap = MOTION["<a>.<b>.clearance"]
+    columns += [gap.column(arrays[name], label("length"), a=pair.one.name, b=pair.other.name)
+                for name, pair in question.pairs.items()]  # fmt: skip
+    columns += MOTION.columns(question.study.units.labels, **{CLEARANCE: arrays[CLEARANCE]}) if question.pairs else []
+    return [*columns, VALID.column(motion.valid)]
+
+
+def pose_columns(motion: PoseValues) -> list[Column]:
+    """The drives, and the coordinates that the study gives."""
+    question, units = motion.question, motion.question.study.units
+    columns = [
+        replace(column, values=motion.arrays.get(column.name, column.values)) for column in question.motion.columns()
+    ]
+    drives = [DRIVE.column(motion.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
+    named = {column.name for column in drives}
+    timed = columns[:1] if question.poses.times is not None else []
+    return [*timed, *drives, *(column for column in columns[len(timed) :] if column.name not in named)]
+
+
+def _error(study: Study, error: Error) -> Column:
+    far = error.output in study.mechanism.points
+    kind = MOTION["<point>_error" if far else "<output>_error"]
+    words = {"point": error.output, "output": error.output}
+    return kind.column(error.values, study.units.label(error.quantity), **words)
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
@@ -57,7 +112,7 @@ def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
 A_ROW_A_POSE = {"motion": motion_table, "jacobian": jacobian_table, "instant_centres": centres_table}
 
 
-def pose_tables(motion: Motion, names: Collection[str] = A_ROW_A_POSE) -> dict[str, Table]:
+def pose_tables(motion: PoseValues, names: Collection[str] = A_ROW_A_POSE) -> dict[str, Table]:
     """The tables of a question with a row a pose, of some names."""
     question = motion.question
     available = {"motion": True, "jacobian": question.square, "instant_centres": bool(question.centres)}

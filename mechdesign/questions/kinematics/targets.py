@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.point_paths import table_of
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.targets import Target, timing
+from mechdesign.study.text.tables import table_of
 
 # Distances between poses and pieces of a path that are held in memory at once.
 MAX_DISTANCES = 1 << 20
@@ -59,6 +60,17 @@ def followed(study: Study, poses: Poses) -> Iterator[tuple[str, Quantity]]:
             yield f"{name}_error", study.mechanism.quantity(name)
         if len(target.coordinates) == 2:
             yield f"{target.owner}_error", "length"
+
+
+def of_values(values: PoseValues) -> list[Error]:
+    """The errors among what a question has at its poses, a point's x and y before its distance."""
+    mechanism, errors = values.question.motion.mechanism, list[Error]()
+    for target in values.question.study.targets.values():
+        parts = [(name, mechanism.quantity(name)) for name in target.coordinates]
+        parts += [(target.owner, "length")] if len(parts) == 2 else []
+        errors += [Error(name, quantity, values.arrays[f"{name}_error"]) for name, quantity in parts
+                   if f"{name}_error" in values.arrays]  # fmt: skip
+    return errors
 
 
 def knots(study: Study, target: Target, poses: Poses) -> list[Corner]:
@@ -209,17 +221,19 @@ def nearest(points: Complexes, corners: Complexes) -> tuple[Complexes, Ints]:
     return nearest_feet, owners
 
 
-def totals(errors: Sequence[Error], designs: int, valid: Flags) -> Floats:
+def totals(values: PoseValues) -> Floats:
     """Number, sum, and sum of the squares of each design's errors at valid poses, shape (3, designs, errors)."""
+    errors, designs, valid = of_values(values), values.question.poses.designs, values.valid
     sums = np.zeros((3, designs, len(errors)))
     for k, error in enumerate(errors):
         counted = (valid & np.isfinite(error.values)).reshape(designs, -1)
-        values = np.where(counted, error.values.reshape(counted.shape), 0.0)
-        sums[:, :, k] = counted.sum(axis=1), values.sum(axis=1), (values**2).sum(axis=1)
+        own = np.where(counted, error.values.reshape(counted.shape), 0.0)
+        sums[:, :, k] = counted.sum(axis=1), own.sum(axis=1), (own**2).sum(axis=1)
     return sums
 
 
-def untargeted(study: Study, errors: Sequence[Error], valid: Flags) -> dict[str, Flags]:
+def untargeted(values: PoseValues) -> dict[str, Flags]:
     """By outputs, the valid poses where their target has no value."""
-    parts = {f"{owner}.{axis}" for owner in study.targets for axis in "xy"}
-    return {error.output: valid & ~np.isfinite(error.values) for error in errors if error.output not in parts}
+    parts = {f"{owner}.{axis}" for owner in values.question.study.targets for axis in "xy"}
+    errors = of_values(values)
+    return {error.output: values.valid & ~np.isfinite(error.values) for error in errors if error.output not in parts}

@@ -10,16 +10,15 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import counted
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.numerics.arrays import Floats, distinct
-from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.questions.kinematics.rates import moving_at
-from mechdesign.questions.poses import SolvedPoses, pose_in_words
 
 # Velocities jump that differ by more of the largest one, at so many rows before and behind a corner.
 JUMPED, BESIDE = 1e-5, 1e-8
 
 
 @quiet
-def velocity_jumps(question: MotionQuestion, bodies: Collection[str], design: int = 0) -> Floats:
+def velocity_jumps(question: MovedQuestion, bodies: Collection[str], design: int = 0) -> Floats:
     """Places of a design's motion, in rows, at which velocities of some bodies jump; its first and last do not count.
 
     Velocities may jump at the corners of a path that is passed with a speed, of a motion over time, and of couplings.
@@ -33,10 +32,8 @@ def velocity_jumps(question: MotionQuestion, bodies: Collection[str], design: in
     places = distinct(np.concatenate([ends, poses.corners if timed else ends]))
     places = places[(places > 0) & (places < poses.end)]
     sides = np.concatenate([places - BESIDE, places + BESIDE])
-    there, configuration = curve.solve(np.full(len(sides), design), sides, judged=False)
-    linear = study.mechanism.linearize(configuration)
-    solved = SolvedPoses(np.arange(len(sides)), poses.groups[0].names, configuration)
-    velocity = moving_at(study, question.section, there, solved, linear).velocity
+    there = curve.solve(np.full(len(sides), design), sides, judged=False)
+    velocity = moving_at(question.section, there, study.mechanism.linearize(there.configuration)).velocity
     if velocity is None or not len(places):
         return np.empty(0)
     graph, size = study.mechanism.graph, study.mechanism.size
@@ -48,10 +45,10 @@ def velocity_jumps(question: MotionQuestion, bodies: Collection[str], design: in
     return np.asarray(places[(np.abs(table[:, 1] - table[:, 0]) > JUMPED * largest).any(axis=0)])
 
 
-def jumps_in_words(question: MotionQuestion, places: Floats, table: str, design: int = 0) -> Caution:
+def jumps_in_words(question: MovedQuestion, places: Floats, table: str, design: int = 0) -> Caution:
     """The warning of jumps at some places."""
     poses, line = question.poses, np.array([design])
-    first = pose_in_words(question.study, poses.along(line, places[:1]), 0)
+    first = question.motion.at(poses.along(line, places[:1])).in_words(0)
     row = int(places[0]) + design * poses.line if places[0] % 1 == 0 else None
     if poses.program is None and np.isin(places, poses.corners).all():
         text = (

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.errors import AssemblyError, MechdesignError
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize import stacked
@@ -19,7 +21,7 @@ from mechdesign.questions.optimize.goals import Goal, shape_of
 from mechdesign.questions.optimize.question import DesignsQuestion, designs_question, regions_of
 from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import entry_of, from_cube, shown, variables_of
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import Question, split
 from mechdesign.region.growth import fitted
@@ -29,7 +31,6 @@ from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.forms import form
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.variable import plainly
 from mechdesign.study.variants import with_entries
 from mechdesign.terms import terms_of
@@ -252,7 +253,7 @@ class Evaluator:
         if command == "workspace":
             return NO_REGION
         poses = study_poses(study, command)
-        solved = list(solve_poses(study, poses))
+        solved = list(solve_poses(study.motion(poses)))
         if self.question.graded:
             batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
         return str(FAILED[first_reason(np.concatenate([part.configuration.reason for part in solved])[None])[0]])

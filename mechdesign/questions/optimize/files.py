@@ -12,14 +12,15 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.solving import solve_poses
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.variables import in_words, parted
-from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.region.curves import workspace_nodes
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
 from mechdesign.study.loading import load_bytes
-from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import changed_data, rewritten
 
@@ -77,7 +78,7 @@ def _parted(study: Study, designs: Designs) -> Iterator[str]:
     values = np.linspace(listed[:-1], listed[1:], BETWEEN + 2, axis=1)[:, 1:-1].ravel()
     group = PoseGroup((name,), {name: values}, np.arange(len(values)))
     failed = np.zeros(len(values), dtype=bool)
-    for solved in solve_poses(study, Poses((group,), len(values), False, (len(values),))):
+    for solved in solve_poses(study.motion(Poses((group,), len(values), False, (len(values),)))):
         failed[solved.rows] = ~solved.configuration.valid
     missed = np.flatnonzero(failed.reshape(-1, BETWEEN).any(axis=1)).tolist()
     unit = study.units.label(study.mechanism.quantity(name))
@@ -105,7 +106,7 @@ def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
     yield study.mechanism.sketch_configuration
     for command in commands:
         poses = workspace_nodes(study) if command == "workspace" else study_poses(study, command)
-        for solved in solve_poses(study, poses):
+        for solved in solve_poses(study.motion(poses)):
             pose = solved.configuration
             valid = np.flatnonzero(pose.valid)
             if valid.size:

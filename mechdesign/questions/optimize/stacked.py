@@ -13,33 +13,31 @@ from numpy.typing import NDArray
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.four_bars import four_bars
+from mechdesign.motion.along import AlongMotion
+from mechdesign.motion.followed import courses_of
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.question import evaluate
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.dynamics import analysis as dynamics
-from mechdesign.questions.dynamics.question import force_question
-from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import courses_of
-from mechdesign.questions.kinematics.extremes import extremes, targets_table
-from mechdesign.questions.kinematics.loops import loops_table, measured
-from mechdesign.questions.kinematics.motion import move
-from mechdesign.questions.kinematics.question import motion_question
-from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
-from mechdesign.questions.poses import SolvedPoses, alike, solve_poses, study_poses
+from mechdesign.questions.dynamics.analysis import Dynamics
+from mechdesign.questions.kinematics.along import KinematicAlong
+from mechdesign.questions.kinematics.answers import Kinematics
+from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
-from mechdesign.questions.stiffness import analysis as stiffness
-from mechdesign.questions.stiffness.body import ask
-from mechdesign.results import Result, Scope
+from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.poses import Poses
 from mechdesign.study.variants import remeasured
 
+# Tables with a row a pose, or several, that are followed between the poses.
+A_ROW_A_POSE = {*Kinematics.a_row_a_pose, *Dynamics.a_row_a_pose, *Stiffness.a_row_a_pose}
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
+    "kinematics": (*Kinematics.a_row_a_pose, "extremes", "loops", "targets"),
     # A design may have more springs than another.
-    "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
-    "dynamics": dynamics.TABLES,
+    "stiffness": tuple(name for name in ORDER if name != "springs"),
+    "dynamics": (*Dynamics.a_row_a_pose, "extremes"),
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 
@@ -53,7 +51,7 @@ class Stack(NamedTuple):
         See `mechdesign.mechanism.Reason`.
     whole : bool array, shape (designs,)
         Whether the motion has no gap between the poses; True where poses are no motion.
-    along : Along, optional
+    along : KinematicAlong, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
         The solved poses.
@@ -62,7 +60,7 @@ class Stack(NamedTuple):
     result: Result
     reason: NDArray[np.int8]
     whole: Flags
-    along: Along | None
+    along: KinematicAlong | None
     solved: list[SolvedPoses]
 
 
@@ -124,7 +122,7 @@ def tables(
 
     Parameters
     ----------
-    wanted : collection of str
+    names : collection of str
         Names of tables.
     outputs : collection of str, optional
         Of the extremes; all where left out.
@@ -132,37 +130,28 @@ def tables(
         Columns that are followed between the poses.
     """
     solved: list[SolvedPoses] = []
-    absent: Mapping[str, str] = {}
-    along = None
-    if command == "kinematics":
-        motion = move(motion_question(study, poses), also=solved.append)
-        question, absent = motion.question, motion.question.absent
-        loops = four_bars(study.mechanism) if "loops" in names else ()
-        errors = question.errors if "targets" in names else ()
-        along = along_of(question, outputs, loops, also=errors, requests=requests)
-        scope = Scope(follow=partial(courses_of, along)) if along is not None else None
-        built = {name: replace(table, scope=scope) for name, table in pose_tables(motion, names).items()}
-        if "extremes" in names:
-            built["extremes"] = extremes(motion, along, outputs)
-        if loops:
-            built["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
-        if motion.errors and "targets" in names:
-            built["targets"] = targets_table(motion, along)
-        reason = motion.reason
-    elif command == "dynamics":
-        motion = move(force_question(study, poses), also=solved.append)
-        built, along = dynamics.tables(motion, motion.question, names, outputs, requests)
-        scope = Scope(follow=None if along is None else partial(courses_of, along))
-        built = {name: replace(table, scope=scope) for name, table in built.items()}
-        reason = motion.reason
-    elif command == "reliability":
+    along: KinematicAlong | None = None
+    if command == "reliability":
         built, reason, solved = reliability.first_order_tables(study, poses, names)
+        result = Result(command, built)
+    elif command == "stiffness":
+        stiff = replace(Stiffness.of(study, poses), names=names)
+        held = evaluate(stiff, also=solved.append)
+        result, reason = Result(command, _followed(stiff.chosen(held, names), stiff.along(requests))), held.reason
     else:
-        body, solved = ask(study), list(solve_poses(study, poses))
-        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(names))
-        built, reason = stiffness.tables(study, body, poses, held, names), held.reason
+        question = (Kinematics if command == "kinematics" else Dynamics).of(study, poses)
+        values = evaluate(question, also=solved.append)
+        built, along = question.chosen(values, names, outputs, requests, solved)
+        result = Result(command, _followed(built, along), absent=question.absent)
+        reason = values.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
-    return Stack(Result(command, built, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
+    return Stack(result, reason.reshape(poses.designs, -1), whole, along, solved)
+
+
+def _followed(tables: Mapping[str, Table], along: AlongMotion | None) -> dict[str, Table]:
+    """Tables of which those with a row a pose are followed along the motions."""
+    scope = Scope(follow=None if along is None else partial(courses_of, along))
+    return {name: replace(table, scope=scope) if name in A_ROW_A_POSE else table for name, table in tables.items()}
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

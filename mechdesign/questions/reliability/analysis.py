@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_poses
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
-from mechdesign.questions.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
 from mechdesign.questions.reliability.allocation import allocate
 from mechdesign.questions.reliability.between import between_poses, places_between
@@ -34,7 +37,6 @@ from mechdesign.questions.reliability.study_sources import find_sources
 from mechdesign.questions.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Poses whose sensitivities are computed together.
@@ -59,7 +61,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         warnings += between_poses(task, _first_order(study, closer, sources)[0])
     if kinds_of_forces(study):
         warnings += assumed(study)
-    failures, failed = judge_failures(study, poses, task.reason)
+    failures, failed = study.motion(poses).failures(task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,
         most=section.samples if "samples" in section.model_fields_set else MAX_SAMPLES, jobs=jobs, progress=progress,
@@ -105,7 +107,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     sampled = next((part.sums for part in results if part.sums), {})
     built += tables.of_drawn(task, sampled)
     result = Result(
-        "reliability", of_poses(study, built, task.reason) | dict(allocated.tables),
+        "reliability", study.motion(poses).of_poses(built, task.reason) | dict(allocated.tables),
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
         tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,
@@ -157,13 +159,13 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     linear = FirstOrder.unknown(sources, len(channels), poses.count)
     closing = FirstOrder.unknown(sources, 0, poses.count)
     groups = []
-    for solved in solve_poses(study, poses, coordinates):
+    for solved in solve_poses(study.motion(poses), coordinates):
         configuration, rows = solved.configuration, solved.rows
         reason[rows] = configuration.reason
         rates = DriveRates((), ())
         if question.moving:
             # Made mechanisms have the same rates of the drives.
-            rates = drive_rates(study, pace(study), poses, solved, mechanism.linearize(configuration))
+            rates = drive_rates(pace(study), solved, mechanism.linearize(configuration))
         own = None if forces is None else forces.take(rows)
         for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates, own), strict=True):
             row[rows] = value

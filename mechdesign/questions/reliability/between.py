@@ -10,19 +10,19 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.curve.corners import curve_of, divide
-from mechdesign.curve.motion import Curve
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
+from mechdesign.motion.corners import curve_of, divide
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import followed_angles
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.questions.kinematics.corners import variables_of
 from mechdesign.questions.loads import coordinates_in, corners_in
-from mechdesign.questions.poses import followed_angles
 from mechdesign.questions.reliability.forces import pace
 from mechdesign.questions.reliability.methods.auto import FACTOR
 from mechdesign.questions.reliability.question import CoordinateChannel, ForceChannel, ReliabilityQuestion
 from mechdesign.questions.reliability.task import Task
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Parts of each step, and about half the most places at which a motion is judged.
 _PARTS = 16
@@ -54,7 +54,7 @@ def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
     coordinates = [channel.coordinate for channel in channels if isinstance(channel, CoordinateChannel)]
     coordinates += coordinates_in(study, loads)
     plan = study.mechanism.plan(poses.groups[0].names)
-    curve = curve_of(study, poses, followed_angles(study.mechanism, plan, coordinates))
+    curve = curve_of(study.motion(poses), followed_angles(study.mechanism, plan, coordinates))
     expressions = expressions_of(coordinates)
     corners = [*corners_of(coordinates), *corners_in(loads)]
     return divide(curve, corners, variables_of(study, pace(study), curve, expressions))[0]

@@ -18,13 +18,13 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel, CoordinateChannel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import column_kinds
@@ -29,7 +30,6 @@ from mechdesign.questions.reliability.corners import Bend, bends, bends_of
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, pace_of
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text.units import Amount
 

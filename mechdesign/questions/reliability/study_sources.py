@@ -14,6 +14,7 @@ from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic, play
+from mechdesign.motion.rows import Poses
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw, fit_law
@@ -23,7 +24,6 @@ from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
 from mechdesign.questions.reliability.sources import Pin, Scalar, Sources, geometric
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 from mechdesign.study.text.units import kind_of
 
 # Largest deviation, in radians or in sizes of the mechanism.

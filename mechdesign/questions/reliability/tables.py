@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.poses import pose_columns
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.columns import (
     CAPABILITY,
@@ -27,7 +27,6 @@ from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
 from mechdesign.results import Column, Drawn, Table
-from mechdesign.study.poses import Poses
 
 # Bins of a histogram.
 _BINS = 60
@@ -41,7 +40,7 @@ _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
 def at_poses(task: Task, rows: Ints) -> list[Column]:
     """Columns of the poses of these rows."""
-    return pose_columns(task.study, task.poses, rows)
+    return task.study.motion(task.poses).columns(rows)
 
 
 def _channels(task: Task, channels: Ints) -> dict[str, Strings]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism import Reason
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.poses import pose_in_words
@@ -22,7 +23,6 @@ from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.simulation import Setting, Sums
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 Strings = NDArray[np.str_]
 

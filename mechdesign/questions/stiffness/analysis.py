@@ -5,32 +5,29 @@ The poses of several designs are one batch, and so are the numbers of the sectio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError
-from mechdesign.mechanism import Configuration, Reason
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.motion.along import PlainAlong
+from mechdesign.motion.answer import Between, MotionQuestion, alone
+from mechdesign.motion.motion import Motion, SolvedPoses
+from mechdesign.motion.passage import Passage
+from mechdesign.motion.question import PoseValues, unfilled
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_rows
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.assumed import assumed
-from mechdesign.questions.poses import (
-    Keeper,
-    Shown,
-    SolvedPoses,
-    invalid_in_words,
-    judge_failures,
-    of_poses,
-    pose_in_words,
-    solve_poses,
-    study_poses,
-)
+from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.questions.stiffness.body import Body, ask, hold, pushes, under_loads
-from mechdesign.questions.stiffness.compliance import Held, put
+from mechdesign.questions.stiffness.compliance import Held
 from mechdesign.questions.stiffness.effects import Effects, effects_of
 from mechdesign.questions.stiffness.elements import Hinge, SlideElement
 from mechdesign.questions.stiffness.tables import (
@@ -43,11 +40,9 @@ from mechdesign.questions.stiffness.tables import (
     springs_table,
     stiffness_table,
 )
-from mechdesign.questions.together import Answers, End, Group
-from mechdesign.results import Drawn, Result, Scope, Table
+from mechdesign.results import Drawn, Result, Table
+from mechdesign.statistics import Request
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
-from mechdesign.work.chunks import map_chunks
 from mechdesign.work.threads import one_thread
 
 # Number of poses solved together.
@@ -57,88 +52,14 @@ ORDER = ("stiffness", "compliance", "eigen", "springs", "deflections", "forces",
 # Smallest singular value of the unit wrenches below which a pose gets a warning: its stiffness depends on rounding and
 # tolerances.
 NEAR_SINGULAR = 1e-4
-# A pose: its row, and the mechanism in it.
-Pose = tuple[int, Configuration]
+R = TypeVar("R", Held, Effects)
 
 
 @one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Stiffness of a body or a pin at every pose of the study [S4]; see `mechdesign.stiffness`."""
     body = ask(study)
-    poses = study_poses(study, "stiffness")
-    progress.start(poses.count, "poses")
-    result = _group(study, body, poses, jobs, progress).of(0)
-    if isinstance(result, Exception):
-        raise result
-    return result
-
-
-@one_thread()
-def answers(study: Study, poses: Poses) -> Answers:
-    """Stiffness at the poses of several designs, without pictures; each design has the answer that it has alone.
-
-    A design without a valid pose has an error.
-    """
-    return Answers([_group(study, ask(study), poses, 1, NULL)])
-
-
-def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: Progress) -> Group:
-    """The result of all designs, each with its warnings, counts and errors."""
-    solved = solve(study, body, poses, solve_poses(study, poses), jobs, progress)
-    count, designs = poses.count // poses.designs, poses.designs
-    cautions, ends = _Cautions(study, poses, body, solved.held), []
-    for k, reason in enumerate(solved.reason.reshape(designs, count)):
-        counts = {"poses": count, "invalid": int(np.count_nonzero(reason))}
-        try:
-            warnings, failed = judge_failures(study, poses, reason, k * count, "stiffness")
-        except AssemblyError as error:
-            ends.append(End(counts=counts, error=error))
-            continue
-        warnings += cautions.of(slice(k * count, (k + 1) * count))
-        if body.given.dynamics:
-            warnings += assumed(study)
-        ends.append(End(warnings, failed, invalid_in_words(study, reason), counts))
-    all_tables = tables(study, body, poses, solved).values()
-    if designs > 1:
-        scoped = {table.name: replace(table, scope=Scope(poses_only=True)) for table in all_tables}
-        uneven = {"springs": solved.springs.counts(designs, count)}
-        return Group(np.arange(designs), Result("stiffness", scoped), ends, uneven)
-    (end,) = ends
-    first, loose = (_drawn_pose(body, poses, solved, pose) for pose in (solved.first, solved.loose))
-    result = Result(
-        "stiffness", of_poses(study, all_tables, solved.reason), end.warnings, end.counts, end.failed,
-        drawn=DrawnStiffness(solved.shown, first, loose),
-    )  # fmt: skip
-    return Group(np.arange(1), result, ends)
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """All poses solved.
-
-    Parameters
-    ----------
-    held : Held
-        How the body is held in each pose.
-    reason : ndarray of int8, shape (poses,)
-        Why a pose fails (`Reason`); 0 where it is valid.
-    springs : Springs
-        Equivalent springs of the legs.
-    effects : Effects or None
-        Effects of the study's loads.
-    first, loose : Pose or None
-        The first valid pose, and the first with a free twist.
-    shown : Shown
-        The poses that pictures can show.
-    """
-
-    held: Held
-    reason: NDArray[np.int8]
-    springs: Springs
-    effects: Effects | None
-    first: Pose | None
-    loose: Pose | None
-    shown: Shown
+    return alone(Stiffness(body, study.motion(study_poses(study, "stiffness"))), progress, jobs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,147 +103,178 @@ class DrawnStiffness(Drawn):
     loose: DrawnPose | None
 
 
-def _drawn_pose(body: Body, poses: Poses, solved: Solved, pose: Pose | None) -> DrawnPose | None:
-    """A pose with its springs, and with the twists that the loads make."""
-    if pose is None:
-        return None
-    row, configuration = pose
-    body = body.at(poses, np.array([row]))
-    parts = under_loads(body, configuration)[1] if body.given.wrenches else []
-    twists = {
-        vertex: np.concatenate([(part.displacements[vertex] @ applied)[0] for part, applied in parts], axis=1)
-        for vertex in (body.network.paths if parts else ())
-    }
-    springs = solved.springs.take(solved.springs.row == row)
-    return DrawnPose(body, row, configuration, springs, twists, pushes(body, configuration))
+@dataclass(frozen=True, eq=False)
+class Unlooked(Between):
+    """Columns of motions are followed where they are asked, and not before."""
+
+    poses: Poses
+
+    @property
+    def followed(self) -> bool:
+        return self.poses.followed
+
+    closely = followed
 
 
-def solve(
-    study: Study, body: Body, poses: Poses, all_solved: Iterable[SolvedPoses], jobs: int | None = 1,
-    progress: Progress = NULL, *, effects: bool = True,
-) -> Solved:  # fmt: skip
-    """How the body is held in all solved poses; one that cannot be assembled is nan.
-
-    `effects` adds the effects of the study's loads.
-    """
-    held = Held.unknown(poses.count, body.size)
-    reason = np.zeros(poses.count, dtype=np.int8)
-    springs: list[Springs] = []
-    # Deflections under loads elsewhere, and by the flanks of teeth that a load presses, are effects, too.
-    loads = len(body.given.wrenches) if effects or body.uneven else 0
-    all_effects = Effects.unknown(body.network, poses.count, loads, body.size) if loads else None
-    first: Pose | None = None
-    loose: Pose | None = None
-    keeper = Keeper(study, poses)
-    for solved in all_solved:
-        configuration = solved.configuration
-        reason[solved.rows] = configuration.reason
-        assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
-        chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
-        batches = ((body.at(poses, solved.rows[index]), configuration.take(index)) for index in chunks)
-        answers = map_chunks(partial(_evaluate, effects=bool(loads)), batches, jobs)
-        for index, (held_part, leg_springs, effect) in zip(chunks, answers, strict=True):
-            rows = solved.rows[index]
-            put(held, rows, held_part)
-            springs += [replace(s, row=rows[s.row]) for s in leg_springs]
-            if all_effects is not None and effect is not None:
-                put(all_effects, rows, effect)
-            progress.update(len(index))
-        first = first or _pose(solved, configuration.valid)
-        loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
-        keeper.keep(solved)
-    return Solved(held, reason, Springs.sorted(springs), all_effects, first, loose, keeper.shown)
+def _made(name: str, values: PoseValues) -> Table:
+    table: Table = values.question.chosen(values, (name,))[name]
+    return table
 
 
-def _pose(solved: SolvedPoses, chosen: Flags) -> Pose | None:
-    """The first of some solved poses that `chosen` marks, with its row; None where it marks none."""
-    index = np.flatnonzero(chosen)[:1]
-    return (int(solved.rows[index[0]]), solved.configuration.take(index)) if len(index) else None
+@dataclass(frozen=True, eq=False)
+class Stiffness(MotionQuestion[Unlooked]):
+    """What a study asks of the stiffness of a body; only some tables."""
 
+    body: Body
+    motion: Motion
+    names: Collection[str] = ORDER
+    watched: Sequence[Coordinate] = ()
 
-def tables(
-    study: Study, body: Body, poses: Poses, solved: Solved, names: Collection[str] = ORDER
-) -> dict[str, Table]:  # fmt: skip
-    """The study's tables, as far as they are among `names`, with the rows of all designs."""
-    soft, effects = solved.held.compliance, solved.effects
-    body = body.at(poses, np.arange(poses.count))
-    section = body.section
-    count = len(section.wrenches)
-    loads = np.broadcast_to(body.loads, (poses.count, count, 3)) if count else None
-    method = "serial legs" if body.legs is not None else "force method"
-    makers: dict[str, Callable[[], Table]] = {
-        "stiffness": lambda: stiffness_table(study, poses, solved.held, solved.reason == 0, method, section.direction),
-        "compliance": lambda: compliance_table(study, poses, soft),
-    }
-    length = section.characteristic_length
-    if body.size == 3 and length is not None:
-        makers["eigen"] = lambda: eigen_table(study, poses, soft, length)
-    legs = body.legs
-    if legs is not None:
-        makers["springs"] = lambda: springs_table(study, poses, [leg.name for leg in legs], solved.springs)
-    if loads is not None:
-        moved = effects.moved if effects is not None and body.uneven else None
-        makers["deflections"] = lambda: deflections_table(study, poses, loads, soft, moved)
-    if effects is not None:
-        makers["forces"] = lambda: forces_table(study, poses, body.network, effects)
-        makers["displacements"] = lambda: displacements_table(study, poses, body.network, effects)
-    return {name: make() for name, make in makers.items() if name in names}
+    command: ClassVar[str] = "stiffness"
+    lead: ClassVar[str] = "stiffness"
+    a_row_a_pose: ClassVar = {name: partial(_made, name) for name in ("stiffness", "compliance")}
 
+    @property
+    def together(self) -> int:
+        return CHUNK
 
-def _evaluate(
-    batch: tuple[Body, Configuration], *, effects: bool
-) -> tuple[Held, Iterable[Springs], Effects | None]:  # fmt: skip
-    """`hold` of a body in its poses, and the effects of the study's loads; None without `effects`."""
-    body, configuration = batch
-    if not effects:
-        return *hold(body, configuration), None
-    loaded, parts = under_loads(body, configuration)
-    held, springs = (loaded.held, ()) if body.legs is None else hold(body, configuration)
-    soft = loaded.held.compliance
-    return (
-        held,
-        springs,
-        Effects.joined(
+    @classmethod
+    def of(cls, study: Study, poses: Poses) -> Self:
+        """Read what a study asks at some poses."""
+        return cls(ask(study), study.motion(poses))
+
+    def at(self, poses: Poses) -> Self:
+        return replace(self, motion=self.motion.at(poses))
+
+    @property
+    def loaded(self) -> bool:
+        """Whether loads count: deflections by loads elsewhere, and by flanks that a load presses, are effects, too."""
+        effects = not {"forces", "displacements"}.isdisjoint(self.names)
+        return bool(self.body.given.wrenches) and (effects or self.body.uneven)
+
+    def unknown(self) -> Mapping[str, Any]:
+        body, count = self.body, len(self.body.given.wrenches)
+        effects = vars(Effects.unknown(body.network, 0, count, body.size)) if self.loaded else {}
+        return {**vars(Held.unknown(0, body.size)), **effects, "springs": []}
+
+    def values(self, part: SolvedPoses) -> Mapping[str, Any]:
+        """How the body is held, its springs, and the effects of the study's loads."""
+        body, configuration = self.body.at(part.poses, part.rows), part.configuration
+        if not self.loaded:
+            held, springs = hold(body, configuration)
+            return {**vars(held), "springs": list(springs)}
+        under, parts = under_loads(body, configuration)
+        held, springs = (under.held, ()) if body.legs is None else hold(body, configuration)
+        soft = under.held.compliance
+        effects = Effects.joined(
             [effects_of(body.network, part, body.given.at, configuration, applied, soft) for part, applied in parts]
-        ),
-    )
+        )
+        return {**vars(held), "springs": list(springs), **vars(effects)}
+
+    def along(self, requests: Collection[Request]) -> PlainAlong | None:
+        curve = self.curve
+        return None if curve is None or curve.spent.all() else PlainAlong(curve, self._columns, requests)
+
+    def _columns(self, there: SolvedPoses) -> dict[str, Floats]:
+        """Numbers of a row a pose, at solved poses."""
+        values = unfilled(self.at(there.poses))
+        values.fill(there)
+        tables = values.question.chosen(values, self.a_row_a_pose)
+        return {column.name: column.values.astype(float)
+                for table in tables.values() for column in table.columns if column.numeric}  # fmt: skip
+
+    def between(self, passage: Passage) -> Unlooked:
+        return Unlooked(None, self.poses)
+
+    def tables(self, passage: Passage, between: Unlooked) -> dict[str, Table]:
+        return self.chosen(passage.values, self.names)
+
+    def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
+        """Tables of some names, as far as the study asks for them, with the rows of all designs."""
+        motion, held, springs = self.motion, _read(Held, values), _springs(values)
+        body = self.body.at(motion.poses, np.arange(motion.poses.count))
+        soft, section, legs = held.compliance, body.section, body.legs
+        effects = _read(Effects, values) if self.loaded else None
+        count, method = len(section.wrenches), "serial legs" if legs is not None else "force method"
+        makers: dict[str, Callable[[], Table]] = {
+            "stiffness": lambda: stiffness_table(motion, held, values.valid, method, section.direction),
+            "compliance": lambda: compliance_table(motion, soft),
+        }
+        length = section.characteristic_length
+        if body.size == 3 and length is not None:
+            makers["eigen"] = lambda: eigen_table(motion, soft, length)
+        if legs is not None:
+            makers["springs"] = lambda: springs_table(motion, [leg.name for leg in legs], springs)
+        if count:
+            loads = np.broadcast_to(body.loads, (motion.poses.count, count, 3))
+            moved = effects.moved if effects is not None and body.uneven else None
+            makers["deflections"] = lambda: deflections_table(motion, loads, soft, moved)
+        if effects is not None:
+            makers["forces"] = lambda: forces_table(motion, body.network, effects)
+            makers["displacements"] = lambda: displacements_table(motion, body.network, effects)
+        return {name: make() for name, make in makers.items() if name in names}
+
+    def uneven(self, passage: Passage, between: Unlooked) -> Mapping[str, Ints]:
+        designs = self.poses.designs
+        return {"springs": _springs(passage.values).counts(designs, self.poses.count // designs)}
+
+    def say(self, passage: Passage, between: Unlooked, design: int) -> tuple[list[Caution], list[str]]:
+        """Under-constrained poses, links without a beam, and legs without a free joint."""
+        held, count = _read(Held, passage.values), self.poses.count // self.poses.designs
+        rows = slice(design * count, (design + 1) * count)
+        rank, margin, stiff = held.rank[rows], held.margin[rows], held.stiffness[rows]
+        finite = (rank > 0) | np.isfinite(stiff).all(axis=(1, 2))
+        loose, near = finite & (rank < self.body.size), finite & (rank == self.body.size) & (margin < NEAR_SINGULAR)
+        warnings = _without_beam(self.body)
+        for where, words in (
+            (loose, "under-constrained: a twist is free (free_x, free_y, free_phi), and the compliance is nan"),
+            (near, f"nearly under-constrained (wrenches within {margin[near].min(initial=1):.1e} of dependence)"),
+        ):
+            if where.any():
+                row = int(where.argmax())
+                first = self.motion.in_words(rows.start + row)
+                said = f"{np.count_nonzero(where)} of {count} poses are {words}; the first: {first}"
+                warnings.append(Caution("singular", said, "stiffness", row, first))
+        return [
+            *warnings,
+            *_without_joint(self.body),
+            *(assumed(self.body.study) if self.body.given.dynamics else ()),
+        ], []
+
+    def drawn(self, passage: Passage, between: Unlooked) -> DrawnStiffness:
+        """The shown poses, the first valid one, and the first with a free twist."""
+        values = passage.values
+        first, loose = (
+            self._drawn_pose(values, int(where.argmax())) if where.any() else None
+            for where in (values.valid, np.isfinite(values.arrays["free"][:, 0]))
+        )
+        return DrawnStiffness(shown_of(self.body.study, passage.shown), first, loose)
+
+    def _drawn_pose(self, values: PoseValues, row: int) -> DrawnPose:
+        """A pose with its springs, and with the twists that the loads make."""
+        body, configuration = self.body.at(self.poses, np.array([row])), solve_rows(self.motion, np.array([row]))
+        parts = under_loads(body, configuration)[1] if body.given.wrenches else []
+        twists = {
+            vertex: np.concatenate([(part.displacements[vertex] @ applied)[0] for part, applied in parts], axis=1)
+            for vertex in (body.network.paths if parts else ())
+        }
+        springs = _springs(values)
+        return DrawnPose(
+            body, row, configuration, springs.take(springs.row == row), twists, pushes(body, configuration)
+        )
 
 
-class _Cautions:
-    """Warnings about under-constrained poses, links without a beam, and legs without a free joint."""
-
-    def __init__(self, study: Study, poses: Poses, body: Body, held: Held) -> None:
-        self.study, self.poses, self.margin = study, poses, held.margin
-        finite = (held.rank > 0) | np.isfinite(held.stiffness).all(axis=(1, 2))
-        self.loose = finite & (held.rank < body.size)
-        self.near = finite & (held.rank == body.size) & (held.margin < NEAR_SINGULAR)
-        self.points, self.legs = _without_beam(study, body), _without_joint(body)
-
-    def of(self, rows: slice) -> list[Caution]:
-        """Warnings about the poses of one design."""
-        study, poses, count, warnings = self.study, self.poses, rows.stop - rows.start, [*self.points]
-        loose, near = (rows.start + np.flatnonzero(where[rows]) for where in (self.loose, self.near))
-        if len(loose):
-            first = pose_in_words(study, poses, int(loose[0]))
-            warnings.append(Caution(
-                "singular",
-                f"{len(loose)} of {count} poses are under-constrained: a twist is free (free_x, free_y, free_phi), "
-                f"and the compliance is nan; the first: {first}",
-                "stiffness", int(loose[0]) - rows.start, first,
-            ))  # fmt: skip
-        if len(near):
-            first = pose_in_words(study, poses, int(near[0]))
-            warnings.append(Caution(
-                "singular",
-                f"{len(near)} of {count} poses are nearly under-constrained (wrenches within "
-                f"{self.margin[near].min():.1e} of dependence); the first: {first}",
-                "stiffness", int(near[0]) - rows.start, first,
-            ))  # fmt: skip
-        return [*warnings, *self.legs]
+def _read(record: type[R], values: PoseValues) -> R:
+    """Values at poses as a record of arrays."""
+    return record(**{part.name: values.arrays[part.name] for part in fields(record)})
 
 
-def _without_beam(study: Study, body: Body) -> list[Caution]:
-    links = study.mechanism.description.links
+def _springs(values: PoseValues) -> Springs:
+    return Springs.sorted(values.arrays["springs"])
+
+
+def _without_beam(body: Body) -> list[Caution]:
+    links = body.study.mechanism.description.links
     return [
         Caution(
             "ignored",

@@ -12,11 +12,12 @@ from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion, pace
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.poses import SolvedPoses
 from mechdesign.questions.stiffness.applied import Applied
 from mechdesign.questions.stiffness.bodies import build_bodies
 from mechdesign.questions.stiffness.compliance import Held, put
@@ -28,7 +29,6 @@ from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import Springs
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +221,8 @@ def _applied(body: Body, configuration: Configuration) -> Applied:
         if k == len(body.given.loads):
             rated = pace(study)
             names = next(group.names for group in poses.groups if rows[0] in group.rows)
-            solved = SolvedPoses(rows, names, configuration)
-            moving = moving_at(study, rated, poses, solved, study.mechanism.linearize(configuration))
+            solved = SolvedPoses(study.motion(poses), rows, names, configuration)
+            moving = moving_at(rated, solved, study.mechanism.linearize(configuration))
             ForceQuestion.of(study, moves=rated.rated).apply(applied, case, poses, rows, moving)
         else:
             forces = Forces(configuration)

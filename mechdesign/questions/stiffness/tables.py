@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value
+from mechdesign.motion.motion import Motion
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
-from mechdesign.questions.poses import pose_columns
 from mechdesign.questions.stiffness.columns import (
     COMPLIANCE,
     DEFLECTIONS,
@@ -25,8 +25,6 @@ from mechdesign.questions.stiffness.effects import Effects, joints_of, points_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import principal
 from mechdesign.results import Column, Table, TableKind
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,34 +49,34 @@ class Springs(Lanes):
         return np.bincount(self.row // poses, minlength=designs)
 
 
-def _entries(study: Study, table: TableKind, letter: str, matrix: Floats) -> list[Column]:
+def _entries(motion: Motion, table: TableKind, letter: str, matrix: Floats) -> list[Column]:
     """Columns of the upper triangle of stiffness or compliance matrices."""
     size = range(matrix.shape[1])
     entries = {f"{letter}{i + 1}{j + 1}": matrix[:, i, j] for i in size for j in size if i <= j}
-    return table.columns(study.units.labels, **entries)
+    return table.columns(motion.units.labels, **entries)
 
 
-def stiffness_table(
-    study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: Value | None
-) -> Table:
+def stiffness_table(motion: Motion, held: Held, valid: Flags, method: str, direction: Value | None) -> Table:
     """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
-    units, labels, soft = study.units, study.units.labels, held.compliance
+    units, labels, soft = motion.units, motion.units.labels, held.compliance
     low, high, angle = principal(soft)
     with np.errstate(divide="ignore"):
         direct = {f"k_{axis}": 1 / soft[:, k, k] for k, axis in enumerate(("x", "y", "phi")[: soft.shape[1]])}
     columns = [
-        *pose_columns(study, poses),
+        *motion.columns(),
         *STIFFNESS.columns(labels, **direct, k_min=low, k_max=high, k_angle=angle / units.angle_factor),
     ]
     if direction is not None:
         columns += STIFFNESS.columns(labels, k_direction=directional(soft, direction * units.angle_factor))
     free = dict(zip(("free_x", "free_y", "free_phi"), held.free.T, strict=False))
-    columns += _entries(study, STIFFNESS, "K", held.stiffness)
-    columns += STIFFNESS.columns(labels, rank=held.rank, **free, valid=valid, method=np.full(poses.count, method))
+    columns += _entries(motion, STIFFNESS, "K", held.stiffness)
+    columns += STIFFNESS.columns(
+        labels, rank=held.rank, **free, valid=valid, method=np.full(motion.poses.count, method)
+    )
     return STIFFNESS.table(columns)
 
 
-def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Table:
+def eigen_table(motion: Motion, soft: Floats, length: Value) -> Table:
     """``eigen.csv``: eigen-stiffnesses of a body, softest first, and the twists along which they act.
 
     They are those of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size causes a wrench
@@ -95,29 +93,29 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Tabl
     stiffness, twists = stiffness[:, order], vectors.swapaxes(1, 2)[:, order]
     lead = np.argmax(np.abs(twists) > 1e-9, axis=2)
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
-    repeat = np.repeat(np.arange(poses.count), 3)
+    repeat = np.repeat(np.arange(motion.poses.count), 3)
     dx, dy, turn = twists.reshape(-1, 3).T
-    return EIGEN.table(pose_columns(study, poses, repeat) + EIGEN.columns(
-        study.units.labels, mode=np.tile([1, 2, 3], poses.count), stiffness=stiffness.ravel(), dx=dx, dy=dy, turn=turn
+    return EIGEN.table(motion.columns(repeat) + EIGEN.columns(
+        motion.units.labels, mode=np.tile([1, 2, 3], len(soft)), stiffness=stiffness.ravel(), dx=dx, dy=dy, turn=turn
     ))  # fmt: skip
 
 
-def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
+def compliance_table(motion: Motion, soft: Floats) -> Table:
     """``compliance.csv``: C11 ... C33."""
-    return COMPLIANCE.table(pose_columns(study, poses) + _entries(study, COMPLIANCE, "C", soft))
+    return COMPLIANCE.table(motion.columns() + _entries(motion, COMPLIANCE, "C", soft))
 
 
-def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
+def springs_table(motion: Motion, legs: Sequence[str], springs: Springs) -> Table:
     """``springs.csv``: a row for each pose, leg and spring."""
-    units = study.units
-    return SPRINGS.table(pose_columns(study, poses, springs.row) + SPRINGS.columns(
+    units = motion.units
+    return SPRINGS.table(motion.columns(springs.row) + SPRINGS.columns(
         units.labels | {"unit": units.label("rotational_stiffness")}, leg=np.array([*legs, ""])[springs.leg],
         stiffness=springs.stiffness, x=springs.place.real, y=springs.place.imag,
         angle=springs.angle / units.angle_factor,
     ))  # fmt: skip
 
 
-def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats, others: Floats | None) -> Table:
+def deflections_table(motion: Motion, loads: Floats, soft: Floats, others: Floats | None) -> Table:
     """``deflections.csv``: a row a pose and load.
 
     `loads` are those on the asked point, shape (poses, loads, 3), `others` what loads elsewhere move it, if there are
@@ -127,16 +125,16 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats, o
     moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
     if others is not None:
         moved = moved + others.reshape(-1, size)
-    repeat = np.repeat(np.arange(poses.count), loads.shape[1])
+    repeat = np.repeat(np.arange(motion.poses.count), loads.shape[1])
     names = (*("fx", "fy", "mz")[:size], *("dx", "dy", "dphi")[:size])
     values = (*loads.reshape(-1, 3).T[:size], *moved.T)
-    columns = DEFLECTIONS.columns(study.units.labels | {"as radians": "rad"}, **dict(zip(names, values, strict=True)))
+    columns = DEFLECTIONS.columns(motion.units.labels | {"as radians": "rad"}, **dict(zip(names, values, strict=True)))
     if others is not None:
-        return DEFLECTIONS.table([*_of_loads(study, poses, loads.shape[1], 1), *columns])
-    return DEFLECTIONS.table([*pose_columns(study, poses, repeat), *columns])
+        return DEFLECTIONS.table([*_of_loads(motion, loads.shape[1], 1), *columns])
+    return DEFLECTIONS.table([*motion.columns(repeat), *columns])
 
 
-def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+def forces_table(motion: Motion, network: Network, effects: Effects) -> Table:
     """``forces.csv``: what every joint bears, a row for each pose, load and joint, and for teeth, belts and cams."""
     edges = (network.edges[k] for k in joints_of(network))
     engagements = (transmission.engagement for transmission in network.transmissions)
@@ -146,28 +144,28 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
     fx, fy, mz = effects.forces.swapaxes(1, 2).reshape(-1, 3).T
     words = dict(zip(("joint", "on", "by"), zip(*pairs, strict=True), strict=True))
     tiled = {name: np.tile(texts, count * loads) for name, texts in words.items()}
-    columns = FORCES.columns(study.units.labels, **tiled, fx=fx, fy=fy, mz=mz)
-    return FORCES.table([*_of_loads(study, poses, loads, joints), *columns])
+    columns = FORCES.columns(motion.units.labels, **tiled, fx=fx, fy=fy, mz=mz)
+    return FORCES.table([*_of_loads(motion, loads, joints), *columns])
 
 
-def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+def displacements_table(motion: Motion, network: Network, effects: Effects) -> Table:
     """``displacements.csv``: displacements of all points, a row for each pose, load and point of a link."""
     points = points_of(network)
     count, number, loads = effects.moves.shape
     moved = effects.moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
-    return DISPLACEMENTS.table(_of_loads(study, poses, loads, number) + DISPLACEMENTS.columns(
-        study.units.labels, link=np.tile([link for link, _, _ in points], count * loads),
+    return DISPLACEMENTS.table(_of_loads(motion, loads, number) + DISPLACEMENTS.columns(
+        motion.units.labels, link=np.tile([link for link, _, _ in points], count * loads),
         point=np.tile([point for _, point, _ in points], count * loads), x=places.real, y=places.imag, dx=moved.real,
         dy=moved.imag,
     ))  # fmt: skip
 
 
-def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
+def _of_loads(motion: Motion, loads: int, rows: int) -> list[Column]:
     """Columns of the pose and of the load's number, for `rows` rows of each pose and load."""
-    repeat = np.repeat(np.arange(poses.count), loads * rows)
-    numbers = np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count)
-    return [*pose_columns(study, poses, repeat), LOAD.column(numbers)]
+    repeat = np.repeat(np.arange(motion.poses.count), loads * rows)
+    numbers = np.tile(np.repeat(np.arange(1, loads + 1), rows), motion.poses.count)
+    return [*motion.columns(repeat), LOAD.column(numbers)]
 
 
 def _link(vertex: str) -> str:

@@ -8,22 +8,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.curve.corners import curve_of
-from mechdesign.curve.ends import Ends
-from mechdesign.curve.functions import Functions
-from mechdesign.curve.motion import Curve
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first
+from mechdesign.motion.corners import curve_of
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.ends import Ends
+from mechdesign.motion.functions import Functions
+from mechdesign.motion.motion import in_study_units
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.columns import PATH, PATH_INDICES
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Rows of the table of one path.
 ROWS = 361
@@ -50,7 +50,7 @@ class _Path:
 
         @quiet
         def evaluate(line: Ints, s: Floats) -> tuple[Floats, Floats]:
-            pose = curve.solve(line, s, judged=False)[1]
+            pose = curve.solve(line, s, judged=False).configuration
             linear = mechanism.linearize(pose)
             rates = linear.velocity([1.0])
             slope = [first(pose, c, rates) for c in coordinates]
@@ -68,7 +68,7 @@ _SPEED = "speed"
 def _curve(study: Study, drive: str, low: float, high: float) -> Curve:
     """The motion of a drive between two values; the whole path is wanted, however many turns its limits leave it."""
     ends = np.array([low, high]) / (study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 1.0)
-    return curve_of(study, Poses.single({drive: ends}), turning=False)
+    return curve_of(study.motion(Poses.single({drive: ends})), turning=False)
 
 
 def point_path(study: Study) -> Result:
@@ -89,7 +89,7 @@ def point_path(study: Study) -> Result:
     coordinate, t = study.mechanism.coordinate(drive), np.linspace(0, np.pi, ROWS)
 
     def shown(values: Sequence[float] | Floats) -> Floats:
-        return np.asarray(in_study_units(study, coordinate, np.asarray(values)))
+        return np.asarray(in_study_units(study.units, coordinate, np.asarray(values)))
 
     rows: list[list[Floats]] = []
     totals: list[list[float]] = []

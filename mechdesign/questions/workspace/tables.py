@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.indices import index
+from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.columns import power_of_length
-from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.boundary import Boundary
 from mechdesign.questions.workspace.columns import (
     BOUNDARY,
@@ -156,8 +156,9 @@ def _boundary(study: Study, question: Question, boundary: Boundary) -> list[Colu
     return [
         *_held(study, question, len(boundary.z)),
         *BOUNDARY.columns(labels, x=boundary.z.real, y=boundary.z.imag, kind=boundary.kind),
-        *(BOUNDARY["<drive>"].column(np.asarray(in_study_units(study, c, values)), label(c.quantity), drive=c.name)
-          for c, values in boundary.drives),
+        *(BOUNDARY["<drive>"].column(
+            np.asarray(in_study_units(study.units, c, values)), label(c.quantity), drive=c.name
+          ) for c, values in boundary.drives),
         *BOUNDARY.columns(labels, at=boundary.at, theta=boundary.theta / study.units.angle_factor, side=boundary.side,
                           curve=boundary.curve, piece=boundary.piece),
     ]  # fmt: skip

@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from mechdesign.motion.rows import TIME
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.panels import Along, quantity
 from mechdesign.study import Study
-from mechdesign.study.poses import TIME
 
 MAX_JOINTS = 6  # curves with a look of their own
 NOTHING = 1e-6  # part of the largest force that is rounding, as a force or as a difference of forces

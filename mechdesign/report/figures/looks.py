@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.question import OF_DYNAMICS, ORDERS
@@ -18,7 +19,6 @@ from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True)) | {OF_DYNAMICS: ""}
 

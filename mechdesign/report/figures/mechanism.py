@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
+from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import evenly
 from mechdesign.questions.dynamics.free_bodies import mass_centers
 from mechdesign.questions.kinematics.drawn import DrawnPoses
-from mechdesign.questions.poses import Shown, solve_rows, solve_shown
+from mechdesign.questions.poses import Shown, solve_shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
@@ -95,7 +96,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     if not np.isfinite(failure).any():
         return None
     row = int(np.nanargmax(failure)) if drawn.samples is None else drawn.samples.pose
-    return f"Errors at {followed_in_words(study, poses, row)}", solve_rows(study, poses, np.array([row]))
+    return f"Errors at {followed_in_words(study, poses, row)}", solve_rows(study.motion(poses), np.array([row]))
 
 
 def sketch_figure(study: Study) -> Figure:

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from mechdesign.motion.rows import TIME, Poses, Sector, Sectors, with_length
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.report.figures.layout import OVER, TURNS
 from mechdesign.report.figures.marks import Axis, Contours, Panel, Picture
 from mechdesign.study import Study
-from mechdesign.study.poses import TIME, Poses, Sector, Sectors, with_length
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6

@@ -10,12 +10,12 @@ from pkgutil import iter_modules
 from typing import Generic, TypeVar
 
 from mechdesign.commands import QUESTIONS
+from mechdesign.motion.rows import Poses
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import Along, Plane, along, plane
 from mechdesign.report.figures.rendering import Gallery, Made
 from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)

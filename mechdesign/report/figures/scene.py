@@ -17,8 +17,10 @@ from mechdesign.mechanism.cams import Cam
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Slot, Spring
+from mechdesign.motion.motion import radians
+from mechdesign.motion.solving import anchors_of
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
-from mechdesign.questions.poses import Shown, anchors_of, pose_in_words, radians
+from mechdesign.questions.poses import Shown, pose_in_words
 from mechdesign.report.figures.framing import extent
 from mechdesign.study import Study
 
@@ -280,9 +282,9 @@ class Sweep(Shown):
         names = self.poses.groups[0].names
         plan = self.mechanism.plan(names)
         parts = -(-_TRACE_POSES // count)
-        values = [radians(self.study, coordinate, self._between(name, parts))
+        values = [radians(self.study.units, coordinate, self._between(name, parts))
                  for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
-        anchors = anchors_of(self.study, self.poses, plan)
+        anchors = anchors_of(self.study.motion(self.poses), plan)
         ends = np.append(self.rows, self.poses.line) if self.poses.closed else self.rows
         s = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
         solved = plan.solve(values, start=None if anchors is None else anchors.at(np.zeros(len(s), dtype=np.intp), s))

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.curve.motion import Curve
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
-from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vectors
-from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.poses import Shown, SolvedPoses
+from mechdesign.questions.kinematics.moved import full
+from mechdesign.questions.poses import Shown
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Table
 
@@ -42,7 +43,7 @@ def largest(vectors: Iterable[Vectors]) -> dict[str, float]:
     return {unit: size for unit, size in sizes.items() if size > 0}
 
 
-def frames(drawn: DrawnPoses, table: Table, marked: Sequence[float]) -> tuple[Sweep, Motion, Table]:
+def frames(drawn: DrawnPoses, table: Table, marked: Sequence[float]) -> tuple[Sweep, PoseValues, Table]:
     """The poses that a page draws, and the motion and the table of which these are the rows `Sweep.rows`.
 
     Parameters
@@ -109,7 +110,7 @@ def near_the_paths(curve: Curve, ways: Callable[[Floats], Complexes], places: Fl
 @quiet
 def paths_of(curve: Curve, points: Sequence[str], places: Floats) -> Complexes:
     """Where points are at places of all motions."""
-    _, configuration = curve.solve(*curve.grid(places), turning=False)
+    configuration = curve.solve(*curve.grid(places), turning=False).configuration
     return _paths(configuration, points).reshape(-1, len(places))
 
 
@@ -119,7 +120,7 @@ def _paths(configuration: Configuration, points: Sequence[str]) -> Complexes:
 
 @quiet
 def _ways(
-    drawn: DrawnPoses, along: Along, points: Sequence[str], sizes: Mapping[str, float]
+    drawn: DrawnPoses, along: KinematicAlong, points: Sequence[str], sizes: Mapping[str, float]
 ) -> Callable[[Floats], Complexes]:  # fmt: skip
     """Where points and tips of arrows are at places of a motion; `sizes` are those of the longest by their units."""
 
@@ -137,12 +138,11 @@ def _ways(
 
 
 @quiet
-def _solved(drawn: DrawnPoses, along: Along, places: Floats) -> tuple[Shown, Motion]:
+def _solved(drawn: DrawnPoses, along: KinematicAlong, places: Floats) -> tuple[Shown, PoseValues]:
     """Poses at places of a motion, and the motion there, without errors of targets."""
     question = along.question
-    poses, configuration = along.curve.solve(np.zeros(len(places), dtype=np.intp), places)
-    poses = replace(poses, motion=True, paths=question.poses.paths, rows=places)
-    motion = Motion(replace(question, poses=poses), reason=configuration.reason.copy())
-    rows = np.arange(len(places))
-    motion.fill(SolvedPoses(rows, poses.groups[0].names, configuration))
-    return Shown(drawn.shown.study, poses, rows, configuration), motion
+    there = along.curve.solve(np.zeros(len(places), dtype=np.intp), places)
+    own = question.at(replace(there.poses, motion=True, paths=question.poses.paths, rows=places))
+    motion = PoseValues(own, there.configuration.reason)
+    motion.put(there.rows, full(own.moved(there)[0], there.rows.shape))
+    return Shown(drawn.shown.study, own.poses, there.rows, there.configuration), motion

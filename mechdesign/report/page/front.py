@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.curve.corners import curve_of
 from mechdesign.errors import MechdesignError
+from mechdesign.motion.corners import curve_of
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize import pareto
@@ -33,7 +34,6 @@ from mechdesign.report.tables import json_text
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study import designs as study_designs
-from mechdesign.study.poses import Poses
 
 # Designs whose poses are solved, and bytes of the drawings and poses that a page has of them.
 MOST_DESIGNS = 60
@@ -154,13 +154,13 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     """Designs of one mechanism in their poses; along a motion these are near enough to draw its paths."""
     if not poses.motion:
         return []
-    curve = curve_of(study, poses)
+    curve = curve_of(study.motion(poses))
     places = evenly(poses.line, MAX_POSES).astype(float)
     if not curve.spent.any():
         places = near_the_paths(curve, partial(paths_of, curve, study.mechanism.points), places, MAX_POSES)
     if poses.closed:
         places = np.append(places, poses.end)
-    _, configuration = curve.solve(*curve.grid(places), turning=False)
+    configuration = curve.solve(*curve.grid(places), turning=False).configuration
     sweeps = []
     for k in range(curve.lines):
         own = configuration.take(np.arange(k * len(places), (k + 1) * len(places)))

@@ -12,12 +12,13 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from mechdesign.mechanism import Reason
+from mechdesign.motion.question import PoseValues
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
 from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
 from mechdesign.questions.kinematics.figures.curves import motion_curves
 from mechdesign.questions.kinematics.figures.paths import path_looks
-from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -41,7 +42,7 @@ from mechdesign.report.page.tracks import (
 )
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
-from mechdesign.study import Poses, Study
+from mechdesign.study import Study
 from mechdesign.study.schema.poses import MotionSection
 
 _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
@@ -246,7 +247,7 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
     return np.where(finite, times, np.nanmedian(times))
 
 
-def _arrows(drawn: DrawnPoses, motion: Motion, sweep: Sweep, sheet: Canvas) -> list[dict[str, Any]]:
+def _arrows(drawn: DrawnPoses, motion: PoseValues, sweep: Sweep, sheet: Canvas) -> list[dict[str, Any]]:
     """Vectors at the poses as arrows of the drawing: of each unit a round length, and a layer for each kind."""
     vectors = list(drawn.vectors(motion, sweep))
     groups = []

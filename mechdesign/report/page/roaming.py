@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from mechdesign.mechanism import Configuration
+from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, Ints, evenly
-from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.index_maps import contours, index_columns, index_norm
 from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
@@ -117,7 +117,7 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
                for axis in "xy"]  # fmt: skip
     for name in study.mechanism.drives:
         drive = study.mechanism.coordinate(name)
-        values = np.asarray(in_study_units(study, drive, configuration.value(drive)))
+        values = np.asarray(in_study_units(study.units, drive, configuration.value(drive)))
         columns.append(Column(name, np.broadcast_to(values, len(rows)), study.units.label(drive.quantity)))
     indices = [region.local.column(name) for name in index_columns(region)]
     columns += [replace(column, values=column.values[rows].astype(float)) for column in indices]

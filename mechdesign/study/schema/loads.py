@@ -12,7 +12,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.model import Spring
-from mechdesign.study.poses import TIME
+from mechdesign.motion.rows import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath

@@ -11,9 +11,9 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import WrittenTarget
-from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath

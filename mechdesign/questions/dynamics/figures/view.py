@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.rounding import STILL
 from mechdesign.questions.dynamics.analysis import DrawnForces
@@ -14,7 +15,6 @@ from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
 from mechdesign.report.figures.pictures import PosesView
-from mechdesign.study.poses import Poses
 
 
 class DynamicsView(PosesView):
@@ -33,7 +33,7 @@ class DynamicsView(PosesView):
     @property
     def poses(self) -> Poses:
         """The poses of the columns."""
-        return self.drawn.motion.question.poses
+        return self.drawn.shown.poses
 
     @cached_property
     def singular(self) -> bool:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.mechanism.plates import CLEARANCE
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
@@ -21,7 +22,7 @@ from mechdesign.report.figures.panels import Along, abscissa, moving_names, time
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import ranks
 from mechdesign.results import Column, Table
-from mechdesign.study import Poses, Study, Units
+from mechdesign.study import Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12

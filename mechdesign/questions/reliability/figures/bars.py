@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.figures.view import ErrorsView
@@ -19,7 +20,6 @@ from mechdesign.report.figures.panels import MAX_PANELS, number
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 MAX_SOURCES = 16
 MIN_SOURCES = 3

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.motion.rows import Poses
 from mechdesign.questions.reliability.tables import DrawnErrors
 from mechdesign.report.figures.looks import Sampled, look
 from mechdesign.report.figures.pictures import PosesView
-from mechdesign.study.poses import Poses
 
 
 class ErrorsView(PosesView):

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
@@ -24,7 +25,7 @@ from mechdesign.report.figures.panels import quantity
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import point_labels
-from mechdesign.study import Poses, Study
+from mechdesign.study import Study
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
 _COIL_SWING = 0.12  # half the width of a coil over its length

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.mechanism import Configuration
+from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, evenly
-from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
     ROOM,
@@ -215,7 +215,7 @@ def _drive_limits(study: Study) -> dict[float, list[str]]:
     for bound in study.mechanism.bounds:
         for end in bound.ends(study.mechanism.nominal) if bound.drive else ():
             if end is not None:
-                value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
+                value = round(float(np.asarray(in_study_units(study.units, bound.coordinate, end))), 9)
                 limits.setdefault(value, []).append(bound.coordinate.name)
     return limits
 

@@ -12,8 +12,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from mechdesign.mechanism import Configuration
+from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.regions import PALE, Region, Sheet, inner_loci, places, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
@@ -103,7 +103,7 @@ def _page(study: Study, drawn: Complexes, *, cut: bool) -> tuple[Axes, Sheet]:
 def _drives(study: Study, configuration: Configuration) -> dict[str, Floats]:
     """Drives of poses in the study's units."""
     coordinates = {name: study.mechanism.coordinate(name) for name in study.mechanism.drives}
-    return {name: np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=float)
+    return {name: np.asarray(in_study_units(study.units, coordinate, configuration.value(coordinate)), dtype=float)
             for name, coordinate in coordinates.items()}  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def _unrolled(study: Study, name: str, values: Floats, region: Region, patches: 
         done[rows] = True
     sketch = mechanism.sketch_configuration
     drawn = float(
-        np.asarray(in_study_units(study, mechanism.coordinate(name), sketch.value(mechanism.coordinate(name))))
+        np.asarray(in_study_units(study.units, mechanism.coordinate(name), sketch.value(mechanism.coordinate(name))))
     )
     nearest = int(np.abs(z - sketch.point(study.workspace.point)).argmin())
     return np.asarray(unrolled + turn * np.round((drawn - unrolled[nearest]) / turn))

@@ -40,7 +40,7 @@ def prepare(study: Study) -> Evaluate:
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
     question, section = question.narrowed, pace(study)
-    rates = constant_rates(study, section, mechanism.drives)
+    rates = constant_rates(mechanism, study.units, section, mechanism.drives)
     forces = force_model(study) if question.columns else None
     if (section.inverse(study.mechanism.drives) or section.motion is not None) and question.moving:
         message = "the index 'reliability' of velocities needs 'rates' of the drives: a path or a motion has none here"

@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from mechdesign.curve.motion import AT_ONCE, BUDGET, Curve
-from mechdesign.curve.pieces import BESIDE, MOST_HALVINGS, RESOLVED, Pieces, largest
+from mechdesign.motion.curve import AT_ONCE, BUDGET, Curve
+from mechdesign.motion.pieces import BESIDE, MOST_HALVINGS, RESOLVED, Pieces, largest
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 

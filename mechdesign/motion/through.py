@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechdesign.curve.functions import Functions
-from mechdesign.curve.motion import Curve
-from mechdesign.curve.series import Evaluate
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.functions import Functions
+from mechdesign.motion.series import Evaluate
 from mechdesign.numerics.arrays import Floats, Ints
 
 # Distance of the poses from the change point and from each other (radians, or sizes of the mechanism). Nearer than the

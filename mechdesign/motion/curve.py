@@ -13,9 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.curve.anchors import Anchors, inputs, steps_of, units_of
-from mechdesign.curve.pieces import Pieces, Search
-from mechdesign.curve.turns import drive_turns
 from mechdesign.expressions import Corner
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
@@ -23,10 +20,13 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import ON_THE_CUT
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
+from mechdesign.motion.anchors import Anchors, inputs, steps_of, units_of
+from mechdesign.motion.motion import Motion, SolvedPoses
+from mechdesign.motion.pieces import Pieces, Search
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.turns import drive_turns
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Largest number of nodes at which a motion is evaluated.
 BUDGET = 1 << 18
@@ -64,20 +64,21 @@ class Curve:
     spent : bool array, shape (lines,)
         Lines with too many turns to be followed; they have no pieces.
     corners : set of Corner
-        Corners of expressions at which the pieces end; see `mechdesign.curve.corners`.
+        Corners of expressions at which the pieces end; see `mechdesign.motion.corners`.
     """
 
     corners: frozenset[Corner] = frozenset()
 
     def __init__(
-        self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True,
+        self, motion: Motion, angles: Sequence[Coordinate] = (), *, turning: bool = True,
         marks: tuple[Ints, Floats] | None = None, drawn: bool = False,
     ) -> None:  # fmt: skip
-        self.study, self.poses, self.angles, self._turning, self._drawn = study, poses, tuple(angles), turning, drawn
-        self.mechanism: Mechanism = study.mechanism
+        self.motion, self.angles, self._turning, self._drawn = motion, tuple(angles), turning, drawn
+        self.mechanism: Mechanism = motion.mechanism
+        self.poses = poses = motion.poses
         (group,) = poses.groups
         self.plan = self.mechanism.plan(group.names)
-        self.anchors = Anchors(study, poses, self.plan) if self.plan.continued else None
+        self.anchors = Anchors(motion, self.plan) if self.plan.continued else None
         self.lines = poses.count // poses.line
         self.spent = np.zeros(self.lines, dtype=bool)
         self.margins = Margins(self.mechanism, self.plan)
@@ -108,11 +109,9 @@ class Curve:
 
     def inputs(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
         """Poses at places of lines, and what they give (radians, lengths)."""
-        return inputs(self.study, self.plan, self.poses, line, s)
+        return inputs(self.motion, self.plan, line, s)
 
-    def solve(
-        self, line: Ints, s: Floats, *, judged: bool = True, turning: bool = True
-    ) -> tuple[Poses, Configuration]:  # fmt: skip
+    def solve(self, line: Ints, s: Floats, *, judged: bool = True, turning: bool = True) -> SolvedPoses:
         """Poses at places of lines, shape (n,); `judged` by the stated limits, `turning` with the turns of angles."""
         poses, values = self.inputs(line, s)
         configuration = self._solved(line, s, poses, values)
@@ -120,7 +119,7 @@ class Curve:
             configuration = self.with_turns(line, s, configuration)
         if judged:
             self.plan.judge(configuration)
-        return poses, configuration
+        return SolvedPoses.all(self.motion.at(poses), configuration)
 
     def with_turns(self, line: Ints, s: Floats, configuration: Configuration) -> Configuration:
         """Solved poses with their angles in the turns that they have along the motion."""
@@ -194,7 +193,9 @@ class Curve:
             np.arange(-STRAIGHT // 2, STRAIGHT // 2) * np.spacing(np.maximum(np.abs(s), 1e-3 * self.poses.end))[:, None]
         )
         places = s[:, None] + fold[:, None] * steps
-        valid = self.solve(np.repeat(line, STRAIGHT), places.ravel(), judged=False)[1].valid.reshape(places.shape)
+        valid = self.solve(np.repeat(line, STRAIGHT), places.ravel(), judged=False).configuration.valid.reshape(
+            places.shape
+        )
         last = STRAIGHT - 1 - valid[:, ::-1].argmax(axis=1)
         inset = s - fold * INSET * self.poses.end
         return np.where(valid.any(axis=1), places[np.arange(len(s)), last], inset)
@@ -203,7 +204,7 @@ class Curve:
         """Pieces between the corners of each line, so short that given coordinates change little in each."""
         if not self.poses.end > 0:
             return Pieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
-        marks, count = steps_of(self.study, self.plan, self.poses)
+        marks, count = steps_of(self.motion, self.plan)
         self.spent |= count.sum(axis=1) * chebyshev.COUNT > BUDGET
         numbers: Ints = np.where(self.spent[:, None], 0, count).astype(np.intp)
         line, segment = (np.repeat(part.ravel(), numbers.ravel()) for part in np.indices(numbers.shape))
@@ -246,7 +247,7 @@ class Curve:
         parts = []
         for k in range(0, max(len(s), 1), AT_ONCE):
             some = slice(k, k + AT_ONCE)
-            configuration = self.solve(line[some], s[some], judged=False)[1]
+            configuration = self.solve(line[some], s[some], judged=False).configuration
             lost = configuration.reason != Reason.OK
             # At the end of a piece rounding may keep a pose from closing.
             parts.append(np.where(lost, np.nan, self.margins.of_limits(configuration)))
@@ -286,7 +287,7 @@ class Curve:
         near: Mapping[str, Value] = self.mechanism.drawn_windings
         if not self._drawn and len(lines) and not near.keys().isdisjoint(angle.name for angle in self.angles):
             poses = self.inputs(lines, place)[0]
-            near = from_sketch(self.study, poses.groups[0].values, poses.places)
+            near = from_sketch(self.motion.at(poses))
         for angle, row in zip(self.angles, coefficients, strict=True):
             begin = chebyshev.value(row[first], x)
             turns = -np.ceil((begin - np.pi) / TURN - ON_THE_CUT)
@@ -331,26 +332,19 @@ class Curve:
         return np.concatenate(rows)
 
 
-def from_sketch(study: Study, given: Mapping[str, Floats], places: Mapping[str, Value]) -> dict[str, Floats]:
-    """Angles of torsion springs at poses (radians), with the turns of the straight way there from the sketch.
-
-    Parameters
-    ----------
-    given : mapping
-        What each pose gives, in the study's units, shape (n,).
-    places : mapping
-        Places that differ from the nominal ones, of shape (n,).
-    """
-    mechanism, sketch = study.mechanism, study.mechanism.sketch_configuration
-    if not mechanism.windings or not given:
+def from_sketch(motion: Motion) -> dict[str, Floats]:
+    """Angles of torsion springs at poses (radians), with the turns of the straight way there from the sketch."""
+    mechanism, units, poses = motion.mechanism, motion.units, motion.poses
+    (group,), sketch = poses.groups, mechanism.sketch_configuration
+    if not mechanism.windings or not group.values:
         return {}
-    coordinates, count = mechanism.plan(tuple(given)).structure.given, len(next(iter(given.values())))
-    begin = [float(sketch.value(c)) / unit for c, unit in zip(coordinates, units_of(study, coordinates), strict=True)]
+    coordinates, count = mechanism.plan(group.names).structure.given, poses.count
+    begin = [float(sketch.value(c)) / unit for c, unit in zip(coordinates, units_of(units, coordinates), strict=True)]
     ways = {name: np.stack([np.full(count, drawn), column], axis=1).ravel()
-            for (name, column), drawn in zip(given.items(), begin, strict=True)}  # fmt: skip
-    both = {name: np.repeat(column, 2) for name, column in places.items()}
-    poses = replace(Poses.single(ways, (2,)), designs=count, places=both)
-    curve = Curve(study, poses, [*mechanism.windings.values()], drawn=True)
+            for (name, column), drawn in zip(group.values.items(), begin, strict=True)}  # fmt: skip
+    both = {name: np.repeat(column, 2) for name, column in poses.places.items()}
+    straight = replace(Poses.single(ways, (2,)), designs=count, places=both)
+    curve = Curve(motion.at(straight), [*mechanism.windings.values()], drawn=True)
     turned = curve.turned(np.arange(count), np.ones(count))
     return {name: np.where(curve.spent, drawn, angles)
             for (name, drawn), angles in zip(mechanism.drawn_windings.items(), turned, strict=True)}  # fmt: skip

@@ -7,9 +7,9 @@ from copy import copy
 
 import numpy as np
 
-from mechdesign.curve.functions import Functions
-from mechdesign.curve.motion import Curve
-from mechdesign.curve.series import Evaluate
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.functions import Functions
+from mechdesign.motion.series import Evaluate
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.statistics import Interval
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.curve.motion import BEYOND, Curve
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.margins import ZERO_LENGTH, Cause
+from mechdesign.motion.curve import BEYOND, Curve
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Distance from the end of a piece at which margins are evaluated, as a part of the piece.
@@ -86,7 +86,7 @@ class Ends:
             held = np.zeros(len(piece), dtype=bool)
             if outer.any() and not self._curve.poses.closed:
                 # At the first and the last pose the motion ends only if it cannot go on beyond them.
-                held[outer] = self._curve.solve(pieces.line[piece[outer]], outside[outer])[1].valid
+                held[outer] = self._curve.solve(pieces.line[piece[outer]], outside[outer]).configuration.valid
             held |= outer & self._curve.poses.closed
             piece, outside = piece[~held], outside[~held]
             causes = self._causes_at(pieces.line[piece], outside)
@@ -159,7 +159,7 @@ class Ends:
         if fold is not None:
             group = self._curve.plan.structure.groups[fold[2]]
             return replace(cause, joint=" ".join(graph.joined(group.edges)), group=fold[2])
-        pose = self._curve.solve(pieces.line, np.array([inside]))[1]
+        pose = self._curve.solve(pieces.line, np.array([inside])).configuration
         for slide in self._curve.margins.legs:
             leg = graph.slides[slide]
             if abs(float(np.ravel(pose.slides[slide])[0])) <= ZERO_LEG * self._curve.mechanism.size:

@@ -9,13 +9,11 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from mechdesign.expressions import Number
+from mechdesign.motion.paths import PointPath, between
+from mechdesign.motion.timed import MotionProgram
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.motion_program import MotionProgram
-from mechdesign.study.point_paths import PointPath, between
 from mechdesign.study.text import fields
 from mechdesign.study.text.units import Amount
-
-HELP_PAGE = "reference/study/kinematics"
 
 MAX_POSES = 10_000_000
 # What is swept along a motion over time.

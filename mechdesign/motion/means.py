@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.curve.pieces import MOST_HALVINGS, between_marks
-from mechdesign.curve.series import Series
+from mechdesign.motion.pieces import MOST_HALVINGS, between_marks
+from mechdesign.motion.series import Series
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, distinct
 

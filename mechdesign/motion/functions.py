@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.curve.means import Means, rises
-from mechdesign.curve.motion import INSET
-from mechdesign.curve.pieces import MOST_HALVINGS, largest
-from mechdesign.curve.series import EXACT
+from mechdesign.motion.curve import INSET
+from mechdesign.motion.means import Means, rises
+from mechdesign.motion.pieces import MOST_HALVINGS, largest
+from mechdesign.motion.series import EXACT
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats, Ints, Lanes, firsts
 

@@ -9,14 +9,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.curve.functions import Functions
-from mechdesign.curve.motion import Curve
 from mechdesign.expressions import Corner
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
+from mechdesign.motion.curve import Curve
+from mechdesign.motion.functions import Functions
+from mechdesign.motion.motion import Motion
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # Halvings of the distance between two places, after which only rounding is left.
 BISECTIONS = 60
@@ -24,9 +23,9 @@ BISECTIONS = 60
 Variables = Callable[[frozenset[str], Ints, Floats], Mapping[str, ArrayLike]]
 
 
-def curve_of(study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True) -> Curve:
-    """The motions of some poses, divided at the corners of couplings and of what limits bound; see `Curve`."""
-    curve = Curve(study, poses, angles, turning=turning)
+def curve_of(motion: Motion, angles: Sequence[Coordinate] = (), *, turning: bool = True) -> Curve:
+    """The motion of some poses, divided at the corners of couplings and of what limits bound; see `Curve`."""
+    curve = Curve(motion, angles, turning=turning)
     mechanism = curve.mechanism
     bounded = [*(c.function for c in mechanism.couplings), *(bound.coordinate for bound in mechanism.bounds)]
     corners, expressions = corners_of(bounded), expressions_of(bounded)
@@ -34,14 +33,14 @@ def curve_of(study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, t
         return curve
 
     def variables(names: frozenset[str], line: Ints, s: Floats) -> Mapping[str, ArrayLike]:
-        configuration = curve.solve(line, s, judged=False)[1]
+        configuration = curve.solve(line, s, judged=False).configuration
         return {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
 
     divided, line, place = divide(curve, corners, variables)
     if not len(line):
         return curve
     # Limits and dead centres are sought again, on pieces that hold no corner.
-    whole = Curve(study, poses, angles, turning=turning, marks=(line, place))
+    whole = Curve(motion, angles, turning=turning, marks=(line, place))
     whole.corners = divided.corners
     return whole
 

@@ -14,9 +14,10 @@ from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
+from mechdesign.motion.motion import Motion
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Floats, Ints, distinct, evenly
-from mechdesign.study import Study
-from mechdesign.study.poses import Poses
+from mechdesign.study.text.units import Units
 
 # Largest change of a given angle, and of a given length as a part of the mechanism's size, from step to step.
 FIRST_TURN, FIRST_LENGTH = np.pi / 4, 0.25
@@ -26,27 +27,28 @@ BEYOND = 1e-9
 ANCHORS = 721
 
 
-def units_of(study: Study, coordinates: Sequence[Coordinate]) -> list[float]:
+def units_of(units: Units, coordinates: Sequence[Coordinate]) -> list[float]:
     """The study's unit of each coordinate, in radians or as 1 for a length."""
-    return [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in coordinates]
+    return [units.angle_factor if c.quantity == "angle" else 1.0 for c in coordinates]
 
 
-def inputs(study: Study, plan: Plan, poses: Poses, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
+def inputs(motion: Motion, plan: Plan, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
     """Poses at places of lines, and what they give to their plan (radians, lengths)."""
-    there = poses.along(line, s)
-    columns = zip(there.groups[0].columns(), units_of(study, plan.structure.given), strict=True)
+    there = motion.poses.along(line, s)
+    columns = zip(there.groups[0].columns(), units_of(motion.units, plan.structure.given), strict=True)
     return there, [np.asarray(column * unit, dtype=float) for column, unit in columns]
 
 
-def steps_of(study: Study, plan: Plan, poses: Poses) -> tuple[Floats, Floats]:
+def steps_of(motion: Motion, plan: Plan) -> tuple[Floats, Floats]:
     """Places between which motions are smooth, and the steps in each part so that given coordinates change little.
 
     The steps are whole numbers of shape (lines, parts).
     """
-    end, mechanism, lines = float(poses.end), study.mechanism, poses.count // poses.line
+    poses, mechanism = motion.poses, motion.mechanism
+    end, lines = float(poses.end), poses.count // poses.line
     marks = distinct(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
     count = np.ones((lines, len(marks) - 1))
-    (group,), units = poses.groups, units_of(study, plan.structure.given)
+    (group,), units = poses.groups, units_of(motion.units, plan.structure.given)
     for coordinate, column, unit in zip(plan.structure.given, group.columns(), units, strict=True):
         size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * mechanism.size
         rows = column.reshape(lines, -1)
@@ -65,10 +67,10 @@ class Anchors:
     motion; else each is continued from the sketch.
     """
 
-    def __init__(self, study: Study, poses: Poses, plan: Plan) -> None:
-        self.study, self.poses, self.plan = study, poses, plan
-        self.mechanism: Mechanism = study.mechanism
-        self.lines = poses.count // poses.line
+    def __init__(self, motion: Motion, plan: Plan) -> None:
+        self.motion, self.poses, self.plan = motion, motion.poses, plan
+        self.mechanism: Mechanism = motion.mechanism
+        self.lines = self.poses.count // self.poses.line
 
     def at(self, line: Ints, s: Floats) -> Configuration:
         """The anchor nearest to each place of a line; the sketch where the line has none."""
@@ -102,7 +104,7 @@ class Anchors:
     def _places(self) -> Floats:
         if not self.plan.angles or not self.poses.end > 0:
             return evenly(self.poses.line, ANCHORS).astype(float)
-        marks, count = steps_of(self.study, self.plan, self.poses)
+        marks, count = steps_of(self.motion, self.plan)
         parts = [np.linspace(low, high, int(steps), endpoint=False)
                  for low, high, steps in zip(marks[:-1], marks[1:], count.max(axis=0), strict=True)]  # fmt: skip
         return np.concatenate([*parts, marks[-1:]])
@@ -129,7 +131,7 @@ class Anchors:
         return self._joined(every).take(order)
 
     def _solved(self, line: Ints, s: Floats, start: Configuration) -> Configuration:
-        poses, values = inputs(self.study, self.plan, self.poses, line, s)
+        poses, values = inputs(self.motion, self.plan, line, s)
         return self.plan.solve(values, poses.places, start=start, limits=False)
 
     def _joined(self, parts: Sequence[Configuration]) -> Configuration:

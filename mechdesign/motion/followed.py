@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mechdesign.motion.along import AlongMotion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.rounding import STILL
-from mechdesign.questions.dynamics.schema import EFFICIENCIES
-from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.statistics import Request
 
 
-def courses_of(along: Along, requests: Sequence[Request]) -> list[Followed | None]:
+def courses_of(along: AlongMotion, requests: Sequence[Request]) -> list[Followed | None]:
     """Columns along motions or parts of them; None for each without values between the poses."""
     return [_course_of(along, request) for request in requests]
 
 
-def _course_of(along: Along, request: Request) -> Followed | None:
-    # As in the extremes, efficiencies are those of the poses.
-    if request.column in EFFICIENCIES or not along.knows(request.columns):
+def _course_of(along: AlongMotion, request: Request) -> Followed | None:
+    if request.column in along.of_poses or not along.knows(request.columns):
         return None
     along = along.part(request.part) if request.part else along
     return Followed(along, request.column) if request.column in along.columns else None
@@ -30,18 +27,19 @@ def _course_of(along: Along, request: Request) -> Followed | None:
 
 @dataclass(frozen=True, eq=False)
 class Courses:
-    """Columns along the motions of a question, each followed once for all designs; can be sent to another process.
+    """Columns along motions, each followed once for all designs; can be sent to another process.
 
-    Those that are asked together are followed together.
+    Those that are asked together are followed together. `along` gives their functions; None of a motion that cannot be
+    followed.
     """
 
-    question: MotionQuestion
+    along: Callable[[Sequence[Request]], AlongMotion | None]
     _followed: dict[Request, Followed | None] = field(default_factory=dict)
 
     def __call__(self, requests: Sequence[Request]) -> list[Followed | None]:
         """Columns along the motions; None for each without values between the poses."""
         if new := [request for request in requests if request not in self._followed]:
-            along = along_of(self.question, (), requests=new)
+            along = self.along(new)
             courses = [None] * len(new) if along is None else courses_of(along, new)
             self._followed.update(zip(new, courses, strict=True))
         return [self._followed[request] for request in requests]
@@ -54,7 +52,7 @@ class Followed:
     `largest` has, by sign, the largest values of all designs times the sign, once they are asked for.
     """
 
-    along: Along
+    along: AlongMotion
     name: str
     design: int | None = None
     largest: dict[int, Floats] = field(default_factory=dict)
@@ -92,12 +90,12 @@ class Followed:
 
     def pose(self, place: float) -> dict[str, float]:
         """What the poses give at a place of the motion of the first design."""
-        poses = self.along.question.poses.along(np.array([self.design or 0]), np.array([place]))
+        poses = self.along.curve.poses.along(np.array([self.design or 0]), np.array([place]))
         return {name: float(value[0]) + 0.0 for name, value in poses.named.items()}
 
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""
-        swept, coordinates = self.along.question.poses.swept, self.pose(place)
+        swept, coordinates = self.along.curve.poses.swept, self.pose(place)
         return ", ".join(f"{name} {coordinates[name]:.6g}" for name in (coordinates if swept is None else [swept]))
 
     def end(self, sign: int) -> Floats:

@@ -15,15 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
-from mechdesign.study.text.csv_files import read_table
-from mechdesign.study.text.fields import APART, MIN_NUMBER
-from mechdesign.study.text.inputs import Folder
-from mechdesign.study.text.units import Amount
-
-HELP_PAGE = "reference/study/kinematics"
+from mechdesign.study.text.fields import MIN_NUMBER
 
 # Pieces of a spline between two of its points whose lengths are added up.
 SPLINE_PIECES = 64
@@ -225,7 +218,7 @@ class Spline(PointPath):
 
 
 @dataclass(frozen=True, eq=False)
-class Own(PointPath):
+class SplineOfEach(PointPath):
     """A path of its own for each design, with as many poses."""
 
     paths: Sequence[PointPath]
@@ -235,7 +228,7 @@ class Own(PointPath):
         return self.paths[0].closed
 
     def take(self, designs: Ints) -> PointPath:
-        return Own(self.count, [self.paths[k] for k in designs.tolist()])
+        return SplineOfEach(self.count, [self.paths[k] for k in designs.tolist()])
 
     @property
     def corners(self) -> Floats:
@@ -280,52 +273,3 @@ def bends(rows: NDArray[Any]) -> Floats:
     steps = np.abs(np.diff(rows, axis=1))
     rounding = EVEN * np.maximum(steps[:, 1:], steps[:, :-1]) + 4 * np.finfo(float).eps * np.abs(rows[:, 1:-1])
     return np.asarray(np.flatnonzero((np.abs(np.diff(rows, 2, axis=1)) > rounding).any(axis=0)) + 1.0)
-
-
-def course(name: str, given: PathSection, folder: Folder, value: Callable[[float], Floats]) -> PointPath | Floats:
-    """The path of a point, or the values of a coordinate, shape (designs, count), by the numbers of each design.
-
-    Raises
-    ------
-    StudyError
-        Where a file cannot be read, or what is listed is no such path.
-    """
-    for form, count, whole in ((given.circle, CIRCLE_POSES, True), (given.arc, LINE_POSES, False)):
-        if form is not None:
-            x, y, radius, begin, end = map(value, (*form.center, form.radius, form.from_, form.to))
-            return Round(given.points or count, x + 1j * y, radius, begin, end, whole)
-    if given.line is not None:
-        start, stop = (value(x) + 1j * value(y) for x, y in given.line)
-        if (start == stop).all():
-            raise StudyError(f"path: the line of {name!r} needs two different places")
-        return Polyline.through(np.linspace(start, stop, given.points or LINE_POSES, axis=1, dtype=np.complex128))
-    point = "." not in name
-    if given.file is not None:
-        table = read_table(folder, given.file)[None]
-    else:
-        assert given.through is not None
-        table = table_of(given.through, value)
-    if point and table.shape[2] == 2:
-        places = table[..., 0] + 1j * table[..., 1]
-        if not given.spline:
-            return Polyline.through(places)
-        chords = np.abs(np.diff(places, axis=1))
-        if places.shape[1] < 3 or not (chords > APART * chords.sum(axis=1, keepdims=True)).all():
-            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
-        splines = [Spline.through(place, given.points) for place in places]
-        return splines[0] if len(splines) == 1 else Own(splines[0].count, splines)
-    if table.shape[2] == 1:
-        return np.asarray(table[..., 0])
-    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
-
-
-def table_of(rows: Sequence[Sequence[float]], value: Callable[[float], Floats]) -> Floats:
-    """Rows of numbers of each design, shape (designs, rows, columns); one design's where they follow no parameter."""
-    table = np.array(rows, dtype=float)[None]
-    for row, column in np.ndindex(table.shape[1:]):
-        number = rows[row][column]
-        if isinstance(number, Amount) and number.expression is not None:
-            values = value(number)
-            table = np.repeat(table, len(values) // len(table), axis=0)
-            table[:, row, column] = values
-    return table

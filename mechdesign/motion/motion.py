@@ -1,0 +1,126 @@
+"""What moves: a mechanism through poses, of one design or of many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.cautions import Caution
+from mechdesign.errors import AssemblyError
+from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.motion.rows import TIME, Poses
+from mechdesign.numerics.arrays import Ints
+from mechdesign.results import Column, ColumnKind, Scope, Table
+from mechdesign.study.text.units import Units
+
+TIMED = ColumnKind("time", "time from the begin of the motion", "time")
+GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A mechanism, the units of what is said about it, and its poses."""
+
+    mechanism: Mechanism
+    units: Units
+    poses: Poses
+
+    def at(self, poses: Poses) -> Motion:
+        """The mechanism in other poses."""
+        return replace(self, poses=poses)
+
+    def unit_of(self, name: str) -> str:
+        """Unit of time, or of a coordinate."""
+        return self.units.label("time" if name == TIME else self.mechanism.quantity(name))
+
+    def columns(self, rows: Ints | slice = slice(None)) -> list[Column]:
+        """The time of a motion and the coordinates that the study gives, as columns; of these rows of the poses."""
+        times, values = self.poses.times, self.poses.values.items()
+        timed = [TIMED.column(times[rows], self.unit_of(TIME))] if times is not None else []
+        return timed + [GIVEN.column(column[rows], self.unit_of(name), coordinate=name) for name, column in values]
+
+    def in_words(self, row: int, digits: int = 6) -> str:
+        """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row, with its time along a motion over time."""
+        return ", ".join(
+            f"{name} = {values[row] + 0.0:.{digits}g} {self.unit_of(name)}".rstrip()
+            for name, values in self.poses.named.items()
+            if np.isfinite(values[row])
+        )
+
+    def failures(self, reason: NDArray[np.int8], begin: int = 0, table: str = "") -> tuple[list[Caution], str]:
+        """Warnings for poses of a design that failed, and the message where that is an error (exit code 3).
+
+        Parameters
+        ----------
+        reason : int8 array, shape (poses of the design,)
+            See `mechdesign.mechanism.Reason`.
+        begin : int
+            Row of its first pose.
+        table : str
+            The table whose rows are the poses of the design, if there is one.
+
+        Raises
+        ------
+        AssemblyError
+            If every pose failed.
+        """
+        bad = np.flatnonzero(reason)
+        if not len(bad):
+            return [], ""
+        invalid, why = self.invalid_in_words(reason), self.mechanism.why
+        named = [f"{self.in_words(begin + int(row))}: {why(int(reason[row]))}" for row in bad[:5]]
+        if len(bad) == len(reason):
+            more = "; ..." if len(bad) > len(named) else ""
+            raise AssemblyError(f"no pose is valid; {'; '.join(named)}{more}")
+        place = (table, int(bad[0]) if table else None, self.in_words(begin + int(bad[0])))
+        if self.poses.listed:
+            return [Caution("unassembled", invalid, *place)], f"pose {'; pose '.join(named)}"
+        return [Caution("unassembled", f"{invalid}; the first: {named[0]}", *place)], ""
+
+    def invalid_in_words(self, reason: NDArray[np.int8]) -> str:
+        """How many poses are not valid, and why; empty where all are."""
+        numbers, counts = np.unique(reason[reason != Reason.OK], return_counts=True)
+        whys = [self.mechanism.why(number).partition(":")[0] for number in numbers.tolist()]
+        words = [f"{count} {why}" for why, count in zip(whys, counts.tolist(), strict=True)]
+        return f"{sum(counts)} of {len(reason)} poses are not valid ({', '.join(words)})" if words else ""
+
+    def of_poses(self, tables: Iterable[Table], reason: NDArray[np.int8]) -> dict[str, Table]:
+        """Tables by their names, whose rows speak of the poses alone and not of the motion between them."""
+        scope = Scope(poses_only=True, missing=self.invalid_in_words(reason))
+        return {table.name: replace(table, scope=scope) for table in tables}
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedPoses:
+    """Poses of a motion that give the same coordinates, solved: their rows in its poses, and the names given."""
+
+    motion: Motion
+    rows: Ints
+    names: tuple[str, ...]
+    configuration: Configuration
+
+    @classmethod
+    def all(cls, motion: Motion, configuration: Configuration) -> SolvedPoses:
+        """Every pose of a motion whose poses give the same coordinates."""
+        (group,) = motion.poses.groups
+        return cls(motion, np.arange(motion.poses.count), group.names, configuration)
+
+    @property
+    def poses(self) -> Poses:
+        """All poses of the motion."""
+        return self.motion.poses
+
+
+def radians(units: Units, coordinate: Coordinate, value: Value) -> Value:
+    """A value in the study's units as the core takes it."""
+    return value * units.angle_factor if coordinate.quantity == "angle" else value
+
+
+def in_study_units(units: Units, coordinate: Coordinate, value: Value) -> Value:
+    """A value of the core in the study's units."""
+    return value / units.angle_factor if coordinate.quantity == "angle" else value

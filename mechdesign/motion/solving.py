@@ -1,0 +1,196 @@
+"""The poses of a motion, solved, with angles that do not jump along it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.mechanism.algebra import TURN
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.mechanism import begun
+from mechdesign.mechanism.plan import Plan
+from mechdesign.motion.anchors import Anchors
+from mechdesign.motion.corners import curve_of
+from mechdesign.motion.curve import Curve, from_sketch
+from mechdesign.motion.motion import Motion, SolvedPoses, radians
+from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.turns import drive_turns
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.work.chunks import map_chunks, worker_count
+
+# Poses solved at once: their arrays stay within some megabytes, however long the sweep.
+POSES_AT_ONCE = 65536
+# Threads that solve poses of a long motion: what is made of them is one thread's work, and more would fill the memory.
+_MOST_SOLVERS = 4
+
+
+def solve_poses(
+    motion: Motion, coordinates: Sequence[Coordinate] = (), jobs: int | None = 1, curve: Curve | None = None
+) -> Iterator[SolvedPoses]:  # fmt: skip
+    """Solve each group of poses with the plan of its coordinates, at most `POSES_AT_ONCE` poses at a time.
+
+    What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
+    motion or a grid, the other angles of the `coordinates` and of the study's limits, in expressions too, are
+    followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
+    (-180, 180] deg. Those of torsion springs have in all of them the turns of the way from the sketch. The result is
+    the same for any number of threads, `jobs`. `curve` is the motion of the poses, with these angles, where it is there
+    already.
+
+    Raises
+    ------
+    MechanismError
+        Where the coordinates of a pose do not determine the mechanism.
+    """
+    for group in motion.poses.groups:
+        yield from _solve_group(motion, group, coordinates, jobs, curve)
+
+
+def _solve_group(
+    motion: Motion, group: PoseGroup, coordinates: Sequence[Coordinate], jobs: int | None, curve: Curve | None
+) -> Iterator[SolvedPoses]:  # fmt: skip
+    mechanism, poses = motion.mechanism, motion.poses
+    plan = mechanism.plan(group.names)
+    jobs = min(worker_count(jobs), _MOST_SOLVERS)
+    pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
+    angles = [] if poses.listed else followed_angles(mechanism, plan, coordinates)
+    if angles and curve is None:
+        curve = curve_of(motion, angles)
+
+    anchors = anchors_of(motion, plan, curve)
+
+    def at(piece: slice) -> Configuration:
+        """Poses of some rows, not yet judged by the limits."""
+        rows = group.rows[piece]
+        columns = zip(plan.structure.given, group.columns(), strict=True)
+        values = [np.asarray(radians(motion.units, c, v[piece]), dtype=float) for c, v in columns]
+        start = starts(mechanism, poses, rows) if plan.continued else None
+        if plan.angles and anchors is not None:
+            start = anchors.at(*np.divmod(rows, poses.line))
+        return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+
+    turns = _Turns(motion, angles, curve)
+    for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
+        rows = group.rows[piece]
+        near = from_sketch(motion.at(_alone(poses, group, piece))) if poses.listed else turns.near(rows, configuration)
+        configuration = replace(
+            configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys()
+        )
+        plan.judge(configuration)
+        yield SolvedPoses(motion, rows, group.names, configuration)
+
+
+def followed_angles(mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
+    """Angles whose turns only the motion gives: not those given, coupled, nor drives whose limits leave one turn.
+
+    Those of torsion springs are among them.
+    """
+    settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
+    settled -= {coordinate.name for coordinate in mechanism.counting}
+    angles = angles_of([*coordinates, *mechanism.counting, *mechanism.windings.values()])
+    return [angle for name, angle in angles.items() if name not in plan.counted | plan.coupled | settled]
+
+
+class _Turns:
+    """Values near which angles lie at the poses of a motion or a grid; chunk by chunk in the order of the rows."""
+
+    def __init__(self, motion: Motion, angles: Sequence[Coordinate], curve: Curve | None) -> None:
+        self.mechanism, self.poses, self.angles, self.curve = motion.mechanism, motion.poses, angles, curve
+        self._last = np.zeros(len(angles))
+
+    def near(self, rows: Ints, configuration: Configuration) -> dict[str, Floats]:
+        if self.curve is None or not self.angles:
+            return {}
+        if len(self.poses.grid) > 1:
+            table = self._grid[:, rows]
+        else:
+            line, s = np.divmod(rows, self.poses.line)
+            table = np.nan_to_num(self.curve.beside(line, s.astype(float)))
+            if self.curve.spent.any():
+                # Of a motion that is not followed between its poses an angle goes the nearest way.
+                table = np.where(self.curve.spent[line], self._nearest(configuration), table)
+        return dict(zip((angle.name for angle in self.angles), table, strict=True))
+
+    def _nearest(self, configuration: Configuration) -> Floats:
+        """Angles of poses, each in the turn that is nearest to the pose before it."""
+        table = np.empty((len(self.angles), *configuration.shape))
+        for k, angle in enumerate(self.angles):
+            values = np.array(np.broadcast_to(configuration.value(angle), configuration.shape))
+            valid = np.isfinite(values)
+            values[valid] = np.unwrap(np.append(self._last[k], values[valid]), period=angle.turn)[1:]
+            table[k], self._last[k] = values, values[valid][-1] if valid.any() else self._last[k]
+        return table
+
+    @cached_property
+    def _grid(self) -> Floats:
+        """Angles of a grid of rows, without whole turns between its lines; drives within their limits."""
+        mechanism, poses, curve = self.mechanism, self.poses, self.curve
+        assert curve is not None
+        line, s = np.divmod(np.arange(poses.count), poses.line)
+        table = curve.turned(line, s.astype(float))
+        table[:, ~curve.holds(line, s.astype(float))] = np.nan
+        for angle, values in zip(self.angles, table, strict=True):
+            for axis in range(len(poses.grid) - 2, -1, -1):
+                # Each design of several has a grid of its own.
+                for stack in values.reshape(-1, poses.grid[axis], math.prod(poses.grid[axis + 1 :])):
+                    for before, block in pairwise(stack):
+                        jump = (block - before)[np.isfinite(block - before)][:1]
+                        block -= angle.turn * np.round(jump / angle.turn).sum()
+            if angle.name in mechanism.drives:
+                lines = values.reshape(poses.designs, -1)
+                finite = np.isfinite(lines)
+                begin = np.take_along_axis(lines, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
+                least, most = (f(np.where(finite, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
+                sizes = {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
+                turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, sizes))
+                values += TURN * np.repeat(turns, lines.shape[1])
+        return np.nan_to_num(table)
+
+
+def anchors_of(motion: Motion, plan: Plan, curve: Curve | None = None) -> Anchors | None:
+    """Poses that count turns along the motions that some poses are; None where turns do not count, and of places."""
+    if not plan.angles or motion.poses.listed or motion.poses.regions:
+        return None
+    return Anchors(motion, plan) if curve is None else curve.anchors
+
+
+def _alone(poses: Poses, group: PoseGroup, piece: slice) -> Poses:
+    """Some poses of a group by themselves."""
+    alone = Poses.single({name: column[piece] for name, column in group.values.items()})
+    return replace(alone, places=dimensions(poses, group.rows[piece]))
+
+
+def dimensions(poses: Poses, rows: Ints | slice) -> dict[str, Floats]:
+    """Dimensions of the designs that some poses belong to, where they differ from the nominal ones; shape of `rows`."""
+    return {name: values[rows] for name, values in poses.places.items()}
+
+
+def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | None:
+    """Where poses of other designs without a closed form start, see `begun`; shape of `rows`."""
+    if not poses.places:
+        return None
+    per_design = poses.count // poses.designs
+    designs, which = np.unique(rows // per_design, return_inverse=True)
+    return begun(mechanism, dimensions(poses, designs * per_design)).take(which.reshape(rows.shape))
+
+
+def solve_rows(motion: Motion, rows: Ints) -> Configuration:
+    """Poses that give the same coordinates.
+
+    Raises
+    ------
+    MechdesignError
+        Where these do not determine the mechanism.
+    """
+    poses = motion.poses
+    names = next(group.names for group in poses.groups if rows[0] in group.rows)
+    plan = motion.mechanism.plan(names)
+    given = zip(plan.structure.given, names, strict=True)
+    values = [radians(motion.units, coordinate, poses.values[name][rows]) for coordinate, name in given]
+    anchors = anchors_of(motion, plan)
+    return plan.solve(values, start=None if anchors is None else anchors.at(*np.divmod(rows, poses.line)))
