@@ -27,8 +27,6 @@ from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
 
-HELP_PAGE = "howto/batch"
-
 # Changes that are told as messages.
 _SAID = ("stale",)
 _SHOWN = 12  # digits of a hash

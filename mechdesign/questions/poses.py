@@ -34,8 +34,6 @@ from mechdesign.study.poses import TIME, PoseGroup, Poses
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.work.chunks import map_chunks, worker_count
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 POSES_AT_ONCE = 65536
 # Threads that solve poses of a long motion: what is made of them is one thread's work, and more would fill the memory.

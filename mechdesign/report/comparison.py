@@ -26,8 +26,6 @@ from mechdesign.results import Table
 from mechdesign.study.text.document import leaves
 from mechdesign.terms import command_of
 
-HELP_PAGE = "howto/batch"
-
 DRAWN = ("histogram.csv", "samples.csv")
 # Rounding error of zeros, as a part of the largest number of the same unit in a table.
 ROUNDING = 1e-12

@@ -21,8 +21,6 @@ from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, 
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "reference/study/kinematics"
-
 
 @dataclass(frozen=True, eq=False)
 class Numbers:

@@ -17,8 +17,6 @@ from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
 
-HELP_PAGE = "howto/motion_laws"
-
 # Times that differ by less than this part of the whole time are the same.
 SAME_TIME = 1e-9
 # Part of the whole time below which that of a segment is a slip.

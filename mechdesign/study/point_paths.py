@@ -23,8 +23,6 @@ from mechdesign.study.text.fields import APART, MIN_NUMBER
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Pieces of a spline between two of its points whose lengths are added up.
 SPLINE_PIECES = 64
 # Steps of a path that differ by less than this part of them go on evenly.

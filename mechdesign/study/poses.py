@@ -15,8 +15,6 @@ from mechdesign.study.point_paths import PointPath, between
 from mechdesign.study.text import fields
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "reference/study/kinematics"
-
 MAX_POSES = 10_000_000
 # What is swept along a motion over time.
 TIME = "time"

@@ -20,8 +20,6 @@ from mechdesign.work import interrupts
 from mechdesign.work.pool import ChunkMap, Pool
 from mechdesign.work.processes import forked
 
-HELP_PAGE = "reference/commands"
-
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
