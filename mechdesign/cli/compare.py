@@ -19,7 +19,7 @@ from mechdesign.errors import StudyError, counted
 from mechdesign.files import FORMATS, digest
 from mechdesign.records import check_replaceable
 from mechdesign.report import comparison, manifest, requirements, writer
-from mechdesign.report.comparison import Comparison, Difference, Tolerance
+from mechdesign.report.comparison import Comparison, Difference, Allowance
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
 from mechdesign.results import Result
@@ -30,7 +30,7 @@ from mechdesign.work.threads import one_thread
 # Changes that are told as messages.
 _SAID = ("stale",)
 _SHOWN = 12  # digits of a hash
-_EXACTLY = Tolerance(0.0, 0.0)
+_EXACTLY = Allowance(0.0, 0.0)
 
 
 def compare(
@@ -56,7 +56,7 @@ def compare(
         raise StudyError("--rtol and --atol take numbers from 0 on")
     if junit is not None:
         check_replaceable(junit)
-    found = comparison.compare(old, new, Tolerance(rtol, atol))
+    found = comparison.compare(old, new, Allowance(rtol, atol))
     return _tell(found, "compare", junit, as_json=json, quiet=quiet)
 
 
