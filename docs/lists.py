@@ -1,4 +1,4 @@
-"""Pages of the reference: keys of the study, tables, indices, words, exit codes, messages, from `mechdesign.reference`.
+"""Pages of the reference: keys of the study, tables, indices, words, exit codes, warnings, from `mechdesign.reference`.
 
 What `mechdesign docs WORD` prints in a terminal stands here, a page a subject.
 """
@@ -6,7 +6,7 @@ What `mechdesign docs WORD` prints in a terminal stands here, a page a subject.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import groupby
@@ -17,7 +17,6 @@ import yaml
 from mechdesign.cautions import KINDS
 from mechdesign.mechanism.configuration import REASONS
 from mechdesign.reference import Entry, entries, tables
-from mechdesign.reference.messages import PART, messages
 from mechdesign.results import TableKind
 
 # Sections of the study with a page each, in the order of the format; keys that stand alone share one.
@@ -37,14 +36,6 @@ LISTS = {
         (),
     ),
     "exit_codes": ("Exit codes", "What a command ends with; of several questions the largest.", ("exit code",)),
-}
-# Messages of a page: title, and exit codes.
-MESSAGES: dict[str, tuple[int | None, ...]] = {
-    "Errors in the study or the command (exit code 2)": (2,),
-    "The mechanism cannot do it (exit code 3)": (3,),
-    "Failures (exit code 4)": (4,),
-    "Warnings: the results are there": (None,),
-    "Parts of messages, and further texts": (PART,),
 }
 DOCS = Path(__file__).parent
 LINE = 80  # characters of a line of an example
@@ -180,12 +171,9 @@ def table_page(command: str, found: Iterable[TableKind]) -> str:
     return _page(f"Tables of {command}", parts)
 
 
-def messages_page(known: Mapping[str, str]) -> str:
-    """The page of errors and warnings; titles of other pages are those of `known`, or of files of the site."""
+def messages_page() -> str:
+    """The page of kinds of warnings, and of reasons why poses fail."""
     parts = [
-        "Every error and warning, under the page that tells more of what it is about; `…` stands for what differs. "
-        "`mechdesign docs TEXT` finds those that contain a text, for example "
-        '`mechdesign docs "singular position"`, or a whole message as it was printed.',
         "An error of a study begins with the file, the line, the column and the key; `mechdesign docs KEY` has what "
         "the key takes and an example. One of an option begins with it; `mechdesign COMMAND --help` lists them. "
         "Exit codes are those of [](exit_codes.md): with 2 nothing was computed.",
@@ -198,19 +186,7 @@ def messages_page(known: Mapping[str, str]) -> str:
         "A listed pose that fails ends with exit code 3, one of a sweep is a warning. The reasons:",
         "\n".join(reasons),
     ]
-    for page, about in groupby(messages(), key=lambda message: message.page):
-        text = known.get(f"{page}.md") or (DOCS / f"{page}.md").read_text(encoding="utf-8")
-        heading = text.partition("\n")[0].partition("# ")[2]
-        parts += [f"## {heading or page.rpartition('/')[2].capitalize()}", f"See [](../../{page}.md)."]
-        told = list(about)
-        for title, codes in MESSAGES.items():
-            lines = [
-                f"- {code(each.text)}" + f" ([{each.kind}](#kinds-of-warnings))" * bool(each.kind)
-                for each in told if each.code in codes
-            ]  # fmt: skip
-            if lines:
-                parts += [f"**{title}**", "\n".join(lines)]
-    return _page("Messages", parts)
+    return _page("Errors and warnings", parts)
 
 
 @cache
@@ -241,5 +217,5 @@ def pages() -> dict[str, str]:
     for name, (title, before, kinds) in LISTS.items():
         found = [entry for entry in known if (entry.kind in kinds if kinds else entry.kind not in _APART)]
         text[f"reference/lists/{name}.md"] = listed(title, before, found)
-    text["reference/lists/messages.md"] = messages_page(text)
+    text["reference/lists/messages.md"] = messages_page()
     return text

@@ -17,9 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-HELP_PAGE = "reference/commands"
-
-
 EXIT_CODES = {
     0: "done, every requirement met",
     1: "done, a requirement not met",

@@ -27,8 +27,6 @@ from mechdesign.functions import (
 from mechdesign.notation import Called, ExpressionError, Parser, Step, call_steps, constant_step
 from mechdesign.numerics.arrays import Floats
 
-HELP_PAGE = "reference/expressions"
-
 Number = float | Floats
 
 # Powers up to this have no narrow peaks.

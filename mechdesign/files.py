@@ -16,8 +16,6 @@ from typing import TextIO
 
 from mechdesign.errors import OutputError, StudyError
 
-HELP_PAGE = "reference/commands"
-
 try:
     import fcntl
 except ImportError:

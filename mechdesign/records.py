@@ -15,8 +15,6 @@ from pathlib import Path
 from mechdesign.errors import StudyError
 from mechdesign.files import check_unread, digest, flowing, foreign, lock, replace, unlinked
 
-HELP_PAGE = "reference/commands"
-
 _RECORD = ".mechdesign.json"  # in each folder with such files: their digests by their names
 
 

@@ -28,8 +28,6 @@ from mechdesign.statistics import (
     no_value_along,
 )  # fmt: skip
 
-HELP_PAGE = "reference/study/requirements"
-
 # Number of a column's values that a message names.
 MOST_VALUES = 12
 # Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.

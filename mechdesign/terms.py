@@ -17,8 +17,6 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Result
 from mechdesign.rows import Chosen, UnknownColumnError, amount_in, choose, named
 
-HELP_PAGE = "theory/optimize"
-
 # The path of one column.
 _PATH = re.compile(r"[\w.]+")
 # A command, in front of the path of a column.

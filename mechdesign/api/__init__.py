@@ -1,3 +1,1 @@
 """The Python interface: studies and results that show themselves in notebooks, and the questions as functions."""
-
-HELP_PAGE = "howto/notebook"

@@ -1,3 +1,1 @@
 """The command line: commands, exit codes, tables on the terminal, files. No numerics."""
-
-HELP_PAGE = "reference/commands"

@@ -20,7 +20,7 @@ from mechdesign.errors import StudyError, counted
 from mechdesign.files import FORMATS, digest
 from mechdesign.records import check_replaceable
 from mechdesign.report import comparison, manifest, requirements, writer
-from mechdesign.report.comparison import Comparison, Difference, Tolerance
+from mechdesign.report.comparison import Allowance, Comparison, Difference
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
 from mechdesign.results import Result
@@ -28,12 +28,10 @@ from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
 
-HELP_PAGE = "howto/batch"
-
 # Changes that are told as messages.
 _SAID = ("stale",)
 _SHOWN = 12  # digits of a hash
-_EXACTLY = Tolerance(0.0, 0.0)
+_EXACTLY = Allowance(0.0, 0.0)
 
 
 def compare(
@@ -59,7 +57,7 @@ def compare(
         raise StudyError("--rtol and --atol take numbers from 0 on")
     if junit is not None:
         check_replaceable(junit)
-    found = comparison.compare(old, new, Tolerance(rtol, atol))
+    found = comparison.compare(old, new, Allowance(rtol, atol))
     return _tell(found, "compare", junit, as_json=json, quiet=quiet)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,16 +12,15 @@ import typer
 
 from mechdesign.cli.terminal import emit_words
 from mechdesign.errors import AssemblyError, StudyError, explain
-from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
+from mechdesign.mechanism.configuration import REASONS
+from mechdesign.reference import Entry, below, entries, find, holding, near, place
 
 _INDENT = "  "
 # Most keys named in the hint below a study's mistakes.
 _NAMED = 3
-# Three words or more without a name or a number.
-_WORDS = re.compile(r"(?<![\w.])[a-z]+(?: [a-z]+){2,}(?![\w.])")
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a column, a command, an option, one of the words below, or a part of a message (in quotes)."
+    "part (sweep), a column, a command, an option, one of the words below, or a text to look for (in quotes)."
 )
 
 
@@ -35,7 +33,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
         If a word is not known; the message names the nearest.
     """
     index = entries(commands(group))
-    matches = [(word, find(index, word) or [*holding(index, word), *find_messages(word)]) for word in words]
+    matches = [(word, find(index, word) or holding(index, word)) for word in words]
     for word, hits in matches:
         if not hits:
             close = near(index, word)
@@ -56,9 +54,9 @@ def explained(error: Exception) -> tuple[int, str]:
 
 
 def look_up(message: str) -> str:
-    """The command that explains a message, found by its first three or more words without a name or a number."""
-    words = _WORDS.search(message)
-    return f"(mechdesign docs {words[0]!r})" if words else ""
+    """The command that explains why a pose fails, by the reason in a message."""
+    reason = next((reason for reason in REASONS if reason in message), "")
+    return f"(mechdesign docs {reason!r})" if reason else ""
 
 
 def commands(group: Mapping[str, Any]) -> Iterator[Entry]:

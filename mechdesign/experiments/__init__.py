@@ -1,3 +1,1 @@
 """Whole studies as a design of experiments: cases of a study, answered one by one."""
-
-HELP_PAGE = "howto/sweep"

@@ -29,8 +29,6 @@ from mechdesign.study.text.units import Amount, QuantityError, Units
 from mechdesign.study.variants import Changes, entry_unit
 from mechdesign.work.threads import one_thread
 
-HELP_PAGE = "howto/sensitivities"
-
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
 # Relative error from which on a derivative is uncertain, unless the change over a step is less than this part of the

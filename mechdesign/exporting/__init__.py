@@ -1,3 +1,1 @@
 """Files for other tools: parts to cut, drawings, the layers of a stack; each is declared where it is made."""
-
-HELP_PAGE = "howto/export"

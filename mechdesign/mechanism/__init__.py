@@ -5,6 +5,4 @@ from mechdesign.mechanism.mechanism import Mechanism, Pose
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
 
-HELP_PAGE = "reference/study/mechanism"
-
 __all__ = ["Configuration", "Description", "Mechanism", "Plan", "Pose", "Reason"]

@@ -19,8 +19,6 @@ from mechdesign.study.designs import Designs
 from mechdesign.study.expansion import OWN, Numbers, default, expand, number_of_poses
 from mechdesign.study.schema.poses import PoseSection
 
-HELP_PAGE = "reference/study/kinematics"
-
 
 def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
     """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked, of the study's own design or of some.

@@ -3,8 +3,7 @@
 from mechdesign.reference.entries import Entry
 from mechdesign.reference.keys import place
 from mechdesign.reference.lookup import below, find, holding, near
-from mechdesign.reference.messages import find_messages
 from mechdesign.reference.sources import entries
 from mechdesign.reference.tables import tables
 
-__all__ = ["Entry", "below", "entries", "find", "find_messages", "holding", "near", "place", "tables"]
+__all__ = ["Entry", "below", "entries", "find", "holding", "near", "place", "tables"]

@@ -10,6 +10,7 @@ from itertools import chain
 from mechdesign.errors import EXIT_CODES
 from mechdesign.functions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
+from mechdesign.mechanism.configuration import REASONS
 from mechdesign.reference import keys, synonyms, tables
 from mechdesign.reference.entries import Entry
 from mechdesign.statistics import STATISTICS as WORDS
@@ -70,6 +71,12 @@ def units() -> Iterator[Entry]:
             yield Entry(written, kind, text, where=("units",) if meaning.startswith("[") else ())
 
 
+def reasons() -> Iterator[Entry]:
+    """Reasons why a pose fails, with what helps."""
+    for reason, cure in REASONS.items():
+        yield Entry(reason, "why a pose fails", cure)
+
+
 def exit_codes() -> Iterator[Entry]:
     """Exit codes of the command."""
     for code, meaning in EXIT_CODES.items():
@@ -78,7 +85,7 @@ def exit_codes() -> Iterator[Entry]:
 
 # One function for each kind of word.
 SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (
-    keys.entries, terms, indices, results, tables.entries, expressions, units, exit_codes, synonyms.entries,
+    keys.entries, terms, indices, results, tables.entries, expressions, units, reasons, exit_codes, synonyms.entries,
 )  # fmt: skip
 
 

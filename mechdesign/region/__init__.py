@@ -1,3 +1,1 @@
 """The region of the plane that a point can reach, by rays about a centre. Imports none of the questions."""
-
-HELP_PAGE = "theory/workspace"

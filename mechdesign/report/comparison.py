@@ -26,8 +26,6 @@ from mechdesign.results import Table
 from mechdesign.study.text.document import leaves
 from mechdesign.terms import command_of
 
-HELP_PAGE = "howto/batch"
-
 DRAWN = ("histogram.csv", "samples.csv")
 # Rounding error of zeros, as a part of the largest number of the same unit in a table.
 ROUNDING = 1e-12
@@ -39,7 +37,7 @@ _MOST_ENTRIES = 4  # of the study, that a note names
 Change = Literal["moved", "missing", "new", "unit", "bytes", "stale", "not met"]
 
 
-class Tolerance(NamedTuple):
+class Allowance(NamedTuple):
     """A number is as it was within ``atol + rtol * |old|``."""
 
     rtol: float
@@ -116,7 +114,7 @@ class Comparison:
 
     def add(
         self, folder: str, old: tuple[Path, Mapping[str, Any]], new: tuple[Path, Mapping[str, Any]],
-        tolerance: Tolerance, *, illegible: bool = False,
+        tolerance: Allowance, *, illegible: bool = False,
     ) -> None:  # fmt: skip
         """Add the differences of two results of a command, folder and manifest each.
 
@@ -144,7 +142,7 @@ class Comparison:
             self.differences += compare_tables(*pair, tolerance, folder)
 
 
-def compare(old: Path, new: Path, tolerance: Tolerance) -> Comparison:
+def compare(old: Path, new: Path, tolerance: Allowance) -> Comparison:
     """Compare two folders of results, of one command or of many, whose folders are matched by their paths.
 
     Raises
@@ -246,7 +244,7 @@ def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table
         raise StudyError(message) from None
 
 
-def compare_tables(old: Table, new: Table, tolerance: Tolerance, folder: str = ".") -> Iterator[Difference]:
+def compare_tables(old: Table, new: Table, tolerance: Allowance, folder: str = ".") -> Iterator[Difference]:
     """Differences of two tables of a folder.
 
     Rows are the same where their keys are: what varies in a sweep, else as many of the leading columns as tell the rows

@@ -22,8 +22,6 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.versions import installed
 
-HELP_PAGE = "howto/report"
-
 NAME = "manifest.json"
 _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"

@@ -22,8 +22,6 @@ from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named
 
-HELP_PAGE = "reference/study/requirements"
-
 Bounds = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
 # Place of a verdict where the motion never enters the part that a requirement is about.

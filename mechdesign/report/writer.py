@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from mechdesign.report.figures.before import Before
 
-HELP_PAGE = "howto/report"
-
 DIMENSIONS = "dimensions"  # of `check`
 _GIGABYTE = 1e9  # bytes
 _UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from mechdesign.study.templates import template_path as template_path
     from mechdesign.study.text.units import Units as Units
 
-HELP_PAGE = "reference/study/index"
-
 _HOMES = {
     **dict.fromkeys(("Study", "load"), "loading"),
     **dict.fromkeys(("template", "template_path"), "templates"),

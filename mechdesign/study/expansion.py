@@ -24,8 +24,6 @@ from mechdesign.study.text.tables import table_of
 from mechdesign.study.text.units import Amount
 from mechdesign.study.timed import number_of_instants, program
 
-HELP_PAGE = "reference/study/kinematics"
-
 
 @dataclass(frozen=True, eq=False)
 class Numbers:

@@ -16,8 +16,6 @@ from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.tables import table_of
 
-HELP_PAGE = "howto/motion_laws"
-
 # Part of the whole time below which that of a segment is a slip.
 SHORTEST = 1e-6
 

@@ -16,8 +16,6 @@ from typing import TypeVar
 from mechdesign.commands import MAX_JOBS
 from mechdesign.work.pool import ChunkMap, Pool
 
-HELP_PAGE = "reference/commands"
-
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 

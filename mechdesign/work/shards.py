@@ -25,8 +25,6 @@ from mechdesign.errors import OutputError, StudyError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.records import remove_recorded, write_recorded
 
-HELP_PAGE = "howto/cluster"
-
 Item = TypeVar("Item")
 Block = tuple[Floats, str]
 """Answers of a batch: a row of numbers for each case, and what is not a number."""

@@ -20,9 +20,8 @@ from helpers.tables import named, unsaid
 
 import mechdesign
 from mechdesign.cautions import KINDS
-from mechdesign.errors import AssemblyError, MechdesignError
+from mechdesign.errors import AssemblyError
 from mechdesign.reference import entries, tables
-from mechdesign.reference.messages import PLACE, find_messages, messages
 from mechdesign.results import Result
 
 ROOT = Path(__file__).parents[2]
@@ -195,60 +194,10 @@ def test_every_table_and_column_of_answers_is_made_by_its_declaration():
     assert made == []
 
 
-def test_warnings_of_shipped_studies_are_messages_of_the_reference():
-    told = {
-        warning["message"]
-        for path in (ROOT / "results").rglob("manifest.json")
-        for warning in json.loads(path.read_text(encoding="utf-8"))["warnings"]
-    }
-    assert told
-    assert [warning for warning in told if not find_messages(warning)] == []
-
-
-@pytest.mark.parametrize(
-    ("change", "code"),
-    [
-        ("mechanism.links.crank=[O, Q, 30]", 2),
-        ("mechanism.drives=[crank, rod]", 2),
-        ("mechanism.links.crank=[O, A, 30 furlong]", 2),
-        ("mechanism.links.crank=[O, A, 3*(2]", 2),
-        ("kinematics.sweep={crank: {from: 0, to: 360, step: -5}}", 2),
-        ("kinematics.rate={crank: 1}", 2),
-        ("reliability={dimensions: {rod.length: {tolerance: h77}}}", 2),
-    ],
-)
-def test_what_a_wrong_study_is_told_is_a_message_of_the_reference(change, code):
-    with pytest.raises(MechdesignError) as raised:
-        mechdesign.kinematics(study_of(FOUR_BAR, change))
-    problems = getattr(raised.value, "problems", None)
-    for words in [problem.message for problem in problems] if problems else [str(raised.value)]:
-        assert find_messages(words), words
-    assert raised.value.exit_code == code
-
-
-def test_messages_are_texts():
-    assert len(messages()) > 300
-    plain = [told.text.lower().replace(PLACE, "") for told in messages()]
-    assert [text for text in plain if not re.search("[a-z]{2,}[,;:')]* +['(]?[a-z]", text)] == []
-    assert all(told.kind in KINDS for told in messages() if told.code is None and told.kind)
-
-
-def test_every_message_names_a_page_of_the_documentation():
-    assert [told.text for told in messages() if not told.page] == [], "give the module a HELP_PAGE"
-    pages = {told.page for told in messages()} | {kind.page for kind in KINDS.values()}
+def test_every_kind_of_warning_names_a_page_of_the_documentation():
     made = lists.pages()
+    pages = [kind.page for kind in KINDS.values()]
     assert [page for page in pages if f"{page}.md" not in made and not (ROOT / "docs" / f"{page}.md").exists()] == []
-
-
-def test_a_message_is_found_with_what_mends_it():
-    (dead,) = find_messages("3 poses are at a dead centre: B.x stands still there, and det_J is 0")
-    assert "det_J is 0" in dead.word
-    assert "kind singular" in dead.text
-    assert "shall turn back" in dead.text
-    (many,) = find_messages("a sweep of more than 10,000,000 poses; take a larger step")
-    assert "larger step" in many.word
-    (pose,) = find_messages("pose crank = 30 deg: cannot be assembled")
-    assert "change a length" in pose.text
 
 
 def test_the_pages_have_every_word():

@@ -22,8 +22,6 @@ from mechdesign.study.text.document import KeyPath, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 
-HELP_PAGE = "howto/sweep"
-
 # The column of a file of cases that names them.
 LABEL = "label"
 # Most cases of one study.

@@ -11,8 +11,6 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.text import fields
 
-HELP_PAGE = "howto/sensitivities"
-
 
 def _name(raw: Any, _context: fields.Context) -> str:
     if not isinstance(raw, str):

@@ -1,3 +1,1 @@
 """What drives it, what does it bear? Efforts of the drives, forces in the joints, shaking forces and energies."""
-
-HELP_PAGE = "theory/dynamics"

@@ -28,7 +28,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "theory/dynamics"
 # Columns of a mechanism with friction, without units.
 EFFICIENCIES = ("efficiency", "back_efficiency")
 

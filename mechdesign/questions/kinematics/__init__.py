@@ -1,3 +1,1 @@
 """How does it move? Positions, rates, limits of motion and loops."""
-
-HELP_PAGE = "theory/kinematics"

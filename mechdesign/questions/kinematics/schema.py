@@ -17,8 +17,6 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Drawn where they are asked for.
 PICTURES = {"polygons": "velocity and acceleration polygons of a few poses, or of the listed ones"}
 

@@ -1,3 +1,1 @@
 """Which dimensions are best? Designs, their goals and the ways to look for the best one."""
-
-HELP_PAGE = "theory/optimize"

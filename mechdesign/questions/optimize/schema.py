@@ -19,8 +19,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure, shown
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "theory/optimize"
-
 _METHODS = {
     "grid": "every design of the steps and choices of the variables",
     "search": "global search over ranges and choices, for each row of weights",

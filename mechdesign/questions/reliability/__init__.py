@@ -1,3 +1,1 @@
 """How precise is it once it is made? Sources of error, first-order errors and simulation."""
-
-HELP_PAGE = "theory/reliability"

@@ -23,8 +23,6 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import failure
 
-HELP_PAGE = "theory/reliability"
-
 # Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].
 SIGMAS = 3.0
 

@@ -1,3 +1,1 @@
 """How stiff is it? Legs, screws and compliance."""
-
-HELP_PAGE = "theory/stiffness"

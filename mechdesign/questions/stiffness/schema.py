@@ -19,8 +19,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "theory/stiffness"
-
 # Keys of each form of cross-section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}

@@ -1,3 +1,1 @@
 """Where can it work? Regions, their boundaries and what an index is worth in them."""
-
-HELP_PAGE = "theory/workspace"

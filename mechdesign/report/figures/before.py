@@ -8,8 +8,6 @@ from mechdesign.errors import StudyError
 from mechdesign.results import Result
 from mechdesign.study import Study
 
-HELP_PAGE = "howto/report"
-
 # Commands whose pictures can show it.
 COMMANDS = ("kinematics", "workspace")
 

@@ -8,8 +8,6 @@ from typing import Any
 from mechdesign.errors import OutputError, printable_lines
 from mechdesign.records import remove_recorded
 
-HELP_PAGE = "howto/report"
-
 REPORT = "report.html"
 PRINTED = "report.pdf"
 INDEX = "index.html"

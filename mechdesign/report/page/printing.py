@@ -11,8 +11,6 @@ from tempfile import TemporaryDirectory
 
 from mechdesign.errors import OutputError, StudyError
 
-HELP_PAGE = "howto/report"
-
 # Names on the search path, and where macOS and Windows install them.
 BROWSERS = (
     "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge",

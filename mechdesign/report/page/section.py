@@ -24,8 +24,6 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.table_text import readable
 
-HELP_PAGE = "howto/report"
-
 # Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8

@@ -1,3 +1,1 @@
 """From the sections of a study to the mechanism that they describe."""
-
-HELP_PAGE = "reference/study/mechanism"

@@ -24,8 +24,6 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
 from mechdesign.terms import command_of, sum_of
 
-HELP_PAGE = "theory/optimize"
-
 # Commands that need their section in the study.
 _UNASSUMED = ("reliability", "stiffness")
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from mechdesign.experiments.schema.matrix import MatrixSection
     from mechdesign.questions.optimize.schema import OptimizeSection
 
-HELP_PAGE = "theory/optimize"
-
 # Sections whose entries may be design variables.
 _DESIGNED = ("mechanism", *(command for command in COMMANDS if command != "optimize"))
 

@@ -19,8 +19,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_expression, read_number
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Ending of a coordinate's name that stands for its velocity in an expression.
 VELOCITY = "_velocity"
 

@@ -15,8 +15,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 from mechdesign.study.text.inputs import file_of
 
-HELP_PAGE = "howto/motion_laws"
-
 # More are no study that a person reads: a file holds them.
 MAX_SEGMENTS = 10_000
 _RIGHT = "[{from: 0, to: 90, time: 0.3}, {dwell: 0.1}]"

@@ -16,8 +16,6 @@ from mechdesign.study.text.fields import Context, failure, read_number, read_row
 from mechdesign.study.text.inputs import file_of
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Default numbers of poses: of a circle (steps of 5 deg); of a line or an arc, both ends included.
 CIRCLE_POSES = 72
 LINE_POSES = 51

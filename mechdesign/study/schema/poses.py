@@ -17,8 +17,6 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 
-HELP_PAGE = "reference/study/kinematics"
-
 # Default number of poses of a motion over time.
 INSTANTS = 181
 

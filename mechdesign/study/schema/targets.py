@@ -20,8 +20,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.reporter import Reporter
 
-HELP_PAGE = "theory/kinematics"
-
 ROOT: KeyPath = ("mechanism", "targets")
 
 

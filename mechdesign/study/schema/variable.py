@@ -11,8 +11,6 @@ from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY
 
-HELP_PAGE = "theory/optimize"
-
 LIST_FORM: fields.Form = {"type": "array", "items": {"title": "value"}}
 
 

@@ -20,8 +20,6 @@ from mechdesign.errors import nearest
 from mechdesign.expressions import Expression, Number
 from mechdesign.study.text.unit_table import Powers, listed, unit_value
 
-HELP_PAGE = "reference/expressions"
-
 KINDS: dict[str, Powers] = {
     "none": (0, 0, 0, 0),
     "length": (1, 0, 0, 0),

@@ -20,8 +20,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import QuantityError
 
-HELP_PAGE = "theory/reliability"
-
 # Grades used by default, and the largest grade.
 USUAL = tuple(f"IT{number}" for number in range(5, 13))
 _MOST_GRADE = 18

@@ -18,8 +18,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import kind_of
 
-HELP_PAGE = "theory/reliability"
-
 PIN_MODELS = {
     "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end, of a coupling "
     "half its backlash",

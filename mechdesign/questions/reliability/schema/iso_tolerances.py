@@ -17,8 +17,6 @@ from numpy.typing import ArrayLike
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats
 
-HELP_PAGE = "theory/reliability"
-
 
 class ToleranceClassError(ValueError):
     """No such tolerance class, or not for this size; the message names those there are."""

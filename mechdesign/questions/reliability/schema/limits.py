@@ -11,8 +11,6 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import Amount
 
-HELP_PAGE = "theory/reliability"
-
 # Endings of the names of positions, velocities and accelerations.
 SUFFIXES = ("", "_velocity", "_acceleration")
 

@@ -31,8 +31,6 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
-HELP_PAGE = "theory/reliability"
-
 # Names as those of columns of dynamics.
 _LIKE_A_COLUMN = re.compile(r"_(effort|power|energy|force(_on_\w+)?)$|^shaking")
 

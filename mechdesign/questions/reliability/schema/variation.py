@@ -30,8 +30,6 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount, QuantityError
 
-HELP_PAGE = "theory/reliability"
-
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 # Least number of measured values.
