@@ -14,8 +14,8 @@ array([54.   , 27.547, 55.587, 62.41 ])
 In a notebook a study and a result show themselves; ``result.figure("paths")`` is one of its pictures, `figures` their
 names, `verdicts` what is met of what the study requires, and ``result.save("folder")`` writes what the command writes.
 
-Every question takes a `seed` of its random numbers in place of the study's own (0 is a seed); `jobs`, threads or
-processes to compute on (None: every processor), on which no result depends; and a `progress` that is told how far the
+Every question takes a `seed` of its random numbers in place of the study's own (0 is a seed); `jobs`, processes to
+compute on (None: one for each processor), on which no result depends; and a `progress` that is told how far the
 computation is. A `journal` keeps what is finished of a long one that is interrupted, and gives it when it begins anew.
 
 The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics. Here nothing is

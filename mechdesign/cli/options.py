@@ -142,7 +142,7 @@ JOBS = _text(
     int,
     "--jobs",
     "N",
-    "Threads to compute on, or studies at a time; the results do not depend on it. Default: every processor.",
+    "Processes to compute on, or studies at a time; the results do not depend on it. Default: one for each processor.",
     min=1,
     max=MAX_JOBS,
 )

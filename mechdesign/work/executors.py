@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import importlib
 import logging
-import math
 import os
 import signal
-import socket
 import sys
 import time
 from concurrent.futures import CancelledError, Executor, Future, wait
 from itertools import chain
 from typing import Any
-from urllib.parse import urlsplit
 
 from mechdesign.errors import StudyError, counted
 from mechdesign.work import interrupts
@@ -21,22 +18,9 @@ from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK, LostWorkerError, Pool
 
 LOCAL = "local"
-_PORT = 8786  # of a scheduler, if the address has none
 # Seconds after which a scheduler that does not answer is given up, and one without workers.
-_ANSWERS = 10
+_ANSWERS = 5
 _NO_WORKERS = 60
-# Upper bound of the bytes of a scheduler's first message.
-_MOST_FIRST = 2**20
-# Settings of a scheduler that is started here, whose clocks and profiles would take a twentieth of each processor.
-_OWN = {
-    "distributed.scheduler.allowed-failures": 0,  # chunks that end their workers are handled by `ChunkMap`
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.tick.cycle": "10s",
-    "distributed.worker.profile.enabled": False,
-    "distributed.scheduler.work-stealing-interval": "1s",
-}
-# Seconds after which the workers of a scheduler are counted again.
-_RECOUNT = 5.0
 
 
 def named(name: str, jobs: int | None) -> Pool:
@@ -91,7 +75,6 @@ class _Dask(Pool):
     """Workers of a dask scheduler, which replaces lost ones itself, at an address or started here."""
 
     threads = False
-    _counted, _threads = -math.inf, 0  # when the workers' threads were counted, and how many there were
 
     def __init__(self, name: str, address: str, jobs: int | None) -> None:
         try:
@@ -105,16 +88,10 @@ class _Dask(Pool):
             handler.setLevel(logging.CRITICAL + 1)
         try:
             if address == LOCAL:
-                with importlib.import_module("dask").config.set(_OWN):
-                    self._cluster = distributed.LocalCluster(
-                        n_workers=worker_count(jobs),
-                        threads_per_worker=1,
-                        dashboard_address="127.0.0.1:0",
-                        silence_logs=50,
-                        preload=[__name__],
-                    )
-            else:
-                _knock(address)
+                self._cluster = distributed.LocalCluster(
+                    n_workers=worker_count(jobs), threads_per_worker=1, dashboard_address="127.0.0.1:0",
+                    silence_logs=50, preload=[__name__],
+                )  # fmt: skip
             self._client: Any = distributed.Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
         except (OSError, ValueError, RuntimeError) as error:
             self._end()
@@ -137,13 +114,10 @@ class _Dask(Pool):
         return max(1, self._count())
 
     def _count(self) -> int:
-        if time.monotonic() - self._counted > _RECOUNT:
-            try:
-                self._threads = sum(self._client.nthreads().values())
-            except Exception as error:
-                raise self._gone() from error
-            self._counted = time.monotonic()
-        return self._threads
+        try:
+            return int(sum(self._client.nthreads().values()))
+        except Exception as error:
+            raise self._gone() from error
 
     def _gone(self) -> LostWorkerError:
         return LostWorkerError(
@@ -153,7 +127,7 @@ class _Dask(Pool):
     def outcome(self, future: Future[Any]) -> Any:
         """Wait for the value of a task, but not for ever on a scheduler without workers."""
         since = time.monotonic()
-        while not wait([future], min(LOOK, _RECOUNT)).done:
+        while not wait([future], LOOK).done:
             interrupts.check()
             if self._count():
                 since = time.monotonic()
@@ -177,15 +151,6 @@ class _Dask(Pool):
     def _end(self) -> None:
         if self._cluster is not None:
             self._cluster.close()
-
-
-def _knock(address: str) -> None:
-    """Raise an OSError if no scheduler answers, sooner than a client does, which tries again and again."""
-    place = urlsplit(address if "://" in address else f"tcp://{address}")
-    with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS) as stream:
-        # A scheduler sends the first message, which begins with its length.
-        if place.scheme == "tcp" and not 0 < int.from_bytes(stream.recv(8), "little") < _MOST_FIRST:
-            raise OSError("it does not answer as one")
 
 
 def dask_setup(worker: object) -> None:

@@ -235,7 +235,6 @@ def test_a_scheduler_that_will_not_answer_is_not_waited_for(monkeypatch, how):
                 raise OSError("connection closed")
             return {}
 
-    monkeypatch.setattr(executors, "_RECOUNT", 0.01)
     monkeypatch.setattr(executors, "_NO_WORKERS", 0.05)
     there = object.__new__(executors._Dask)
     there._name, there._client = "dask:tcp://there", Client()

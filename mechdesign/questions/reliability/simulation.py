@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -69,6 +69,11 @@ class Setting:
     scale: tuple[tuple[float, float], tuple[float, float]] | None = None
     followed: bool = False
 
+    @cached_property
+    def drives(self) -> dict[str, Value]:
+        """Nominal values of the drives."""
+        return {name: self.nominal.value(self.mechanism.coordinate(name)) for name in self.mechanism.drives}
+
     def narrowed(self) -> Setting:
         """The same pose with the limited channels only, which suffice for the limits."""
         channels, vectors = self.question.limited_channels, self.question.vectors
@@ -102,10 +107,8 @@ def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
 
 def solve(setting: Setting, made: Made) -> Configuration:
     """Made mechanisms at the pose, drives with their errors; angles at the turn nearest to the nominal pose."""
-    mechanism, nominal = setting.mechanism, setting.nominal
-    drives: list[Value] = [
-        nominal.value(mechanism.coordinate(name)) + made.drives.get(name, 0.0) for name in mechanism.drives
-    ]
+    nominal = setting.nominal
+    drives = [value + made.drives.get(name, 0.0) for name, value in setting.drives.items()]
     solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
     loads = [] if setting.forces is None else setting.forces.coordinates
     return solved.beside(nominal, [*setting.question.coordinates, *loads])

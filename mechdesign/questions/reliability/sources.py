@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from mechdesign.expressions import Number
+from mechdesign.mechanism.algebra import times
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED
@@ -257,7 +258,7 @@ class Sources:
                 continue
             for direction, part in zip(pin.directions, parts, strict=False):
                 for name, slope in direction.items():
-                    places[name] = places.get(name, nominal.get(name, 0.0)) + slope * part
+                    places[name] = places.get(name, nominal.get(name, 0.0)) + times(slope, part)
         parameters = {f"{FOLLOWED}{name}": value for name, value in by_kind["parameter"].items()}
         followed = {name for scalar in self.scalars for name in scalar.moves}
         parameters = {name: value for name, value in parameters.items() if name in followed}
