@@ -22,7 +22,6 @@ LEFT = 0.78
 BELOW = 0.55
 ABOVE = 0.12
 RIGHT = 0.15
-PLANE = "plane"  # label of axes whose places a page marks as the mechanism moves
 
 
 class Window(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Lines, Panel, Picture
+from mechdesign.report.figures.marks import Axis, Coloured, Lines, Own, Panel, Picture
 
 # Axes with a label that begins so are over a sweep or a path, whose label follows.
 OVER = "over "
+PLANE = "plane"  # label of axes whose places a page marks as the mechanism moves
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 _STEPS = (1, 2, 2.5, 5, 10)
@@ -27,12 +28,17 @@ _TITLE, _NOTE, _HEADING, _ASIDE, _LABEL, _WORD = 11.0, 8.5, 9.5, 8.5, 10.0, 8.0 
 # Inches: at the edges of a page, between what is separate, between a text and what it is of.
 _EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
 # Inches: the least width of panels by their kind, and the room beside them at first.
-_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "grid": 1.2, "": 2.0}
+_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "plane": 2.1, "grid": 1.2, "": 2.0}
 _BESIDE = 0.9
 # Inches: the height of a panel that stands alone, among up to so many below each other, among more, and the least.
 _ALONE, _SOME, _MORE, _MOST, _LOWEST = 2.6, 1.75, 1.5, 1.2, 0.7
 _MOST_SOME, _MOST_MORE = 4, 7
-_HIGHEST_MAP, _HIGHEST_OF_TWO, _MAP = 5.2, 3.8, 0.8  # inches; height over width of a map whose axes are not equal
+_HIGHEST_MAP, _HIGHEST_OF_TWO, _HIGHEST_PAGE, _MAP = (
+    5.6,
+    3.8,
+    7.6,
+    0.8,
+)  # inches; height over width of a map whose axes are not equal
 _STILL = 1e-6  # of its size, by which a curve changes that stands still
 _SLIVER = 0.45  # least height over width of axes of one scale
 _MARGIN = 0.08  # of the range, beyond curves from a given end
@@ -122,6 +128,9 @@ def draw(picture: Picture) -> Figure:
         left_below = x / style.width(), (y - cell.tall) / height
         cell.axes.set_position((*left_below, own / style.width(), cell.tall / height))
         _place(cell, left[cell.column])
+        for mark in cell.panel.marks:
+            if isinstance(mark, Own) and mark.late:
+                mark.draw(cell.axes)
     for words, size, down in heading:
         figure.text(_EDGE / style.width(), 1 - down / height, words, va="top", fontsize=size)
     return figure
@@ -168,6 +177,11 @@ def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
             continue
         row, column = divmod(k, columns)
         same_x, same_y = ("x" in picture.share or grid), ("y" in picture.share or grid)
+        beside = picture.panels[k + 1] if column + 1 < columns and k + 1 < len(picture.panels) else None
+        bars = {mark.bar for mark in (beside.marks if beside else ()) if isinstance(mark, Coloured)} - {""}
+        marks = [
+            Own(mark.function) if isinstance(mark, Coloured) and mark.bar in bars else mark for mark in panel.marks
+        ]
         axes = figure.add_axes(
             (0.1, 0.1, 0.5, 0.5), label=f"panel {k}", sharex=by_x.get(0 if everywhere else column) if same_x else None,
             sharey=by_y.get(0 if everywhere else row) if same_y else None,
@@ -178,7 +192,7 @@ def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
         outer_y = not same_y or not any(picture.panels[row * columns : k])
         # One that is left over is as wide as the page, unless it shares its axis or is a map.
         alone = k + 1 == len(picture.panels) and not (column or same_x or same_y or panel.kind == "map" or panel.equal)
-        yield _Cell(panel, axes, row, column, columns if alone else 1, outer_x, outer_y)
+        yield _Cell(replace(panel, marks=marks), axes, row, column, columns if alone else 1, outer_x, outer_y)
 
 
 def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, alone: bool) -> None:
@@ -192,8 +206,10 @@ def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, a
     # A narrow page has no room beside a panel that stands alone: it has the legend of the page.
     own = dict[str, Any]() if panel.legend and not (alone and style.narrow() and panel.legend == "beside") else entries
     for mark in panel.marks:
+        if isinstance(mark, Own) and mark.late:
+            continue
         handle = mark.draw(axes)
-        if handle is not None and mark.label:
+        if mark.label and handle is not None:
             # A straight line is no curve, also not among those that `lost_curves` of the tests looks at.
             handle.set_label("" if isinstance(mark, Lines) else mark.label)
             (entries if several[id(mark)] > 1 else own).setdefault(mark.label, handle)
@@ -209,6 +225,8 @@ def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, a
 def _end(cell: _Cell) -> None:
     """The ends of the axes of a panel, once all is drawn that shares them."""
     axes, panel = cell.axes, cell.panel
+    if panel.plane:
+        axes.grid(visible=False)
     if panel.bars or panel.y.words:
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
@@ -220,13 +238,13 @@ def _end(cell: _Cell) -> None:
         reach = float(axes.dataLim.y1) - low
         axes.set_ylim(top=max(axes.get_ylim()[1], low + (1 + _MARGIN) * reach))
     if panel.equal:
-        axes.set_aspect("equal", anchor="NW")
+        axes.set_aspect(panel.equal, anchor="NW")
         if panel.kind == "equal":
             _widen(axes)
     elif panel.y.ends == (None, None) and panel.y.scale == "linear" and not panel.bars:
         _straighten(axes)
-    if panel.x.over:
-        axes.set_label(f"{OVER}{panel.x.label}")
+    if panel.x.over or panel.plane:
+        axes.set_label(PLANE if panel.plane else f"{OVER}{panel.x.label}")
 
 
 def _straighten(axes: Axes) -> None:
@@ -248,13 +266,13 @@ def _widen(axes: Axes) -> None:
 def _height(cell: _Cell, wide: float, rows: int) -> float:
     """Inches of a panel of a width."""
     panel, axes, highest = cell.panel, cell.axes, _HIGHEST_OF_TWO
-    if panel.equal and panel.kind == "map" and rows == 1:
-        highest = _HIGHEST_MAP
+    if panel.equal and panel.kind in ("map", "plane"):
+        highest = _HIGHEST_MAP if rows == 1 else _HIGHEST_PAGE / rows
     if panel.bars:
         return (0.15 + len(panel.bars[0].values)) * _bar_height(panel.y.words, panel.bars[0].count)
     if panel.equal:
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-        return min(highest, wide * abs((high - low) / (right - left)))
+        return min(highest, panel.equal * wide * abs((high - low) / (right - left)))
     if panel.kind == "map":
         return min(highest, _MAP * wide)
     if rows == 1:

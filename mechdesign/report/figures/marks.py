@@ -193,9 +193,13 @@ class Contours(PanelMark):
 
 @dataclass(frozen=True, eq=False)
 class Own(PanelMark):
-    """What a function draws into the axes; it returns what a legend shows."""
+    """What a function draws into the axes; it returns what a legend shows.
+
+    It is drawn `late` where it needs the final size of the panel, such as symbols and names of a size on paper.
+    """
 
     function: Callable[[Axes], Any]
+    late: bool = field(default=False, kw_only=True)
 
     def draw(self, axes: Axes) -> Any:
         return self.function(axes)
@@ -203,7 +207,10 @@ class Own(PanelMark):
 
 @dataclass(frozen=True, eq=False)
 class Coloured(Own):
-    """A map that a function draws: it returns what a bar of colours shows, which `bar` names, and options of that."""
+    """A map that a function draws: it returns what a bar of colours shows, which `bar` names, and options of that.
+
+    Panels side by side whose bars have one name have one bar.
+    """
 
     bar: str = ""
 
@@ -263,8 +270,10 @@ class Panel:
     ----------
     aside : str
         Words at the right of the title.
-    equal : bool
-        Whether both axes have one scale.
+    equal : float
+        How many times longer lengths are drawn along y than along x; 0 where the axes have scales of their own.
+    plane : bool
+        Whether it shows places: a page marks points in it as the mechanism moves.
     legend : str
         Where its marks are named: in the legend of the picture, in one beside it (on a narrow page above), or inside.
     size : float
@@ -276,7 +285,8 @@ class Panel:
     y: Axis = Axis()
     title: str = ""
     aside: str = ""
-    equal: bool = False
+    equal: float = 0.0
+    plane: bool = False
     legend: Literal["", "beside", "best", "upper right", "lower right"] = ""
     heading: str = ""  # of a legend of its own
     size: float = 1.0
@@ -287,8 +297,10 @@ class Panel:
         return [mark for mark in self.marks if isinstance(mark, Bars)]
 
     @property
-    def kind(self) -> Literal["bars", "map", "equal", ""]:
+    def kind(self) -> Literal["bars", "map", "plane", "equal", ""]:
         """By which panels have room side by side."""
+        if self.plane:
+            return "plane"
         if any(isinstance(mark, Contours | Coloured) for mark in self.marks):
             return "map"
         return "bars" if self.bars else "equal" if self.equal else ""

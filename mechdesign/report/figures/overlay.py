@@ -45,8 +45,10 @@ def draw_sweep(axes: Axes, sweep: Sweep) -> None:
         draw_pose(axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]))
 
 
-def both_named(before: Before) -> list[Trace]:
-    """What a legend shows of the study now and of that before."""
+def both_named(before: Before | None) -> list[Trace]:
+    """What a legend shows of the study now and of that before; nothing without one."""
+    if before is None:
+        return []
     # As they are: a dollar would begin a formula.
     names = [printable(name).replace("$", r"\$") for name in before.names]
     looks: tuple[dict[str, Any], ...] = ({"color": style.INK}, {"color": COLOR, "linestyle": DASHES})

@@ -276,14 +276,21 @@ def steps(levels: Floats, low: float, high: float) -> BoundaryNorm:
     return BoundaryNorm(levels, 256, extend=ends[bool(low < levels[0]) + 2 * bool(high > levels[-1])])
 
 
-def filled(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, levels: Floats) -> list[list[Complexes]]:
-    """Fill patches between the levels of a norm, and draw white lines at some levels; returns the lines of each level.
+def contour_lines(patches: Sequence[Grid], levels: Floats) -> list[list[Complexes]]:
+    """The lines of each level over some patches."""
+    makers = [contour_generator(x, y, z, line_type=LineType.Separate) for x, y, z in patches]
+    return [
+        [np.asarray(line, dtype=float) @ np.array([1, 1j]) for maker in makers for line in maker.lines(level)]
+        for level in levels.tolist()
+    ]
+
+
+def filled(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, levels: Floats) -> None:
+    """Fill patches between the levels of a norm, and draw white lines at some levels.
 
     All patches at once: Matplotlib's contours of many patches with one norm take a hundred times as long.
     """
-    makers = [
-        contour_generator(x, y, z, fill_type=FillType.OuterCode, line_type=LineType.Separate) for x, y, z in patches
-    ]
+    makers = [contour_generator(x, y, z, fill_type=FillType.OuterCode) for x, y, z in patches]
     ends, reach = norm.boundaries.tolist(), 2.0 * float(np.ptp(norm.boundaries))
     ends = [-_BEYOND] * (norm.extend in ("min", "both")) + ends + [_BEYOND] * (norm.extend in ("max", "both"))
     areas: list[Path] = []
@@ -294,16 +301,12 @@ def filled(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, levels: Floa
         for maker in makers:
             areas += starmap(Path, zip(*maker.filled(low, high), strict=True))
         colors += [colormaps[COLORMAP](norm(inside))] * (len(areas) - count)
-    lines = [
-        [np.asarray(line, dtype=float) @ np.array([1, 1j]) for maker in makers for line in maker.lines(level)]
-        for level in levels.tolist()
-    ]
     axes.add_collection(PathCollection(areas, facecolors=colors, linewidths=0, antialiaseds=False), autolim=False)
-    ways = [np.column_stack([line.real, line.imag]) for line in chain.from_iterable(lines)]
+    every = chain.from_iterable(contour_lines(patches, levels))
+    ways = [np.column_stack([line.real, line.imag]) for line in every]
     axes.add_collection(LineCollection(ways, colors="white", linewidths=0.5, alpha=0.7), autolim=False)
     axes.update_datalim([(float(end(x)), float(end(y))) for x, y, _ in patches for end in (np.nanmin, np.nanmax)])
     axes.autoscale_view(tight=True)
-    return lines
 
 
 def axis_label(name: str, unit: str = "") -> str:

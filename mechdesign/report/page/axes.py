@@ -7,8 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.report.figures.framing import PLANE
-from mechdesign.report.figures.layout import OVER
+from mechdesign.report.figures.layout import OVER, PLANE
 
 POINTS = 72.0  # an inch
 

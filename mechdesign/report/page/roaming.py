@@ -168,7 +168,7 @@ def _map(layer: Element, sheet: Canvas, region: Region, index: str, norm: Bounda
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
-    contours(axes, list(grids(region.local, index)), norm, labels=False)
+    contours(axes, list(grids(region.local, index)), norm)
     far = sheet.corner + complex(sheet.width, -sheet.height) / sheet.scale
     axes.set_xlim(sheet.corner.real, far.real)
     axes.set_ylim(far.imag, sheet.corner.imag)

@@ -107,8 +107,7 @@ def motion_curves(
         common.append(
             Lines([value for value, own in marks if own == kind], "x", label=kind, look=look | {"zorder": 1.5})
         )
-    if before is not None:
-        common += both_named(before)
+    common += both_named(before)
     colors: dict[tuple[str, str], str] = {}
     panels = [_panel(group, axis, x, study.units, colors, before, common) for group in shown]
     return Picture("", panels, share="x")

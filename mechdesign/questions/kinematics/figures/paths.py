@@ -20,8 +20,9 @@ from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, PLANE, RIGHT, TITLE, framed, tiled, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, framed, tiled, windows
 from mechdesign.report.figures.labels import Label, paper
+from mechdesign.report.figures.layout import PLANE
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.pictures import picture

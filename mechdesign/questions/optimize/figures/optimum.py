@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,11 +20,12 @@ from mechdesign.questions.optimize.figures.front import chosen, described, marke
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.poses import Shown
 from mechdesign.questions.workspace.drawn import DrawnRegion
-from mechdesign.questions.workspace.figures.boundary import regions_figure, workspace_figure
+from mechdesign.questions.workspace.figures.boundary import regions_picture, workspace_picture
 from mechdesign.questions.workspace.figures.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
+from mechdesign.report.figures.marks import PanelMark, Picture, Trace
 from mechdesign.report.figures.mechanism import sketch_and_first_pose
 from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, legend_below, tick_abscissa
 from mechdesign.report.figures.pictures import picture
@@ -245,7 +246,7 @@ def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
 
 
 @picture(DesignsView, "optimum", order=80)
-def optimum_figure(view: DesignsView) -> Figure:
+def optimum_figure(view: DesignsView) -> Figure | Picture:
     """The best design: in its workspace if that was judged, else in its motion.
 
     Of a front those that are marked in it, side by side.
@@ -258,30 +259,25 @@ def optimum_figure(view: DesignsView) -> Figure:
                   if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
         if len(parts) > 1 and len(moving) == len(parts):
             return designs_figure(moving)
-        judged_regions = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
-                 if own.region is not None]  # fmt: skip
-        if len(parts) > 1 and len(judged_regions) == len(parts):
-            figure = regions_figure(judged_regions, "some designs of the front where they are best conditioned")
-            for axes, (_, own) in zip(figure.axes, parts, strict=True):
-                _draw_contained(axes, own)
-            return figure
+        judged = [(words, own.study, regions(own.study, own.region)[0], [*_contained(own)]) for words, own in parts
+                  if own.region is not None]  # fmt: skip
+        if len(parts) > 1 and len(judged) == len(parts):
+            return regions_picture(judged, "some designs of the front where they are best conditioned")
     best, words = drawn.best, ", ".join(listed(designs, designs.design(designs.best)))
     if best.region is not None:
         region = regions(best.study, best.region)[0]
         there = f", at {region.title}" if region.title else ""
         dotted = "; dotted: what it contains" if best.contained else ""
-        title = f"the best design, {words}{there}{dotted}"
-        figure = workspace_figure(best.study, DrawnRegion.of(best.region), region, title)
-        _draw_contained(figure.axes[0], best)
-        return figure
+        title, shown = f"the best design, {words}{there}{dotted}", DrawnRegion.of(best.region)
+        return workspace_picture(best.study, shown, region, title, more=[*_contained(best)])
     words = f"The best design, {words}"
     if best.motion is not None:
         return design_figure(best.study, best.motion, words)
     return sketch_and_first_pose(best.study, best.shown, words)
 
 
-def _draw_contained(axes: Axes, own: DrawnDesign) -> None:
+def _contained(own: DrawnDesign) -> Iterator[PanelMark]:
     """Outline of what a workspace is to contain."""
     for shape, centre in own.contained:
         z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
-        axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
+        yield Trace(z.real, z.imag, look={"color": style.INK, "linestyle": ":", "linewidth": 1.6, "zorder": 5})

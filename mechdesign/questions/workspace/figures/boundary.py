@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.mechanism import Configuration
@@ -24,7 +24,8 @@ from mechdesign.questions.workspace.figures.regions import (
     panel_titles,
     pieces,
     places,
-    sheet,
+    region_marks,
+    region_picture,
     some,
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
@@ -36,8 +37,8 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO, Label, covered, place_labels
-from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Words
-from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
+from mechdesign.report.figures.marks import Axis, Lines, Own, Panel, PanelMark, Picture, Trace, Words
+from mechdesign.report.figures.overlay import both_named, draw_line, draw_pose
 from mechdesign.report.figures.panels import MAX_PANELS, Along
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
@@ -54,60 +55,59 @@ _SMALL_SYMBOLS = 0.7
 _NEAR_SHAPE = 3.0  # points from an inscribed shape to its size in words
 
 
-def workspace_figure(
-    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
-) -> Figure:
+def workspace_picture(
+    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None,
+    more: Sequence[PanelMark] = (),
+) -> Picture:  # fmt: skip
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
     section, mechanism = WorkspaceSection.of(study), study.mechanism
     reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
-    extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
+    everywhere = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
                              places_before(before)])  # fmt: skip
     where = f" at {region.title}" if region.title else ""
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
-    page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
-    (axes,) = page.axes
-    fill(axes, region.local)
-    page.ends([region])
-    draw_before(axes, before)
-    for index in range(len(drawn.along.reason)):
-        draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
-    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
-    name_both(page.figure, before)
-    return page.figure
+
+    def mechanisms(axes: Axes) -> None:
+        draw_before(axes, before)
+        for index in range(len(drawn.along.reason)):
+            draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
+        draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
+
+    marks = [Own(partial(fill, local=region.local)), *region_marks(region), *more, *both_named(before)]
+    return region_picture(study, everywhere, [("", [*marks, Own(mechanisms, late=True)])], title, ROOM)
 
 
 @picture(WorkspaceView, "workspace", order=10)
-def boundary_figure(view: WorkspaceView) -> Figure | None:
+def boundary_picture(view: WorkspaceView) -> Picture | None:
     """The region with its boundary; of several values of the held coordinates the regions side by side."""
     if not view.regions:
         return None
-    if len(view.regions) > 1:
-        return side_by_side(view.study, view.regions, view.before)
-    return workspace_figure(view.study, view.drawn, view.regions[0], before=view.before)
+    if len(view.regions) == 1:
+        return workspace_picture(view.study, view.drawn, view.regions[0], before=view.before)
+    title = f"the mechanism where it is best conditioned{left_out(view.regions)}"
+    return regions_picture(
+        [(region.title, view.study, region, ()) for region in some(view.regions)], title, view.before
+    )
 
 
-def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
-    """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
-    title = f"the mechanism where it is best conditioned{left_out(regions)}"
-    return regions_figure([(region.title, study, region) for region in some(regions)], title, before)
-
-
-def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
+def regions_picture(
+    parts: Sequence[tuple[str, Study, Region, Sequence[PanelMark]]], title: str, before: Before | None = None
+) -> Picture:  # fmt: skip
     """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
-    study, shown = parts[0][1], [region for _, _, region in parts]
-    poses = [_pose_inside(own, region) for _, own, region in parts]
+    study, poses = parts[0][1], [_pose_inside(own, region) for _, own, region, _ in parts]
     reached = np.concatenate([np.ravel(pose.point(point)) for pose in poses for point in study.mechanism.points])
-    everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
+    everywhere = np.concatenate([*(region.places() for _, _, region, _ in parts), reached[np.isfinite(reached)],
                                  places_before(before)])  # fmt: skip
+    panels = []
+    for (words, own, region, more), configuration in zip(parts, poses, strict=True):
+        marks = [Own(partial(fill, local=region.local)), *region_marks(region), *more, *both_named(before)]
+        inside = partial(
+            draw_mechanism, mechanism=own.mechanism, configuration=configuration, faint=True, size=_SMALL_SYMBOLS
+        )
+        marks += [Own(inside, late=True), Own(partial(draw_before, before=before, held=region.held), late=True)]
+        panels.append((words, marks))
     title = f"workspace of point {WorkspaceSection.of(study).point}, {title}"
-    page = sheet(study, everywhere, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
-    for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
-        fill(axes, region.local)
-        draw_mechanism(axes, own.mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
-        draw_before(axes, before, region.held)
-    page.ends(shown)
-    name_both(page.figure, before)
-    return page.figure
+    return region_picture(study, everywhere, panels, title, ROOM)
 
 
 def _pose_inside(study: Study, region: Region) -> Configuration:
@@ -122,31 +122,34 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
 
 
 @picture(WorkspaceView, "inscribed", order=50)
-def inscribed_figure(view: WorkspaceView) -> Figure | None:
+def inscribed_picture(view: WorkspaceView) -> Picture | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
     study, table = view.study, view.result.tables["indices"]
     if not view.regions or INSCRIBED[0] not in table:
         return None
-    shown, unit = some(view.regions), study.units.label("length")
+    shown, panels = some(view.regions), []
+    for region in shown:
+        shapes = _inscribed(table, region, study.units.label("length"))
+        marks = [Own(partial(fill, local=region.local)), *region_marks(region), Own(partial(_draw_shapes, shapes))]
+        # In small panels the sizes would lie over each other.
+        names = [size for _, size in shapes]
+        if len(shown) == 1:
+            marks.append(Own(partial(_name_shapes, names), late=True))
+            names = []
+        panels.append(("\n".join([region.title, *(size.text for size in names)]), marks))
     places = np.concatenate([region.places() for region in shown])
-    by_region = [_inscribed(table, region, unit) for region in shown]
-    # In small panels the sizes would lie over each other.
-    titles = [region.title for region in shown]
-    if len(shown) > 1:
-        titles = ["\n".join([title, *(size.text for _, size in shapes)])
-                  for title, shapes in zip(titles, by_region, strict=True)]  # fmt: skip
     title = f"largest circle and rectangle in the workspace{left_out(view.regions)}"
-    page = sheet(study, places, titles, title, bar=False)
-    for axes, region, shapes in zip(page.axes, shown, by_region, strict=True):
-        fill(axes, region.local)
-        for shape, size in shapes:
-            shape.set(edgecolor=size.color, facecolor="none", linewidth=1.6, zorder=4)
-            axes.add_patch(shape)
-    page.ends(shown)
-    if len(shown) == 1:
-        (axes,) = page.axes
-        place_labels(axes, [size for _, size in by_region[0]], covered(axes), order=5)
-    return page.figure
+    return region_picture(study, places, panels, title)
+
+
+def _draw_shapes(shapes: Sequence[tuple[Patch, Label]], axes: Axes) -> None:
+    for shape, size in shapes:
+        shape.set(edgecolor=size.color, facecolor="none", linewidth=1.6, zorder=4)
+        axes.add_patch(shape)
+
+
+def _name_shapes(sizes: Sequence[Label], axes: Axes) -> None:
+    place_labels(axes, sizes, covered(axes), order=5)
 
 
 def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Label]]:

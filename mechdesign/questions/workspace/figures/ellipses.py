@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.workspace.figures.regions import fill, sheet, stretch_of
+from mechdesign.questions.workspace.figures.regions import fill, region_marks, region_picture, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import LEFT, extent
+from mechdesign.report.figures.framing import extent
+from mechdesign.report.figures.marks import Own, PanelMark, Picture, Trace
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
 
@@ -22,15 +23,12 @@ from mechdesign.report.figures.pictures import picture
 _LARGEST = 0.48
 _USUAL = 0.7
 _TURN = np.exp(1j * np.linspace(0.0, 2 * np.pi, 97))
-# Inches: what the legend of the ellipses needs, and of the ends of the region below it.
-_ROOM = 0.66
-_ABOVE_ENDS = 0.24
 _VELOCITY: dict[str, Any] = {"color": style.BLUE, "linestyle": "-"}
 _FORCE: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (3, 1.2))}
 
 
 @picture(WorkspaceView, "ellipses", order=40)
-def ellipses_figure(view: WorkspaceView) -> Figure | None:
+def ellipses_picture(view: WorkspaceView) -> Picture | None:
     """Velocity ellipses, J u for drive rates u of unit size, and force ellipses, J^-T u for efforts u [Yoshikawa 1985].
 
     None where the Jacobian is not that of a point, and in a strip that is stretched: circles would not be round.
@@ -44,10 +42,7 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
     _, wide, tall = extent(region.places())
     if stretch_of(wide / tall) != 1.0:
         return None
-    page = sheet(study, region.places(), [""], title, bar=False, below=_ROOM)
-    (axes,) = page.axes
-    fill(axes, region.local)
-    page.ends([region])
+    marks: list[PanelMark] = [Own(partial(fill, local=region.local)), *region_marks(region)]
     with np.errstate(divide="ignore", over="ignore"):
         u, sizes, _ = np.linalg.svd(ellipses.matrices)
         inverse = 1 / sizes
@@ -58,14 +53,15 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
     rate, effort = (f"rad/{units.time}", units.label("moment")) if angular else (velocity, units.label("force"))
     mixed = section.characteristic_length
     arcs = f", 1 rad = {quantity(mixed, length)}" if mixed is not None else ""
-    handles, thin = [], False
+    thin = False
     for name, half, look, unit, cause in (
         ("velocity", sizes, _VELOCITY, velocity, f"rates (root of squares {_one(rate)}{arcs})"),
         ("force", inverse, _FORCE, units.label("force"), f"efforts (root of squares {_one(effort)})"),
     ):
         on_axes, stands_for, fits = _scale(half.max(axis=1), ellipses.spacing)
         words = f"{quantity(on_axes, length).rstrip()} long: {quantity(stands_for, unit)}"
-        handles.append(Line2D([], [], linewidth=1.4, label=f"{name} by unit drive {cause}: half axis {words}", **look))
+        named = f"{name} by unit drive {cause}: half axis {words}"
+        marks.append(Trace([], [], label=named, look=look | {"linewidth": 1.4}))
         edges, widths = [], []
         for place, axis, pair in zip(ellipses.places, directions, half * on_axes / stands_for, strict=True):
             largest = float(pair.max())
@@ -76,17 +72,14 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
             edges.append(np.column_stack([edge.real, edge.imag]))
             widths.append(0.7 if small else 1.4)
             thin |= small
-        axes.add_collection(LineCollection(edges, linewidths=widths, zorder=4, **look))
+        marks.append(Own(partial(_lines, edges, widths, look)))
     if thin:
-        handles.append(Line2D([], [], color=style.FAINT, linewidth=0.7, label="thin: longer than drawn"))
-    if style.narrow():
-        for handle in handles:
-            handle.set_label(style.folded(str(handle.get_label()), 9.0, style.width() - LEFT - 0.5))
-        style.grow(page.figure, below=style.line(9.0) * sum(str(entry.get_label()).count("\n") for entry in handles))
-    height = page.figure.get_figheight()
-    page.figure.legend(handles=handles, loc="lower left", borderaxespad=0.3,
-                       bbox_to_anchor=(LEFT / style.width() - 0.02, _ABOVE_ENDS / height))  # fmt: skip
-    return page.figure
+        marks.append(Trace([], [], label="thin: longer than drawn", look={"color": style.FAINT, "linewidth": 0.7}))
+    return region_picture(study, region.places(), [("", marks)], title)
+
+
+def _lines(edges: list[Floats], widths: list[float], look: dict[str, Any], axes: Axes) -> None:
+    axes.add_collection(LineCollection(edges, linewidths=widths, zorder=4, **look))
 
 
 def _one(unit: str) -> str:

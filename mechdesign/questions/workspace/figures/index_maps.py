@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from mechdesign.indices import INDEX_NAMES
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.workspace.figures.regions import Region, fill, grids, left_out, sheet, some
+from mechdesign.questions.workspace.figures.regions import (
+    Region,
+    fill,
+    grids,
+    left_out,
+    region_marks,
+    region_picture,
+    some,
+)
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.marks import Coloured, Own, PanelMark, Picture
 from mechdesign.report.figures.panels import node_areas, quantile, quantity
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.style import Grid
 from mechdesign.study import Study
 
@@ -36,7 +45,7 @@ CLEAR_OF_NAMES = 18.0
 
 
 @picture(WorkspaceView, *INDEX_NAMES, order=80)
-def map_figures(view: WorkspaceView) -> Gallery | None:
+def index_pictures(view: WorkspaceView) -> dict[str, Picture] | None:
     """One map an index of the table of local indices; of many regions a few, spread evenly.
 
     There is none of an index that is infinite everywhere.
@@ -45,10 +54,7 @@ def map_figures(view: WorkspaceView) -> Gallery | None:
         return None
     shown = some(view.regions)
     names = [name for name in index_columns(view.regions[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
-    maps = Gallery()
-    for name in names:
-        maps.add(name, _index_map, view.study, shown, name, left_out(view.regions))
-    return maps
+    return {name: _index_map(view.study, shown, name, left_out(view.regions)) for name in names}
 
 
 def index_columns(region: Region) -> list[str]:
@@ -56,9 +62,9 @@ def index_columns(region: Region) -> list[str]:
     return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
 
 
-def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -> Figure:
+def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -> Picture:
     index = regions[0].local.column(column)
-    places = np.concatenate([region.places() for region in regions])
+    everywhere = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
     title, titles = f"{name} at point {point}: {index.meaning}{cut}", [region.title for region in regions]
@@ -72,38 +78,46 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
     every = [patch for patches in shown for patch in patches]
     low, _, top = _ends(every)
-    if parts is None and style.constant(low, top):
-        page = sheet(study, places, titles, f"{title}; {quantity(low, index.unit).strip()} everywhere", bar=False)
-        for axes, region in zip(page.axes, regions, strict=True):
-            fill(axes, region.local)
-        page.ends(regions)
-        return page.figure
-    norm = _norm(every)
-    page = sheet(study, places, titles, title, bar=True)
-    # First, since the legend makes a narrow page higher.
-    page.ends(regions)
-    for axes, patches in zip(page.axes, shown, strict=True):
-        contours(axes, patches, norm, labels=len(regions) == 1)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), label, ticks=norm.boundaries)
-    return page.figure
+    same = parts is None and style.constant(low, top)
+    if same:
+        title = f"{title}; {quantity(low, index.unit).strip()} everywhere"
+    norm, panels = _norm(every), list[tuple[str, list[PanelMark]]]()
+    for words, patches, region in zip(titles, shown, regions, strict=True):
+        drawn = Own(partial(fill, local=region.local)) if same else Coloured(partial(_field, patches, norm), bar=label)
+        marks = [drawn, *region_marks(region)]
+        if len(regions) == 1 and not same:
+            marks.append(Own(partial(label_levels, patches=patches, norm=norm), late=True))
+        panels.append((words, marks))
+    return region_picture(study, everywhere, panels, title)
 
 
-def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, *, labels: bool) -> None:
-    """Filled contours over the patches of a region, each level named once, where its line is longest."""
+def _field(patches: Sequence[Grid], norm: BoundaryNorm, axes: Axes) -> tuple[ScalarMappable, dict[str, Any]]:
+    """Filled contours, and what a bar of colours shows of them."""
+    contours(axes, patches, norm)
+    return ScalarMappable(norm, style.COLORMAP), {"ticks": norm.boundaries}
+
+
+def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
+    """Filled contours over the patches of a region."""
+    style.filled(axes, _within(patches, norm), norm, norm.boundaries[1:])
+
+
+def _within(patches: Sequence[Grid], norm: BoundaryNorm) -> list[Grid]:
+    """Patches with values that have a colour: beyond the last level an index grows without bound, at singularities."""
     low, high = norm.boundaries[[0, -1]]
-    # Beyond the last level the index grows without bound, at singularities.
     over = 2 * high - low
-    shown = [(x, y, np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low))
-             for x, y, z in patches]  # fmt: skip
-    lines = style.filled(axes, shown, norm, norm.boundaries[1:])
-    if labels:
-        edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in patches)]
-        label_levels(axes, lines, norm, _on_paper(axes, np.concatenate(edges)))
+    return [(x, y, np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low))
+            for x, y, z in patches]  # fmt: skip
 
 
-def label_levels(axes: Axes, drawn: Sequence[Sequence[Complexes]], norm: BoundaryNorm, blocked: Complexes) -> None:
+def label_levels(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
     """Name each level of a norm but the first on one of its lines, far from other lines and names; or not at all."""
-    levels = norm.boundaries[1:]
+    levels, edge = norm.boundaries[1:], np.zeros(0, dtype=complex)
+    drawn = style.contour_lines(_within(patches, norm), levels)
+    for x, y, _ in patches:
+        z = x + 1j * y
+        edge = np.concatenate([edge, z[0], z[-1], z[:, 0], z[:, -1]])
+    blocked = _on_paper(axes, edge)
     ten = 10.0 ** style.power(float(np.abs(norm.boundaries).max()))
     lines = [[_on_paper(axes, part) for part in parts] for parts in drawn]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]

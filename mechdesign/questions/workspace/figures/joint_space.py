@@ -5,36 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.workspace.figures.boundary import solved_inside
-from mechdesign.questions.workspace.figures.regions import PALE, Region, Sheet, inner_loci, places, stretch_of
+from mechdesign.questions.workspace.figures.regions import PALE, Region, inner_loci, places, region_marks, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, extent
+from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.labels import HALO
-from mechdesign.report.figures.panels import coordinate_label, title
+from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Words
+from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-_HEIGHT = 4.6  # inches
-_ABOVE = 0.6  # inches, with two lines of words
-_LEGEND = 0.25  # inches
+_SHAPE = 0.6  # height over width of a panel over an angle and a length
 _STILL = 1e-6  # of the size of the region in the plane of the drives
 _EDGE = 0.04  # of the height and the width, beyond the region
 
 
 @picture(WorkspaceView, "joint_space", order=65)
-def joint_space_figure(view: WorkspaceView) -> Figure | None:
+def joint_space_picture(view: WorkspaceView) -> Picture | None:
     """The region over both drives, in the looks that it has in the plane of the point; None unless it has two drives.
 
     Where a drive turns without end it is cut open along the first ray of the scan.
@@ -56,48 +55,42 @@ def joint_space_figure(view: WorkspaceView) -> Figure | None:
             study, region, inside, _drives(study, solved_inside(study, replace(region, local=inside))), nodes
         )
     cut = any(_cut(region, patches, values, _turn(study, name)) for name, values in nodes.items())
-    axes, page = _page(
-        study, np.concatenate([places(boundary), *(cells.reshape(-1, 2) @ [1, 1j] for cells in shown)]), cut=cut
-    )
-    for cells in shown:
+    everywhere = np.concatenate([places(boundary), *(cells.reshape(-1, 2) @ [1, 1j] for cells in shown)])
+    x, y = (float(sketch[name]) for name in names)
+    marks = [
+        Own(partial(_cells, shown)),
+        *region_marks(replace(region, others=None, boundary=boundary, singularities=inside)),
+        Dots([x], [y], look={"color": style.INK, "markersize": 5, "zorder": 4}),
+        Words(x, y, "sketch", (6, 4), look={"fontsize": 9, "zorder": 5, "path_effects": HALO}),
+    ]
+    return _picture(study, everywhere, marks, cut=cut)
+
+
+def _cells(patches: Sequence[Floats], axes: Axes) -> None:
+    """The cells of a region's patches, each of shape (rays, nodes, 2)."""
+    axes.grid(visible=False)
+    for cells in patches:
         corners = [cells[:-1, :-1], cells[1:, :-1], cells[1:, 1:], cells[:-1, 1:]]
         quads = np.stack(corners, axis=2).reshape(-1, 4, 2)
         axes.add_collection(PolyCollection(list(quads[np.isfinite(quads).all(axis=(1, 2))]), facecolors=PALE,
                                            linewidths=0, antialiaseds=False))  # fmt: skip
-    page.ends([replace(region, others=None, boundary=boundary, singularities=inside)])
-    x, y = (float(sketch[name]) for name in names)
-    axes.plot(x, y, "o", color=style.INK, markersize=5, zorder=4)
-    axes.annotate("sketch", (x, y), (6, 4), textcoords="offset points", fontsize=9, zorder=5, path_effects=HALO)
-    return page.figure
 
 
-def _page(study: Study, drawn: Complexes, *, cut: bool) -> tuple[Axes, Sheet]:
-    """Axes over both drives, of one scale where both are angles or both lengths."""
-    names = study.mechanism.drives
-    middle, wide, tall = extent(drawn)
-    wide, tall = (1 + 2 * _EDGE) * wide, (1 + 2 * _EDGE) * tall
-    room = style.width() - LEFT - RIGHT
-    height = min(_HEIGHT, room)
-    alike, stretch = len({study.mechanism.quantity(name) for name in names}) == 1, 1.0
-    if alike:
-        stretch = stretch_of(wide / tall)
-        scale = min(room / wide, height / (tall * stretch))
-        room, height = scale * wide, scale * tall * stretch
-    figure, (axes,) = style.page(1, 1, height, left=LEFT, right=style.width() - LEFT - room, top=_ABOVE,
-                                 bottom=BELOW + _LEGEND)  # fmt: skip
+def _picture(study: Study, everywhere: Complexes, marks: Sequence[PanelMark], *, cut: bool) -> Picture:
+    """A panel over both drives, of one scale where both are angles or both lengths."""
+    names, (middle, wide, tall) = study.mechanism.drives, extent(everywhere)
+    alike = len({study.mechanism.quantity(name) for name in names}) == 1
+    stretch = stretch_of(wide / tall) if alike else 1.0
     any_mode = study.workspace is not None and study.workspace.assembly == "any"
     note = f"joint space, in the working mode {'that counts at each place' if any_mode else 'of the sketch'}"
     note += "; cut open at edges without a line" * cut
     if stretch != 1.0:
         note += f"; {names[stretch > 1]} drawn {max(stretch, 1 / stretch):g} times larger"
-    title(figure, "Workspace in the plane of the drives", note, left=LEFT)
-    axes.set_xlim(middle.real - wide / 2, middle.real + wide / 2)
-    axes.set_ylim(middle.imag - tall / 2, middle.imag + tall / 2)
-    axes.set_aspect(stretch if alike else "auto")
-    axes.grid(visible=False)
-    axes.set_xlabel(coordinate_label(study, names[0]))
-    axes.set_ylabel(coordinate_label(study, names[1]))
-    return axes, Sheet(figure, (axes,), None, 1.0)
+    half = (0.5 + _EDGE) * np.array([wide, tall])
+    x, y = (Axis(coordinate_label(study, name), ends=(at - reach, at + reach))
+            for name, at, reach in zip(names, (middle.real, middle.imag), half.tolist(), strict=True))  # fmt: skip
+    panel = Panel(marks, x, y, equal=stretch if alike else _SHAPE * wide / tall)
+    return Picture("Workspace in the plane of the drives", [panel], (note,))
 
 
 def _drives(study: Study, configuration: Configuration) -> dict[str, Floats]:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
-from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, sheet
+from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, region_picture
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.marks import Axis, Panel, Picture, Trace
-from mechdesign.report.figures.overlay import name_both
+from mechdesign.report.figures.marks import Axis, Coloured, Own, Panel, Picture, Trace
+from mechdesign.report.figures.overlay import both_named
 from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
@@ -27,7 +27,7 @@ _SHOWN_RATIOS = 0.97
 
 
 @picture(WorkspaceView, "path", "speed_ratio", order=30)
-def path_pictures(view: WorkspaceView) -> dict[str, Figure | Picture] | None:
+def path_pictures(view: WorkspaceView) -> dict[str, Picture] | None:
     """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
     if "path" not in view.result.tables:
         return None
@@ -46,24 +46,25 @@ def _label(path: Table) -> str:
     return style.axis_label("speed ratio", path.column("speed_ratio").unit)
 
 
-def _path(study: Study, path: Table, before: Before | None) -> Figure:
-    mechanism, section = study.mechanism, WorkspaceSection.of(study)
-    z = places(path)
-    title = f"path of point {section.point}, by its speed over the drive's"
+def _path(study: Study, path: Table, before: Before | None) -> Picture:
+    mechanism, section, z = study.mechanism, WorkspaceSection.of(study), places(path)
     reached = np.concatenate([z, sketch_places(study), places_before(before)])
-    page = sheet(study, reached, [""], title, bar=True, pad=ROOM)
-    (axes,) = page.axes
-    ratio = path["speed_ratio"]
-    top, tail = _ends(ratio)
-    norm = Normalize(0.0, top)
-    for rows in pieces(path):
-        axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
-        coloured(axes, z[rows], ratio[rows], norm, 4)
-    draw_before(axes, before)
-    draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
-    name_both(page.figure, before)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), _label(path), extend="max" if tail else "neither")
-    return page.figure
+    top, tail = _ends(path["speed_ratio"])
+
+    def speeds(axes: Axes) -> tuple[ScalarMappable, dict[str, str]]:
+        norm = Normalize(0.0, top)
+        for rows in pieces(path):
+            axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
+            coloured(axes, z[rows], path["speed_ratio"][rows], norm, 4)
+        return ScalarMappable(norm, style.COLORMAP), {"extend": "max" if tail else "neither"}
+
+    def mechanisms(axes: Axes) -> None:
+        draw_before(axes, before)
+        draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
+
+    marks = [Coloured(speeds, bar=_label(path)), *both_named(before), Own(mechanisms, late=True)]
+    title = f"path of point {section.point}, by its speed over the drive's"
+    return region_picture(study, reached, [("", marks)], title, ROOM)
 
 
 def _speed(study: Study, path: Table) -> Picture:

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, PLANE, RIGHT, Window, extent, windows
-from mechdesign.report.figures.panels import legend_at_left, round_down
+from mechdesign.report.figures.framing import extent
+from mechdesign.report.figures.marks import Axis, Own, Panel, PanelMark, Picture, Trace
+from mechdesign.report.figures.panels import round_down
 from mechdesign.report.figures.style import Grid
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -45,16 +44,7 @@ _LONGEST, _STRETCHED = 10.0, 1.2
 # Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
 _PAD = 0.03
 ROOM = 0.07
-# Inches.
-_BAR = 0.95  # of a bar of colours with its numbers
-_LEGEND = 0.24
-_PANEL_TITLE = 0.34
-_TITLE_LINE = 0.17  # more of it
-_TITLE = 0.4
-_ROW_GAP = 0.28
-_BESIDE, _BESIDE_NARROW = 0.45, 0.3  # of a panel without labels of its own
-_TICK = 0.65  # from one number along x to the next, twice that along y
-_MAX_HEIGHT = 6.5
+_BESIDE = 0.45  # inches beside a panel without labels of its own
 
 
 def places(table: Table) -> Complexes:
@@ -139,32 +129,42 @@ def fate(kind: str, at: str) -> str:
     return "singularity"
 
 
-def outline(axes: Axes, region: Region) -> set[str]:
-    """Draw a region's boundary by what ends it, and faintly the pieces left out; returns the keys of `LOOKS` drawn."""
+def region_marks(region: Region) -> Iterator[PanelMark]:
+    """A region's boundary by what ends it, faintly the pieces left out, and the singularities inside."""
     boundary = region.boundary
     ends: dict[str, list[Ints]] = {}
     for rows in curves(boundary):
         ends.setdefault(fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]])), []).append(rows)
     # White below keeps the gaps of dashes clean.
     every = [rows for pieces in ends.values() for rows in pieces]
-    _draw(axes, boundary, every, color="white", linewidth=2.1, zorder=3.1)
+    yield _joined(boundary, every, "", {"color": "white", "linewidth": 2.1, "zorder": 3.1})
     for end, pieces in ends.items():
-        color, dashes, width, _ = LOOKS[end]
-        _draw(axes, boundary, pieces, color=color, linestyle=dashes, linewidth=width, solid_capstyle="round",
-              zorder=3.15)  # fmt: skip
-    kinds = set(ends)
+        color, dashes, width, words = LOOKS[end]
+        look = {"color": color, "linestyle": dashes, "linewidth": width, "solid_capstyle": "round", "zorder": 3.15}
+        yield _joined(boundary, pieces, words, look)
     if region.others is not None:
         local, boundary = region.others
-        fill(axes, local, LEFT_OUT, zorder=0.9)
-        _draw(axes, boundary, list(curves(boundary)), color=style.FAINT, linewidth=0.8, zorder=2.8)
-        kinds.add("other")
-    return kinds
+        yield Own(partial(fill, local=local, color=LEFT_OUT, zorder=0.9))
+        look = {"color": style.FAINT, "linewidth": 0.8, "zorder": 2.8}
+        yield _joined(boundary, list(curves(boundary)), LOOKS["other"][-1], look)
+    kinds: dict[str, list[Ints]] = {}
+    for rows in inner_loci(region):
+        assert region.singularities is not None
+        kinds.setdefault(str(region.singularities["kind"][rows[0]]), []).append(rows)
+    # A pale edge shows on every colour.
+    for kind, pieces in kinds.items():
+        color, dashes, width, words = LOOKS[kind]
+        pale = {"color": color, "zorder": 3.2, "path_effects": [withStroke(linewidth=3.4, foreground="white")]}
+        assert region.singularities is not None
+        long, single = ([rows for rows in pieces if (len(rows) > 1) == more] for more in (True, False))
+        yield _joined(region.singularities, long, words, pale | {"linestyle": dashes, "linewidth": width})
+        yield _joined(region.singularities, single, "", pale | {"linestyle": "", "marker": "o", "markersize": 4})
 
 
-def _draw(axes: Axes, table: Table, pieces: Sequence[Ints], **look: Any) -> None:
-    """Draw some curves of a table as one broken line."""
-    if pieces:
-        axes.plot(*(np.concatenate([np.append(table[name][rows], np.nan) for rows in pieces]) for name in "xy"), **look)
+def _joined(table: Table, pieces: Sequence[Ints], words: str, look: Mapping[str, Any]) -> Trace:
+    """Some curves of a table as one broken line."""
+    x, y = (np.concatenate([np.zeros(0), *(np.append(table[name][rows], np.nan) for rows in pieces)]) for name in "xy")
+    return Trace(x, y, label=words, look=look)
 
 
 def inner_loci(region: Region) -> list[Ints]:
@@ -177,26 +177,6 @@ def inner_loci(region: Region) -> list[Ints]:
     z = places(table)
     return [rows for rows in curves(table)
             if not len(ends) or np.abs(ends - z[rows[len(rows) // 2]]).min() >= near]  # fmt: skip
-
-
-def loci(axes: Axes, region: Region) -> set[str]:
-    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds."""
-    table = region.singularities
-    if table is None:
-        return set()
-    kinds: dict[str, list[Ints]] = {}
-    for rows in inner_loci(region):
-        kinds.setdefault(str(table["kind"][rows[0]]), []).append(rows)
-    for kind, pieces in kinds.items():
-        color, dashes, width, _ = LOOKS[kind]
-        look: dict[str, Any] = {
-            "color": color,
-            "zorder": 3.2,
-            "path_effects": [withStroke(linewidth=3.4, foreground="white")],
-        }
-        _draw(axes, table, [rows for rows in pieces if len(rows) > 1], linestyle=dashes, linewidth=width, **look)
-        _draw(axes, table, [rows for rows in pieces if len(rows) == 1], linestyle="", marker="o", markersize=4, **look)
-    return set(kinds)
 
 
 def fill(axes: Axes, local: Table, color: str = PALE, **look: Any) -> None:
@@ -225,92 +205,31 @@ def left_out(regions: Sequence[Region]) -> str:
     return f" ({MAX_REGIONS} of {len(regions)} shown)" if len(regions) > MAX_REGIONS else ""
 
 
-@dataclass(frozen=True, eq=False)
-class Sheet:
-    """A figure of panels of one scale, with room for a bar of colours at the right and a legend below.
+def region_picture(
+    study: Study, places: Complexes, panels: Sequence[tuple[str, Sequence[PanelMark]]], title: str, pad: float = _PAD
+) -> Picture:  # fmt: skip
+    """Panels of marks under titles, which may have several lines, that all show the same part of the plane.
 
-    Along y lengths are drawn `stretch` times as large as along x.
+    The axes are equal, unless what is shown is a thin strip; the title says so.
     """
-
-    figure: Figure
-    axes: tuple[Axes, ...]
-    bar: Axes | None
-    stretch: float
-
-    def ends(self, regions: Sequence[Region]) -> None:
-        """Draw what ends each region, a panel each, and its singularities, with a legend."""
-        panels = list(zip(self.axes, regions, strict=True))
-        self.legend(set().union(*(outline(*panel) | loci(*panel) for panel in panels)))
-
-    def legend(self, kinds: set[str]) -> None:
-        """Entries in one row below the panels for what `outline` and `loci` have drawn."""
-        entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)
-                   for name, (color, dashes, width, words) in LOOKS.items() if name in kinds]  # fmt: skip
-        if entries:
-            legend_at_left(self.figure, entries, 4, columnspacing=1.4, borderaxespad=0.3)
-
-    def color_bar(self, drawn: ScalarMappable, label: str, **options: Any) -> None:
-        """What the colours of the panels mean."""
-        style.color_bar(self.figure, drawn, label, cax=self.bar, **options)
-
-
-def sheet(
-    study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD,
-    below: float = 0.0,
-) -> Sheet:  # fmt: skip
-    """Panels that all show the same part of the plane, `titles` above them and `title` above all.
-
-    Titles of panels may have several lines. So many inches more than a legend of what ends the region needs are left
-    `below`. The axes are equal, unless what is shown is a thin strip; the title says so.
-    """
-    number = len(titles)
-    middle, wide, tall = extent(places)
+    number, (middle, wide, tall) = len(panels), extent(places)
     stretch = stretch_of(wide / tall)
-    tall *= stretch
     columns = number if number < 4 else 2 if number == 4 else 3
-    if style.narrow() or (number > 1 and wide > 2 * tall):
+    if style.narrow() or (number > 1 and wide > 2 * tall * stretch):
         columns = 1 if number < 3 else 2
     if stretch != 1.0:
         title += f"; {'y' if stretch > 1 else 'x'} drawn {max(stretch, 1 / stretch):g} times larger"
-    rows = -(-number // columns)
-    room = style.width() - RIGHT - (_BAR if bar else 0.0)
-    wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
-    pitch = (room - LEFT) / columns
-    inside = room / columns - LEFT if columns < 3 else pitch - _BESIDE
-    if style.narrow():
-        inside = pitch - _BESIDE_NARROW
-    above, down = 0.0, _ROW_GAP
+    titles = [words for words, _ in panels]
     if number > 1:
-        titles, name = panel_titles(titles, inside)
+        titles, name = panel_titles(titles, style.width() / columns - _BESIDE)
         title += f"; panels: values of {name}" * bool(name)
-        above = _PANEL_TITLE + _TITLE_LINE * max(name.count("\n") for name in titles)
-        down = above + _ROW_GAP
-    title = style.folded(title[0].upper() + title[1:], 11.0, style.width() - LEFT - 0.1)
-    top = _TITLE + style.line(11.0) * title.count("\n")
-    below += BELOW + _LEGEND
-    free = style.tallest() - top - above - (rows - 1) * down - below
-    scale = min(inside / wide, min(_MAX_HEIGHT if rows == 1 else 7.5, free) / rows / tall)
-    window = Window(middle, scale, scale * wide, scale * tall)
-    figure, panels = windows(
-        window, study.units.label("length"), number, columns, gap=pitch - window.width, above=down,
-        top=top + above - down, below=below, stretch=stretch,
-    )  # fmt: skip
-    outer = figure.get_figheight()
-    for axes, name in zip(panels, titles, strict=True):
-        axes.grid(visible=False)
-        axes.set_label(PLANE)
-        axes.set_title(name, loc="left", fontsize=9.5)
-        axes.locator_params(axis="x", nbins=max(1, int(window.width / _TICK)))
-        axes.locator_params(axis="y", nbins=max(1, int(2 * window.height / _TICK)))
-    figure.text(LEFT / style.width(), 1 - 0.12 / outer, title, va="top", fontsize=11)
-    colors = None
-    if bar:
-        edge = (LEFT + window.width if number == 1 else room) + 0.15
-        every = rows * window.height + (rows - 1) * down
-        long, middle_up = min(every, 4.0), below + every / 2
-        low = (middle_up - long / 2) / outer
-        colors = figure.add_axes((edge / style.width(), low, 0.16 / style.width(), long / outer))
-    return Sheet(figure, tuple(panels), colors, stretch)
+    room = pad * max(wide, tall * stretch)
+    unit, (half, up) = study.units.label("length"), (wide / 2 + room, tall / 2 + room / stretch)
+    x = Axis("x", unit, ends=(middle.real - half, middle.real + half))
+    y = Axis("y", unit, ends=(middle.imag - up, middle.imag + up))
+    shown = [Panel(marks, x, y, words, equal=stretch, plane=True)
+             for words, (_, marks) in zip(titles, panels, strict=True)]  # fmt: skip
+    return Picture(title[0].upper() + title[1:], shown, across=columns, share="xy" if number > 1 else "")
 
 
 def panel_titles(titles: Sequence[str], room: float, most: int = 2) -> tuple[list[str], str]:
