@@ -29,7 +29,8 @@ ORDER = (
     ("mechdesign.questions.kinematics",),
     # The force method, by which dynamics finds moments that equilibrium leaves open.
     tuple(f"mechdesign.questions.stiffness.{name}" for name in
-          ("__init__", "applied", "compliance", "elements", "couplings", "force_method", "network", "screws")),
+          ("__init__", "applied", "bodies", "compliance", "elements", "couplings", "force_method", "network", "screws",
+           "self_stress")),
     ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.stiffness",),
     ("mechdesign.questions.reliability",),
