@@ -434,7 +434,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
 
 def question(command: str) -> Callable[..., Answer]:
     """The function of a question that has none of its own above."""
-    return partial(_ask, command, seed=None)
+    return partial(_ask, command, seed=None, jobs=1)
 
 
 def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
