@@ -24,7 +24,7 @@ from pathlib import Path
 from mechdesign.__main__ import main
 from mechdesign.commands import QUESTIONS
 from mechdesign.report.figures import pictures
-from mechdesign.report.figures.pictures import Picture, View
+from mechdesign.report.figures.pictures import NamedPicture, View
 
 PICTURES = "PICTURES_OF_PAGE"
 _IMPORTED = (
@@ -113,7 +113,7 @@ def _draw_only(names: Iterable[str]) -> None:
     """Leave out the pictures of questions that are not among these."""
     every, shown = pictures.pictures, set(names)
 
-    def wanted(command: str) -> list[Picture[View]]:
+    def wanted(command: str) -> list[NamedPicture[View]]:
         return [picture for picture in every(command) if shown.intersection(picture.names)]
 
     pictures.pictures = wanted

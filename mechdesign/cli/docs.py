@@ -33,7 +33,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
         If a word is not known; the message names the nearest.
     """
     index = entries(commands(group))
-    matches = [(word, find(index, word) or holding(index, word)) for word in words]
+    matches = [(word, _found(index, word)) for word in words]
     for word, hits in matches:
         if not hits:
             close = near(index, word)
@@ -41,6 +41,12 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
             raise StudyError(f"the reference has no {word!r}{cure}")
     texts = [_lines(index, hits) for _, hits in matches] or [_overview(index)]
     emit_words("\n".join(line for text in texts for line in text).rstrip("\n") + "\n")
+
+
+def _found(index: Sequence[Entry], word: str) -> list[Entry]:
+    """Entries of a word; those whose texts hold it, where it is none but a reason why a pose fails."""
+    hits = find(index, word)
+    return hits if any(hit.word not in REASONS for hit in hits) else [*hits, *holding(index, word)]
 
 
 def explained(error: Exception) -> tuple[int, str]:

@@ -116,14 +116,13 @@ class Stencil:
         """
         n, h = self.centre.shape[1], self.step
         middle, up, down = values[:, 0], values[:, 1 : n + 1], values[:, n + 1 : 2 * n + 1]
-        with np.errstate(invalid="ignore"):
-            right, left = (up - middle[:, None]) / h, (middle[:, None] - down) / h
-            slope = np.where(np.isnan(left), right, np.where(np.isnan(right), left, (right + left) / 2))
-            bend = np.zeros((*values.shape[::2], n, n))
-            bend[:, :, range(n), range(n)] = np.moveaxis((right - left) / h, 1, 2)
-            for k, (i, j) in enumerate(self.pairs.tolist()):
-                mixed = (values[:, 2 * n + 1 + k] - up[:, i] - up[:, j] + middle) / h**2
-                bend[:, :, i, j] = bend[:, :, j, i] = mixed
+        right, left = (up - middle[:, None]) / h, (middle[:, None] - down) / h
+        slope = np.where(np.isnan(left), right, np.where(np.isnan(right), left, (right + left) / 2))
+        bend = np.zeros((*values.shape[::2], n, n))
+        bend[:, :, range(n), range(n)] = np.moveaxis((right - left) / h, 1, 2)
+        for k, (i, j) in enumerate(self.pairs.tolist()):
+            mixed = (values[:, 2 * n + 1 + k] - up[:, i] - up[:, j] + middle) / h**2
+            bend[:, :, i, j] = bend[:, :, j, i] = mixed
         return Models(middle, np.nan_to_num(np.moveaxis(slope, 1, 2)), np.nan_to_num(bend))
 
 

@@ -178,11 +178,8 @@ def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
         margins.append(np.where(assembled, 1.0, -1.0))
     margins += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]
     places = {**mechanism.nominal, **configuration.places}
-    with np.errstate(all="ignore"):
-        margins += [
-            margin / bound.scale(size)
-            for bound in mechanism.bounds
-            for _, margin in bound.margins(configuration, places)
-        ]
+    margins += [
+        margin / bound.scale(size) for bound in mechanism.bounds for _, margin in bound.margins(configuration, places)
+    ]
     columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in margins]
     return np.stack(columns, axis=1) if columns else np.empty((*configuration.shape, 0))

@@ -49,11 +49,10 @@ def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats,
     assert variable.to is not None
     parameters = {key: value for key, value in designs.items() if key in study.parameters.nominal}
     env = {**study.parameters.values(parameters), **designs}
-    with np.errstate(all="ignore"):
-        low, high = (np.asarray(bound.evaluate(env), dtype=float) for bound in (variable.from_, variable.to))
-        if variable.integer:
-            slack = BOUND_ROUNDING * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
-            low, high = np.ceil(low - slack), np.floor(high + slack)
+    low, high = (np.asarray(bound.evaluate(env), dtype=float) for bound in (variable.from_, variable.to))
+    if variable.integer:
+        slack = BOUND_ROUNDING * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
+        low, high = np.ceil(low - slack), np.floor(high + slack)
     return np.broadcast_to(low, count), np.broadcast_to(high, count)
 
 
@@ -66,13 +65,12 @@ def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats
     if variable.choices is not None:
         return np.zeros(count), np.ones(count), np.full(count, float(len(variable.choices)))
     low, high = bounds(study, designs, name, count)
-    with np.errstate(invalid="ignore"):
-        if variable.step is not None or variable.integer:
-            step = np.full(count, float(variable.step or 1))
-            counts = np.floor((high - low) / step + BOUND_ROUNDING) + 1
-        else:
-            counts = np.where(high >= low, float(variable.number or 1), 0.0)
-            step = (high - low) / np.maximum(counts - 1, 1)
+    if variable.step is not None or variable.integer:
+        step = np.full(count, float(variable.step or 1))
+        counts = np.floor((high - low) / step + BOUND_ROUNDING) + 1
+    else:
+        counts = np.where(high >= low, float(variable.number or 1), 0.0)
+        step = (high - low) / np.maximum(counts - 1, 1)
     return low, step, np.where(np.isfinite(counts), np.maximum(counts, 0), 0)
 
 

@@ -109,13 +109,12 @@ class Reliable:
         from mechdesign.numerics.statistics import outside
 
         allowed = self.measure(level)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # Bracket of the deviation's logarithm: exact for symmetric limits, wider where one limit is farther.
-            least, most = (np.log(np.minimum(high, -low) * factor / np.exp(level)) for factor in (0.1, 1e3))
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (least + most)
-                kept = outside(low / np.exp(middle), high / np.exp(middle)) <= allowed
-                least, most = np.where(kept, middle, least), np.where(kept, most, middle)
+        # Bracket of the deviation's logarithm: exact for symmetric limits, wider where one limit is farther.
+        least, most = (np.log(np.minimum(high, -low) * factor / np.exp(level)) for factor in (0.1, 1e3))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (least + most)
+            kept = outside(low / np.exp(middle), high / np.exp(middle)) <= allowed
+            least, most = np.where(kept, middle, least), np.where(kept, most, middle)
         return np.where((low < 0) & (high > 0), np.exp(most), 0.0)
 
 
@@ -175,8 +174,7 @@ def aim_of(allocate: Allocate) -> Aim:
 
 def _cpk(question: ReliabilityQuestion, mean: Floats, sigma: Floats) -> Floats:
     """Cpk of each band, shape (bands, poses), from moments of shape (channels, poses)."""
-    with np.errstate(divide="ignore"):
-        return np.stack([
-            np.minimum(band.high - mean[band.output], mean[band.output] - band.low) / (3.0 * sigma[band.output])
-            for band in question.bands
-        ])  # fmt: skip
+    return np.stack([
+        np.minimum(band.high - mean[band.output], mean[band.output] - band.low) / (3.0 * sigma[band.output])
+        for band in question.bands
+    ])  # fmt: skip

@@ -240,8 +240,7 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
     for disc in question.discs:
         weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROWEST) ** 2
     parts = np.nansum(linear.share() * (weights * linear.deviation() ** 2)[:, None], axis=0).T
-    with np.errstate(invalid="ignore"):
-        return np.asarray(parts / parts.sum(axis=1, keepdims=True))
+    return np.asarray(parts / parts.sum(axis=1, keepdims=True))
 
 
 def _allocation(last: _Round) -> Table:

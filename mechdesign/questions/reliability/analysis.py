@@ -175,13 +175,12 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             if bent is not None and elastic is not None:
                 block_elastic = bent.at(part, channels, rows[block])
                 elastic.flexibility[:, :, rows[block]] = block_elastic.flexibility
-            with np.errstate(invalid="ignore", divide="ignore"):
-                block_sources = sources.take(rows[block])
-                errors = linear_errors(
-                    mechanism, part, channels, block_sources, rates.take(block), block_elastic,
-                    None if own is None else own.take(block),
-                )  # fmt: skip
-                margins = linear_margins(mechanism, part, block_sources)
+            block_sources = sources.take(rows[block])
+            errors = linear_errors(
+                mechanism, part, channels, block_sources, rates.take(block), block_elastic,
+                None if own is None else own.take(block),
+            )  # fmt: skip
+            margins = linear_margins(mechanism, part, block_sources)
             linear.components[:, :, rows[block]] = errors.components
             if not len(closing.components):
                 closing = FirstOrder.unknown(sources, len(margins.components), poses.count)

@@ -138,8 +138,7 @@ class WithLengths(FirstOrder):
         """As of the linear model; what the mean length does not say of a short one is shared as its mean square is."""
         along, square = self._along(self._means).parts, self._vectors.parts[0::2] + self._vectors.parts[1::2]
         rest = self.deviation()[list(self.outputs)] ** 2 - along.sum(axis=1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            own = along + square * (np.maximum(rest, 0.0) / square.sum(axis=1))[:, None]
+        own = along + square * (np.maximum(rest, 0.0) / square.sum(axis=1))[:, None]
         return self._replaced(super().parts, np.nan_to_num(own))
 
     @cached_property
@@ -238,8 +237,7 @@ def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     way = np.stack([np.cos(angle), np.sin(angle)])
     sigma = np.sqrt(np.maximum(squares, 0.0) @ way**2)
     along = np.einsum("pij,pi->pj", axes, mean) @ way
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(sigma > 0, along / (sigma * np.sqrt(2.0)), np.where(along == 0, 0.0, np.sign(along) * np.inf))
+    ratio = np.where(sigma > 0, along / (sigma * np.sqrt(2.0)), np.where(along == 0, 0.0, np.sign(along) * np.inf))
     side = erf(ratio)
     length = (sigma * np.sqrt(2.0 / np.pi) * np.exp(-(ratio**2)) + along * side) @ weight
     return length, np.einsum("pij,pj->pi", axes, (side * weight) @ way.T)

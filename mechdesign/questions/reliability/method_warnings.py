@@ -119,8 +119,7 @@ def _flat(task: Task, second: MethodResult) -> tuple[int, int, float, float] | N
     true = np.sqrt(np.diagonal(second.moments(task)[1], axis1=1, axis2=2).T) * task.scale[:, None]
     unit = task.labels[2]
     largest = np.array([np.nanmax(np.fmax(true, deviation)[unit == own], initial=0.0) for own in unit])[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        part = np.where(true > _FLAT_LEAST * largest, deviation / true, np.nan)
+    part = np.where(true > _FLAT_LEAST * largest, deviation / true, np.nan)
     if not (part < 1.0 / _CURVED_FACTOR).any():
         return None
     output, pose = np.unravel_index(np.nanargmin(part), part.shape)

@@ -253,13 +253,12 @@ class ReliabilityQuestion:
         Errors of a mechanism that is not assembled are nan and keep no limit.
         """
         kept = np.ones((len(self.bands) + len(self.discs), errors.shape[1]), dtype=bool)
-        with np.errstate(invalid="ignore"):
-            for row, band in zip(kept, self.bands, strict=False):
-                error = errors[band.output]
-                row[:] = (error >= band.low) & (error <= band.high)
-            for row, disc in zip(kept[len(self.bands) :], self.discs, strict=True):
-                x, y = errors[disc.x], errors[disc.y]
-                row[:] = x * x + y * y <= disc.radius * disc.radius
+        for row, band in zip(kept, self.bands, strict=False):
+            error = errors[band.output]
+            row[:] = (error >= band.low) & (error <= band.high)
+        for row, disc in zip(kept[len(self.bands) :], self.discs, strict=True):
+            x, y = errors[disc.x], errors[disc.y]
+            row[:] = x * x + y * y <= disc.radius * disc.radius
         return kept
 
     @property
@@ -278,8 +277,7 @@ class ReliabilityQuestion:
         gradients = [-sign * slopes[output] for output, _, sign in self._ends]
         for disc in self.discs:
             x, y = errors[disc.x], errors[disc.y]
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
+            gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
         return np.stack(gradients)
 
 

@@ -123,8 +123,7 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
     forces = None if setting.forces is None else setting.forces.made(made.parameters)
     question, elastic = setting.question, setting.elastic
     channels = question.channels if elastic is None else question.vectors
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        values = nominal_values(setting.mechanism, solved, channels, setting.rates, forces)
+    values = nominal_values(setting.mechanism, solved, channels, setting.rates, forces)
     errors = np.empty((len(question.channels), count))
     for error, value, centre in zip(errors, values, setting.centres, strict=False):
         error[:] = value - centre

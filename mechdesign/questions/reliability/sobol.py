@@ -139,9 +139,8 @@ def _ratio(parts: Floats, whole: Floats) -> Floats:
     from mechdesign.numerics.statistics import student
 
     count, mean = len(parts), whole.mean(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = np.where(mean > 0, parts.mean(axis=0) / mean, np.nan)
-        spread = np.std((parts - value * whole) / mean, axis=0, ddof=1) / np.sqrt(count)
+    value = np.where(mean > 0, parts.mean(axis=0) / mean, np.nan)
+    spread = np.std((parts - value * whole) / mean, axis=0, ddof=1) / np.sqrt(count)
     half = student(count - 1, CONFIDENCE) * spread
     return np.asarray(np.clip(np.stack([value, value - half, value + half]), 0.0, 1.0))
 

@@ -152,10 +152,9 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
     for k, band in enumerate(question.bands):
         low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        both = np.isfinite(low) & np.isfinite(high)
-        cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
-        cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
+    both = np.isfinite(low) & np.isfinite(high)
+    cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
+    cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
     upper = np.where(np.isfinite(high), nominal + high, np.nan)
     for k, disc in enumerate(question.discs, bands):
         upper[..., k] = np.reshape(disc.radius, (-1, 1))
