@@ -120,7 +120,7 @@ def test_pages_for_contributors_name_every_folder_and_files_that_exist() -> None
     overview = read("docs/contributing/index.md")
     for folder in (ROOT / "mechdesign").iterdir():
         assert not (folder / "__init__.py").exists() or f"`mechdesign/{folder.name}/`" in overview
-    for page in ("index", "adding", "testing"):
+    for page in ("index", "one_study", "adding", "testing"):
         for path in re.findall(r"`((?:mechdesign|tests|docs|configs)/[\w./-]+)`", read(f"docs/contributing/{page}.md")):
             assert (ROOT / path).exists(), path
 
