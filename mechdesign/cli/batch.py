@@ -21,7 +21,6 @@ from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, n
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     HERE,
-    Outcome,
     answer,
     drawing_ahead,
     interrupted,
@@ -32,6 +31,7 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.live_table import LiveTable, Reported
 from mechdesign.cli.options import Options
+from mechdesign.cli.outcome import Outcome
 from mechdesign.cli.places import claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import StudyError

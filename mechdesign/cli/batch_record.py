@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
+from mechdesign.cli.outcome import Outcome
 from mechdesign.cli.places import RESULTS, SUMMARY
 from mechdesign.errors import Interrupted, MechdesignError, counted, printable
 from mechdesign.records import check_replaceable

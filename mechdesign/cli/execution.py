@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,11 @@ from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.live_table import Bar
 from mechdesign.cli.options import PDF, Options
+from mechdesign.cli.outcome import Outcome
 from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
-from mechdesign.files import FORMATS, owned, settle
+from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
 from mechdesign.questions.look import is_long
 from mechdesign.report import manifest, requirements, writer
@@ -48,48 +48,6 @@ STANDARD_INPUT = Path("-")
 HERE = Path("study.yaml")  # the study where none is named
 PICTURES = "mechdesign.report.figures.pictures"  # with it all of Matplotlib that pictures need is imported
 _ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
-OUTCOMES = {
-    0: "done",
-    1: "requirement not met",
-    2: "wrong study",
-    3: "cannot be assembled",
-    4: "failed",
-    Interrupted.exit_code: "interrupted",
-}
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The outcome of one command; `rows` are those of the main table."""
-
-    study: str
-    command: str
-    directory: Path
-    exit_code: int
-    rows: int
-    warnings: Sequence[Caution] = ()
-    failed: str = ""
-    verdicts: Sequence[Verdict] = ()
-    seconds: float = 0.0
-    kept: bool = False
-    written: bool = False  # whether the results are in the directory
-    table: Table | None = None  # the main table
-    shard: str = ""  # what became of the shard, with --shard
-    left: bool = False  # whether the run ended before this question
-    reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
-
-    @property
-    def picture(self) -> Path | None:
-        """The most telling of its pictures; None where there is none."""
-        content = manifest.read(self.directory) if self.written else None
-        files = manifest.recorded_files(content) if content is not None else {}
-        # The pictures of a question are listed in their order, which begins with the most telling.
-        return next((self.directory / name for name in files if name.rpartition(".")[2] in FORMATS), None)
-
-    @property
-    def word(self) -> str:
-        """The outcome in a word or two."""
-        return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
 def source(path: Path | None, options: Options) -> StudySource:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from mechdesign.cli.execution import Outcome
+from mechdesign.cli.outcome import Outcome
 from mechdesign.errors import printable, printable_lines
 from mechdesign.experiments.columns import SUMMARY
 from mechdesign.results import Table

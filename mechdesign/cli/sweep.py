@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.cli.batch_record import failure, name_of
-from mechdesign.cli.execution import Outcome, ask
+from mechdesign.cli.execution import ask
 from mechdesign.cli.options import Options
+from mechdesign.cli.outcome import Outcome
 from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError
 from mechdesign.experiments.schema.matrix import RANGE

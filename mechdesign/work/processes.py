@@ -47,7 +47,9 @@ class Processes(ProcessPoolExecutor):
         super().__init__(count, context(), _begin, (settle_in, *given))
         others = multiprocessing.active_children()
         try:
-            with interrupts.undisturbed(), nullcontext() if inherit() else _without_script():
+            with interrupts.undisturbed(), warnings.catch_warnings(), nullcontext() if inherit() else _without_script():
+                # A process may be forked beside threads: what begins there needs none of their locks.
+                warnings.simplefilter("ignore", DeprecationWarning)
                 # Work that meets no idle process begins one.
                 for _ in range(count):
                     self.submit(os.getpid)

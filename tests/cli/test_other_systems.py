@@ -121,9 +121,9 @@ def contents(folder):
     "command",
     [
         ("kinematics", "slider.yaml"),
-        ("reliability", "arm.yaml", "--no-plots"),
+        pytest.param(("reliability", "arm.yaml", "--no-plots"), marks=pytest.mark.nightly),
         ("optimize", "arm.yaml", "--no-plots"),
-        ("sweep", "arm.yaml", "--no-plots"),
+        pytest.param(("sweep", "arm.yaml", "--no-plots"), marks=pytest.mark.nightly),
         ("run", "arm.yaml", "slider.yaml", "--no-plots"),
     ],
 )
@@ -169,6 +169,7 @@ print(*(one == two))
     assert (output, told, code) == ("True True True True\n", "", 0)
 
 
+@pytest.mark.nightly
 def test_a_worker_that_dies(here, invoke):
     """Its chunks are computed again."""
     command = ("reliability", "arm.yaml", "--set", "reliability.samples=1000000", "--no-plots", "--jobs")

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
+from mechdesign.cli.outcome import Outcome
 from mechdesign.cli.summary import summary
 from mechdesign.report.figures import pictures, style
 from mechdesign.report.figures.rendering import Gallery
