@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
+from mechdesign.report.figures.layout import fitting
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
 MIN_HEIGHT = 1.5  # inches, of a window
@@ -22,6 +24,7 @@ LEFT = 0.78
 BELOW = 0.55
 ABOVE = 0.12
 RIGHT = 0.15
+_LEGEND_ROW = 0.19
 
 
 class Window(NamedTuple):
@@ -110,3 +113,13 @@ def tiled(
 
     fitted = {columns: window(columns) for columns in range(1, min(count, most) + 1)}
     return max(fitted.items(), key=lambda item: item[1].scale)
+
+
+def legend_at_left(figure: Figure, handles: Sequence[Line2D], columns: int) -> None:
+    """One legend at the bottom from the left edge of drawings on; a narrow page is made higher for its rows."""
+    labels = [str(handle.get_label()) for handle in handles]
+    if style.narrow():
+        columns = fitting(labels, style.width() - LEFT)
+    style.grow(figure, below=_LEGEND_ROW * (-(-len(labels) // columns) - 1))
+    place = (LEFT / style.width() - 0.02, 0.0)
+    figure.legend(handles, labels, loc="lower left", ncols=columns, bbox_to_anchor=place)

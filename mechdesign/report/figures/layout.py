@@ -294,13 +294,13 @@ def _size(cell: _Cell, wide: float) -> None:
     for axis, declared, outer in cell.drawn_axes:
         # What axes share is set at one of them.
         if outer:
-            _tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
+            tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
         axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer and declared.numbers)
         axis.set_label_text(declared.label if outer else "")
         axis.offsetText.set_visible(outer)
 
 
-def _tick(axis: Drawn, declared: Axis, inches: float) -> None:
+def tick(axis: Drawn, declared: Axis, inches: float) -> None:
     """Ticks along so many inches of an axis."""
     upright = axis is axis.axes.yaxis
     if declared.words or len(declared.ticks):
@@ -372,7 +372,7 @@ def _place(cell: _Cell, left: float) -> None:
     width, height = axes.bbox.width / style.dots(), axes.bbox.height / style.dots()
     for axis, declared, outer in cell.drawn_axes:
         if outer and not (declared.words or len(declared.ticks)):
-            _tick(axis, declared, width if axis is axes.xaxis else height)
+            tick(axis, declared, width if axis is axes.xaxis else height)
         axis.label.set_visible(True)
     axes.yaxis.set_label_coords((_PAD - left) / width, 0.5)
     axes.yaxis.label.set_verticalalignment("top")

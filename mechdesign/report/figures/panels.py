@@ -1,4 +1,4 @@
-"""Results over the poses: panels along a sweep, one below the other, maps over a plane, their titles and legends."""
+"""Results over the poses: the axis of a sweep, maps over a plane, and numbers in words."""
 
 from __future__ import annotations
 
@@ -7,49 +7,18 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from mechdesign.motion.rows import TIME, Poses, Sector, Sectors, with_length
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import LEFT
-from mechdesign.report.figures.layout import OVER, TURNS
 from mechdesign.report.figures.marks import Axis, Contours, Panel, Picture
 from mechdesign.study import Study
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
-# Inches.
-_LEFT = 0.88
-_RIGHT = 0.3
-_TOP = 0.62
-_GAP = 0.42
-_HEIGHT = 1.75
-_EDGE = 0.05  # left of the label of an axis
-_LINE = 0.18  # a line of it
-_TICK = 0.1  # a tick and its gap
-_DIGIT = 0.083  # a digit of its number
-BELOW_BARE = 0.6  # below the lowest panel: its axis alone
-BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
-# Inches of a map and its bar of colours.
-_MAP_LEFT = 0.75
-_MAP_BELOW = 0.55
-_BAR = 1.1
-_MAP_TOP = 0.7
-_MAP_GAP = 0.5
-_MAX_MAP_HEIGHT = 5.2
-_MAX_SHEET_HEIGHT = 7.6  # of two rows of maps
 _FLAT = 0.8  # height over width below which two maps stand one below the other
 _EDGE_OF_MAP = 0.02  # of its size, beyond the region
 _NARROW = 10.0  # ratio of values up to which levels are at even steps
-_LETTER = 0.56  # mean width of a letter in font sizes
-_LEGEND_LETTERS = 14.75  # an inch
-_LEGEND_ROW = 0.19  # inches
-_LEGEND_ROOM = 4 * _LEGEND_ROW  # by which a narrow page may grow for its title and its legend
-_ABSCISSA_TICK = 0.47  # inches from one to the next
 
 
 class Along(NamedTuple):
@@ -110,93 +79,6 @@ def coordinate_label(study: Study, name: str) -> str:
     return style.axis_label(name, study.units.label(study.mechanism.quantity(name)))
 
 
-def title(figure: Figure, text: str, *notes: str, left: float = _LEFT) -> None:
-    """A title at the top left, and smaller lines below it; a narrow page is made higher where they are folded."""
-    room, folds = style.width() - left - 0.1, 0.0
-    lines: list[tuple[str, float, float]] = []
-    for k, (words, size) in enumerate(((text, 11.0), *((note, 8.5) for note in notes if note))):
-        below = 0.1 + 0.18 * k + 0.04 * bool(k) + folds
-        if style.narrow():
-            words = style.folded(words, size, room)
-            folds += style.line(size) * words.count("\n")
-        lines.append((words, min(size, 72 * room / _LETTER / max(map(len, words.split("\n")))), below))
-    style.grow(figure, above=folds)
-    for words, size, below in lines:
-        figure.text(left / style.width(), 1 - below / figure.get_figheight(), words, va="top", fontsize=size)
-
-
-def stack(
-    panels: int, heading: str, label: str, *, note: str = "", tall: float = _HEIGHT, bottom: float = BELOW_WITH_LEGEND
-) -> tuple[Figure, list[Axes]]:
-    """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
-    top = _TOP + 0.1 * bool(note)
-    tall = min(tall, (style.tallest() - top - bottom - _LEGEND_ROOM + _GAP) / panels - _GAP)
-    figure, axes = style.page(panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_GAP, sharex=True)
-    title(figure, heading, note)
-    for axis in axes:
-        # Given places: to find them from the tick labels would take as long as the rest of the picture.
-        axis.set_title("", y=1.02)
-        axis.locator_params(axis="y", nbins=5)
-        axis.yaxis.set_label_coords((_EDGE - _LEFT) / (style.width() - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
-        axis.yaxis.label.set_verticalalignment("top")
-    axes[-1].xaxis.set_label_coords(0.5, -0.35 / tall, transform=axes[-1].transAxes)
-    axes[-1].set_xlabel(label)
-    return figure, axes
-
-
-def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
-    """Make room at the left so that no label of an axis lies over the numbers of its ticks; once all is drawn."""
-    style.name_powers(axes)
-    numbers = [
-        text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
-    ]
-    letters = max(map(len, numbers))
-    lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
-    left = max(figure.subplotpars.left * style.width(), _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
-    figure.subplots_adjust(left=left / style.width())
-    for axis in axes:
-        axis.yaxis.set_label_coords((_EDGE - left) / (axis.get_position().width * style.width()), 0.5,
-                                    transform=axis.transAxes)  # fmt: skip
-        axis.yaxis.label.set_verticalalignment("top")
-
-
-def tick_abscissa(axis: Axes, swept: Along) -> None:
-    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees.
-
-    The axes that share them are marked as panels over what is swept; a page moves a cursor through them.
-    """
-    for panel in axis.get_shared_x_axes().get_siblings(axis):
-        panel.set_label(f"{OVER}{swept.label}")
-    turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
-    inches = axis.get_position().width * style.width()
-    axis.xaxis.set_major_locator(
-        MaxNLocator(nbins=min(9, int(inches / _ABSCISSA_TICK)), steps=TURNS if turning else [1, 2, 2.5, 5, 10])
-    )
-
-
-def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
-    """One legend at the bottom, in as many columns as the width holds; a narrow page is made higher for its rows."""
-    if labels:
-        style.grow(figure, below=legend_room(labels))
-        figure.legend(handles, labels, loc="lower center", ncols=fitting(labels), borderaxespad=0.2)
-
-
-def legend_at_left(figure: Figure, handles: Sequence[Line2D], columns: int, **look: Any) -> None:
-    """One legend at the bottom from the left edge of drawings on; a narrow page has as many columns as it holds."""
-    labels = [str(handle.get_label()) for handle in handles]
-    style.grow(figure, below=legend_room(labels, LEFT))
-    columns = fitting(labels, style.width() - LEFT) if style.narrow() else columns
-    figure.legend(handles, labels, loc="lower left", ncols=columns,
-                  bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0), **look)  # fmt: skip
-
-
-def legend_room(labels: Sequence[str], indent: float = 0.0) -> float:
-    """Inches below the panels that a legend needs beyond those it needs on a wide page; it begins at an indent."""
-    rows = (-(-len(labels) // fitting(labels, wide - indent)) for wide in (style.width(), style.LOOKS["screen"].width))
-    narrow, wide = rows
-    return _LEGEND_ROW * (narrow - wide)
-
-
 def number(value: float) -> str:
     """A probability in three digits."""
     return f"{value:.3g}" if value == 0 or value >= 1e-3 else style.in_powers(value)
@@ -215,12 +97,6 @@ def round_down(value: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
-
-
-def fitting(labels: Sequence[str], width: float | None = None) -> int:
-    """Columns of a legend that a width holds (inches), that of the page if none is given."""
-    letters = int(_LEGEND_LETTERS * (style.width() if width is None else width))
-    return max(1, min(len(labels), letters // (8 + max(len(label) for label in labels))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,7 +99,7 @@ class CaseAxis:
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class CaseKind:
     """Cases that are drawn alike: in words, their colour and marker, which they are, how large at least."""
 
     words: str
@@ -116,7 +116,7 @@ class Kind:
         return Dots(x.values[rows], y.values[rows], label=self.words, look=look)
 
 
-def kinds_of(table: Table, *, required: bool) -> list[Kind]:
+def kinds_of(table: Table, *, required: bool) -> list[CaseKind]:
     """Cases by how they ended, and where they are ranked those on the front and the best, the better ones on top."""
     codes = table["exit_code"]
     met = "meets every requirement" if required else "answered"
@@ -128,11 +128,11 @@ def kinds_of(table: Table, *, required: bool) -> list[Kind]:
     if best is not None and best.front > best.equals:
         looks.append(("on the Pareto front", style.ORANGE, "D", table[FRONT] == 1))
     kinds = [
-        Kind(f"{words} ({counted(int(cases.sum()), 'case')})", color, marker, cases)
+        CaseKind(f"{words} ({counted(int(cases.sum()), 'case')})", color, marker, cases)
         for words, color, marker, cases in looks
         if cases.any()
     ]
-    return kinds if best is None else [*kinds, Kind(f"best: {best.words}", style.INK, "*", table[RANK] == 1, _STAR)]
+    return kinds if best is None else [*kinds, CaseKind(f"best: {best.words}", style.INK, "*", table[RANK] == 1, _STAR)]
 
 
 def sample(table: Table, most: int) -> tuple[Ints, float]:

@@ -13,8 +13,7 @@ from mechdesign.questions.kinematics.figures.poses import centre_look
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
-from mechdesign.report.figures.panels import legend_at_left
+from mechdesign.report.figures.framing import LEFT, RIGHT, extent, legend_at_left, tiled, windows
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Table

@@ -60,7 +60,7 @@ _OPEN_HEAD = Path([(-1, 0.42), (0, 0), (-1, -0.42)])
 _Row = list[tuple[str, str]]
 
 
-class _Kind(NamedTuple):
+class RateArrow(NamedTuple):
     """An order of rates, and how its arrows look."""
 
     name: str
@@ -71,8 +71,8 @@ class _Kind(NamedTuple):
 
 
 KINDS = (
-    _Kind("velocity", style.INK, {"linestyle": "-", "linewidth": 1.7}, _FILLED_HEAD, True),
-    _Kind("acceleration", style.VERMILION, {"linestyle": (0, (3, 1.4)), "linewidth": 1.5}, _OPEN_HEAD, False),
+    RateArrow("velocity", style.INK, {"linestyle": "-", "linewidth": 1.7}, _FILLED_HEAD, True),
+    RateArrow("acceleration", style.VERMILION, {"linestyle": (0, (3, 1.4)), "linewidth": 1.5}, _OPEN_HEAD, False),
 )
 
 
@@ -183,7 +183,7 @@ def _heading(chosen: SpecialPoses, *, listed: bool) -> str:
     return heading + (f"; the first {len(chosen.shown)}, and {chosen.left_out} more" if chosen.left_out else "")
 
 
-def arrow(base: complex, along: complex, kind: _Kind, inches: float, **more: Any) -> Line2D:
+def arrow(base: complex, along: complex, kind: RateArrow, inches: float, **more: Any) -> Line2D:
     """A line from a place along a vector, with the head of its kind at the tip; `inches` a length of one is drawn."""
     tip, head_length = base + along, min(_HEAD, _HEAD_SHARE * 72 * inches * abs(along))
     head = MarkerStyle(kind.head, fillstyle="full" if kind.filled else "none").rotated(rad=float(np.angle(along)))

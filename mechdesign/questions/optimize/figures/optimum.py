@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,10 +24,11 @@ from mechdesign.questions.workspace.figures.boundary import regions_picture, wor
 from mechdesign.questions.workspace.figures.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
-from mechdesign.report.figures.marks import PanelMark, Picture, Trace
+from mechdesign.report.figures.framing import LEFT, RIGHT, extent, framed
+from mechdesign.report.figures.layout import OVER, tick
+from mechdesign.report.figures.marks import Axis, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.mechanism import sketch_and_first_pose
-from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, legend_below, tick_abscissa
+from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result, Table
@@ -46,6 +47,7 @@ _LEGEND = 0.35
 _BESIDE = 0.12
 _MAX_BESIDE = 4.0
 _SMALL_SYMBOLS = 0.7
+_ROOM = 0.07  # of its size, about what is shown
 _LETTERS_AN_INCH = 13.5
 _CURVE_POSES = 240  # of the motion between listed poses
 # Of more poses the values are joined by a line.
@@ -100,7 +102,8 @@ def design_figure(study: Study, motion: Result, words: str) -> Figure:
         figure = _posed(sweep, worst, _targets(table, shown), above)
     axes = figure.axes[0]
     axes.set_title(title, loc="left", fontsize=10.5)
-    _draw_targets(axes, table, shown)
+    for mark in _target_marks(table, shown):
+        mark.draw(axes).set_label(mark.label)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
     if shown:
@@ -108,39 +111,31 @@ def design_figure(study: Study, motion: Result, words: str) -> Figure:
     return figure
 
 
-def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
+def designs_picture(parts: Sequence[tuple[str, Shown, Result | None]]) -> Picture:
     """Designs side by side on one scale: each in its poses, under its words, with its motion where that was judged."""
     sweeps = [Sweep.of(shown) for _, shown, _ in parts]
-    places = np.concatenate([sweep.extent for sweep in sweeps])
-    count = len(parts)
-    columns = 1 if style.narrow() else count
-    wide = column_width(columns, _BESIDE)
-    titles = [
-        style.folded(words.replace("\n", ", "), 8.5, wide)
-        if style.narrow()
-        else "\n".join(textwrap.fill(line, int(wide * _LETTERS_AN_INCH)) for line in words.splitlines())
-        for words, _, _ in parts
-    ]
-    above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
-    free = (style.tallest() - _BELOW - 2 * _LEGEND) / count - above
-    window = fit(places, wide, _MAX_BESIDE if columns > 1 else min(8.0 / count, free), 0.25)
-    figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
-                           below=_BELOW + _LEGEND)  # fmt: skip
-    for axes, title, sweep, (_, _, motion) in zip(grid, titles, sweeps, parts, strict=True):
-        axes.set_title(title, loc="left", fontsize=8.5)
-        axes.locator_params(nbins=5)
-        if sweep.poses.motion:
-            draw_paths(axes, sweep, width=0.8)
-        if motion is not None:
-            table = motion.tables["motion"]
-            _draw_targets(axes, table, reached(table))
-        draw_mechanism(
-            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
-            travel=sweep.travel, size=_SMALL_SYMBOLS,
-        )  # fmt: skip
-    handles, labels = grid[0].get_legend_handles_labels()
-    legend_below(figure, handles, labels)
-    return figure
+    places, panels = np.concatenate([sweep.extent for sweep in sweeps]), []
+    for (words, _, motion), sweep in zip(parts, sweeps, strict=True):
+        table = motion.tables["motion"] if motion is not None else None
+        targets = [] if table is None else [*_target_marks(table, reached(table))]
+        panels.append((words, [*targets, Own(partial(_draw_design, sweep), late=True)]))
+    middle, wide, tall = extent(places)
+    half = np.array([wide, tall]) / 2 + _ROOM * max(wide, tall)
+    unit = sweeps[0].study.units.label("length")
+    x, y = (Axis(name, unit, ends=(at - side, at + side))
+            for name, at, side in zip("xy", (middle.real, middle.imag), half.tolist(), strict=True))  # fmt: skip
+    shown = [Panel(marks, x, y, words, equal=1.0, plane=True) for words, marks in panels]
+    return Picture("", shown, across=1 if style.narrow() else len(shown), share="xy")
+
+
+def _draw_design(sweep: Sweep, axes: Axes) -> None:
+    """A design in its first valid pose, and the paths of its points."""
+    if sweep.poses.motion:
+        draw_paths(axes, sweep, width=0.8)
+    draw_mechanism(
+        axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
+        travel=sweep.travel, size=_SMALL_SYMBOLS,
+    )  # fmt: skip
 
 
 def _worst(shown: Sequence[Reached], valid: Ints) -> int:
@@ -163,13 +158,14 @@ def _targets(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
     return targets
 
 
-def _draw_targets(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
+def _target_marks(table: Table, shown: Sequence[Reached]) -> Iterator[Trace]:
     """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
     for point, targets in _targets(table, shown).items():
         x, y = (table[f"{point}.{axis}"] for axis in "xy")
         few = len(targets) <= _MAX_DOTS
-        axes.plot(targets.real, targets.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
-        axes.plot(x, y, color=style.INK, label=f"{point} reached", **_LOOKS["reached", few])
+        wanted = {"color": style.VERMILION} | _LOOKS["wanted", few]
+        yield Trace(targets.real, targets.imag, label=f"{point} wanted", look=wanted)
+        yield Trace(x, y, label=f"{point} reached", look={"color": style.INK} | _LOOKS["reached", few])
 
 
 def _posed(sweep: Sweep, index: int, targets: dict[str, Complexes], above: float) -> Figure:
@@ -237,7 +233,8 @@ def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
             axes.set_title(titles[curve.output], loc="left", fontsize=9.5)
             axes.set_ylabel(style.axis_label("error", curve.unit))
         axes.locator_params(axis="y", nbins=5)
-        tick_abscissa(axes, over)
+        axes.set_label(f"{OVER}{over.label}")
+        tick(axes.xaxis, over.axis, wide * style.width())
         axes.margins(x=0.02)
         if k == len(rows) - 1:
             axes.set_xlabel(over.label)
@@ -258,7 +255,7 @@ def optimum_figure(view: DesignsView) -> Figure | Picture:
         moving = [(words, own.shown, own.motion) for words, own in parts
                   if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
         if len(parts) > 1 and len(moving) == len(parts):
-            return designs_figure(moving)
+            return designs_picture(moving)
         judged = [(words, own.study, regions(own.study, own.region)[0], [*_contained(own)]) for words, own in parts
                   if own.region is not None]  # fmt: skip
         if len(parts) > 1 and len(judged) == len(parts):

@@ -25,8 +25,8 @@ from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
-from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, legend_at_left, windows
+from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import ARC, arc, force
