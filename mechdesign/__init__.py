@@ -28,14 +28,15 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from mechdesign.api.cases import evaluate as evaluate
+    from mechdesign.api.cases import sensitivities as sensitivities
+    from mechdesign.api.cases import sweep as sweep
+    from mechdesign.api.loading import load as load
     from mechdesign.api.questions import dynamics as dynamics
     from mechdesign.api.questions import kinematics as kinematics
-    from mechdesign.api.questions import load as load
     from mechdesign.api.questions import optimize as optimize
     from mechdesign.api.questions import reliability as reliability
-    from mechdesign.api.questions import sensitivities as sensitivities
     from mechdesign.api.questions import stiffness as stiffness
-    from mechdesign.api.questions import sweep as sweep
     from mechdesign.api.questions import workspace as workspace
     from mechdesign.api.shown import Answer as Answer
     from mechdesign.cautions import Caution as Caution
@@ -64,20 +65,12 @@ _HOMES = {
     **dict.fromkeys(("Verdict", "requirements"), "mechdesign.report.requirements"),
     **dict.fromkeys(("Column", "Table"), "mechdesign.results"),
     "Study": "mechdesign.study",
+    "load": "mechdesign.api.loading",
     **dict.fromkeys(
-        (
-            "load",
-            "kinematics",
-            "workspace",
-            "optimize",
-            "reliability",
-            "stiffness",
-            "dynamics",
-            "sweep",
-            "sensitivities",
-        ),
+        ("kinematics", "workspace", "optimize", "reliability", "stiffness", "dynamics"),
         "mechdesign.api.questions",
     ),
+    **dict.fromkeys(("sweep", "sensitivities", "evaluate"), "mechdesign.api.cases"),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 

@@ -1,70 +1,19 @@
-"""`load` and the questions, as Python and notebooks ask them."""
+"""The questions, as Python and notebooks ask them."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from typing import Any
 
-from mechdesign import study as studies
-from mechdesign.api.shown import Answer, ShownStudy
+from mechdesign.api.shown import Answer
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
 from mechdesign.work.chunks import spread
 from mechdesign.work.journal import Journal
-
-
-def load(
-    source: str | os.PathLike[str] | Mapping[str, Any] | None = None,
-    overrides: Sequence[str] | Mapping[str, Any] = (),
-    seed: int | None = None,
-    *,
-    text: str | bytes | None = None,
-    allow_files: bool = False,
-) -> ShownStudy:
-    """Load a study from a file, a mapping or a text in YAML.
-
-    Parameters
-    ----------
-    source : path or mapping
-        The study file, or the study as plain data; NumPy's numbers and arrays are taken as numbers and lists.
-    overrides : sequence of str, or mapping
-        ``"a.b.c=value"``, or values by their dotted names; applied in their order, before the study is checked.
-    seed : int, optional
-        In place of the study's own.
-    text : str or bytes
-        The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
-        those of a mapping.
-    allow_files : bool
-        Whether files that the study names may lie outside its folder.
-
-    Returns
-    -------
-    ShownStudy
-        What it says, in its own units; in a notebook it shows its mechanism.
-
-    Raises
-    ------
-    StudyError
-        With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
-
-    Examples
-    --------
-    >>> import mechdesign
-    >>> study = mechdesign.load(text='''
-    ... mechanism:
-    ...   links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
-    ...   drives: [crank]
-    ...   sketch: {A: [0, 30], B: [75, 55]}
-    ... ''')
-    >>> study.mechanism.mobility
-    1
-    """
-    return ShownStudy.of(studies.load(source, overrides, seed, text=text, allow_files=allow_files))
 
 
 def kinematics(
@@ -118,7 +67,7 @@ def kinematics(
     >>> print(f"{swing[0]:.6f} {math.degrees(ends[0] - ends[1]):.6f}")
     60.265244 60.265244
     """
-    return _ask("kinematics", study, seed, jobs=jobs, progress=progress, all_modes=all_modes)
+    return ask("kinematics", study, seed, jobs=jobs, progress=progress, all_modes=all_modes)
 
 
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
@@ -162,7 +111,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     >>> print(f"{area[0]:.3f} {math.pi * (300**2 - 100**2):.3f}")
     251327.412 251327.412
     """
-    return _ask("workspace", study, seed, jobs=jobs, progress=progress)
+    return ask("workspace", study, seed, jobs=jobs, progress=progress)
 
 
 def optimize(
@@ -214,7 +163,7 @@ def optimize(
     >>> print(f"{best['a'][0]:g} mm, {best['kinematics.mu'][0]:.2f} deg")
     20 mm, 60.61 deg
     """
-    return _ask("optimize", study, seed, jobs=jobs, progress=progress, journal=journal)
+    return ask("optimize", study, seed, jobs=jobs, progress=progress, journal=journal)
 
 
 def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
@@ -259,7 +208,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     >>> print(f"{result.tables['moments']['sigma'][0]:.4f}, {result.tables['reliability']['reliability'][0]:.4f}")
     0.1000, 0.6827
     """
-    return _ask("reliability", study, seed, jobs=jobs, progress=progress)
+    return ask("reliability", study, seed, jobs=jobs, progress=progress)
 
 
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
@@ -297,7 +246,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     >>> print(f"{mechdesign.stiffness(study).main['k_y'][0]:.6f}")
     100.000000
     """
-    return _ask("stiffness", study, seed, jobs=jobs, progress=progress)
+    return ask("stiffness", study, seed, jobs=jobs, progress=progress)
 
 
 def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
@@ -340,104 +289,15 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     >>> print(f"{result.main['arm_effort'][0]:.3f}, {result.tables['joint_forces']['fy'][0]:.3f}")
     981.000, 19.620
     """
-    return _ask("dynamics", study, seed, jobs=jobs, progress=progress)
-
-
-def sweep(
-    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
-    journal: Journal | None = None,
-) -> Answer:  # fmt: skip
-    """Which cases meet what is required? A row a case of the matrix, each answered as a study of its own.
-
-    Parameters
-    ----------
-    study : Study
-        With a section ``matrix``: which entries vary, and how.
-    seed, jobs, progress, journal : optional
-        See `mechdesign`; cases that are drawn are random, and so is what is random in each.
-
-    Returns
-    -------
-    Answer
-        Table ``sweep``: the values that vary, each requirement's value and whether it is met, the results that the
-        matrix names, why a case failed, and where the matrix says what is ``best`` the rank of each case and whether it
-        is on the Pareto front. A case that cannot be loaded or answered is a row of nan with its reason;
-        ``failed`` counts those.
-
-    Raises
-    ------
-    StudyError
-        If there is no matrix, nothing is required and no result named, or a name is unknown; nothing was computed.
-    Interrupted
-        On Ctrl-C; its ``result`` has the cases that were finished.
-
-    Examples
-    --------
-    The stroke of a slider-crank is twice its crank, whatever its rod.
-
-    >>> import mechdesign
-    >>> study = mechdesign.load(text='''
-    ... mechanism:
-    ...   parameters: {r: 30, l: 100}
-    ...   links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
-    ...   joints: {guide: {prismatic: [ground, slider], through: O}}
-    ...   drives: [crank]
-    ...   sketch: {A: [0, 30], B: [95, 0]}
-    ... matrix: {vary: {mechanism.parameters.r: [30, 45]}, results: [kinematics.extremes.B.x.range]}
-    ... ''')
-    >>> mechdesign.sweep(study).main["kinematics.extremes.B.x.range"].round(6)
-    array([60., 90.])
-    """
-    return _ask("sweep", study, seed, jobs=jobs, progress=progress, journal=journal)
-
-
-def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
-    """What does each number change? Derivatives of results with respect to numbers of the study.
-
-    Parameters
-    ----------
-    study : Study
-        With a section ``sensitivities``: results, and the numbers that change.
-    seed, jobs, progress : optional
-        See `mechdesign`; what is random is the same in every case.
-
-    Returns
-    -------
-    Answer
-        Table ``sensitivities``: a row a result and number, with derivative, error estimate, unit and elasticity. At a
-        kink the derivative is nan, and the slopes on both sides are given.
-
-    Raises
-    ------
-    StudyError
-        If there is no such section, a name is unknown, or what is to change is no number; nothing was computed.
-
-    Examples
-    --------
-    The stroke of a slider-crank is twice its crank, whatever its rod.
-
-    >>> import mechdesign
-    >>> study = mechdesign.load(text='''
-    ... mechanism:
-    ...   parameters: {r: 30, l: 100}
-    ...   links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
-    ...   joints: {guide: {prismatic: [ground, slider], through: O}}
-    ...   drives: [crank]
-    ...   sketch: {A: [0, 30], B: [95, 0]}
-    ... sensitivities: {results: [kinematics.extremes.B.x.range], parameters: [r, l]}
-    ... ''')
-    >>> mechdesign.sensitivities(study).main["derivative"].round(6) + 0.0
-    array([2., 0.])
-    """
-    return _ask("sensitivities", study, seed, jobs=jobs, progress=progress)
+    return ask("dynamics", study, seed, jobs=jobs, progress=progress)
 
 
 def question(command: str) -> Callable[..., Answer]:
     """The function of a question that has none of its own above."""
-    return partial(_ask, command, seed=None, jobs=1)
+    return partial(ask, command, seed=None, jobs=1)
 
 
-def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
+def ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
     """A command's answer, which knows its study."""
     answer = getattr(import_module(QUESTIONS[command].module), command)
     if all_modes:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from mechdesign.errors import MechdesignError
+from mechdesign.family.stacked import grouped, shared
 from mechdesign.motion.answer import MotionQuestion, answer
 from mechdesign.motion.group import Answers, Group
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.analysis import Dynamics
 from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.look import ask
-from mechdesign.questions.optimize.stacked import grouped, shared
 from mechdesign.questions.stiffness.analysis import Stiffness
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mechdesign.experiments.schema.matrix import Named
+from mechdesign.family.goals import bounds_of
 from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.optimize.goals import bounds_of
 from mechdesign.rows import Chosen, UnknownColumnError
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.document import KeyPath

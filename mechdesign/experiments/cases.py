@@ -12,13 +12,14 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
+from mechdesign.family import forms
 from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look, with_fewer_rows
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
-from mechdesign.study import Study, forms
+from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks

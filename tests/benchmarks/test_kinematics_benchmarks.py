@@ -22,10 +22,10 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.experiments.batches import at_poses
+from mechdesign.family.evaluator import Evaluator
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
 from mechdesign.report.tables import csv_blocks

@@ -13,8 +13,8 @@ import pytest
 from helpers.memory import peak_of
 
 import mechdesign
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 
 CONFIGS = Path(__file__).parents[2] / "configs"

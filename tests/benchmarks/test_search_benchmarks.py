@@ -13,9 +13,9 @@ from helpers.syntheses import PROBLEMS
 from scipy.optimize import differential_evolution
 
 import mechdesign
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.numerics.fronts import hypervolume
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 
 STUDY = Path(__file__).parent / "three_variables.yaml"

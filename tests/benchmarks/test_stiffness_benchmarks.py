@@ -12,8 +12,8 @@ import pytest
 
 import mechdesign
 from mechdesign.experiments.batches import answers
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs

@@ -15,8 +15,8 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.errors import AssemblyError
+from mechdesign.family.stacked import tables
 from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.questions.optimize.stacked import tables
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace

@@ -17,9 +17,9 @@ from mechdesign.errors import MechdesignError
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.motion.group import Group
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.results import Result
 

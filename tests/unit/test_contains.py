@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 import mechdesign
 from mechdesign.errors import StudyError
+from mechdesign.family.evaluator import Evaluator
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.inscribed import crossed

@@ -11,9 +11,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechdesignError, StudyError
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import Goal, goal, goals_of, unit_of
-from mechdesign.questions.optimize.question import designs_question
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import Goal, goal, unit_of
+from mechdesign.questions.optimize.question import Evaluation, designs_question, goals_of
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
 from mechdesign.study.schema.conditions import Condition
@@ -359,7 +359,7 @@ def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() ->
     ],
 )
 def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: str, message: str) -> None:
-    from mechdesign.questions.optimize.goals import bounds_of
+    from mechdesign.family.goals import bounds_of
 
     study = study_of(SLIDE + f"optimize: {{variables: {{r: {{from: 0, to: 1, number: 2}}}}, {goals}}}")
     section = study.optimize
@@ -409,13 +409,13 @@ kinematics: {sweep: {arm: {from: 0, to: 80, number: n}}, outputs: [P]}
 optimize: {method: search, variables: {n: {from: 2, to: 9}, r: {from: 1, to: 9}}, minimize: kinematics.motion.P.x}
 """)
     designs = {"n": np.array([3.0, 5.0, 3.0, 2.5]), "r": np.array([10.0, 20.0, 30.0, 40.0])}
-    found = Evaluator(designs_question(study, [goal("kinematics.P.x")], graded=True))(designs)
+    found = Evaluation(designs_question(study, [goal("kinematics.P.x")], graded=True))(designs)
     np.testing.assert_allclose(found.table[:3, 0], np.array([10, 20, 30]) * np.cos(np.radians(80)))
     assert found.reasons == ["", "", "", "kinematics.sweep.arm.number: expected a whole number, not ..."]
 
 
 def test_conditions_with_rows() -> None:
-    from mechdesign.questions.optimize.goals import bounds_of
+    from mechdesign.family.goals import bounds_of
 
     condition = Condition.model_validate(
         {"result": "kinematics.extremes.max", "where": {"output": "P.x"}, "at_most": 3}

@@ -35,6 +35,7 @@ ORDER = (
     ("mechdesign.questions.stiffness",),
     ("mechdesign.questions.reliability",),
     ("mechdesign.questions.workspace",),
+    ("mechdesign.family",),
     ("mechdesign.questions.optimize",),
     ("mechdesign.report.figures",),
     tuple(f"mechdesign.questions.{name}.figures" for name in COMMANDS),

@@ -11,6 +11,7 @@ from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
 import mechdesign
+from mechdesign.family.goals import Goal
 from mechdesign.questions.optimize.figures.designs import value_text
 from mechdesign.questions.optimize.figures.front import front_picture
 from mechdesign.questions.optimize.figures.scores import (
@@ -20,7 +21,6 @@ from mechdesign.questions.optimize.figures.scores import (
     parallel_axes,
     score_curves,
 )
-from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import draw

@@ -10,8 +10,8 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions

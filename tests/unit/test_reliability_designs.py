@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.questions.optimize import stacked
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
+from mechdesign.family import stacked
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
 from mechdesign.study.designs import Designs

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 import mechdesign
 from mechdesign.cli.app import app
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.analysis import _doubts
-from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.explorer import Explorer, Part, Points, Spent
-from mechdesign.questions.optimize.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.optimize.search import Ending, search
 from mechdesign.questions.optimize.variables import from_cube

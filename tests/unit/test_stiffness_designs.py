@@ -13,8 +13,8 @@ from helpers.stiffness import METRES, matrix
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.optimize.evaluation import Evaluator
-from mechdesign.questions.optimize.goals import goal
+from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.study.designs import Designs
 

@@ -11,6 +11,9 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
+from mechdesign.family.evaluator import missing
+from mechdesign.family.goals import Goal, shape_of
+from mechdesign.family.question import DesignsQuestion
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.analysis import kinematics
@@ -18,12 +21,10 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize import pareto
 from mechdesign.questions.optimize import search as searching
-from mechdesign.questions.optimize.evaluation import Evaluator, missing
 from mechdesign.questions.optimize.explorer import Explorer
 from mechdesign.questions.optimize.files import design_files
-from mechdesign.questions.optimize.goals import Goal, shape_of
 from mechdesign.questions.optimize.judge import Designs, Judge
-from mechdesign.questions.optimize.question import DesignsQuestion, designs_question
+from mechdesign.questions.optimize.question import Evaluation, designs_question
 from mechdesign.questions.optimize.tables import (
     best_table,
     bounds_table,
@@ -77,7 +78,7 @@ def optimize(
         else searching.allowance(len(section.variables), len(weights), alone=bool(question.alone))
     )
     question, meanings = question.limited(MAX_KEPT_ROWS // budget), question.meanings
-    with workers(Evaluator(question), jobs, travels=True) as compute:
+    with workers(Evaluation(question), jobs, travels=True) as compute:
         judge = Judge(question, compute, progress, journal)
         try:
             doubts = _ask(study, judge, weights, budget, study.seed if seed is None else seed)

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import MechanismError
+from mechdesign.family.batch import Evaluated
+from mechdesign.family.family import DESIGNS_AT_ONCE
+from mechdesign.family.goals import Goal, unit_of
+from mechdesign.family.question import DesignsQuestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
-from mechdesign.questions.optimize.batch import Evaluated
 from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
 from mechdesign.questions.optimize.explorer import ASSEMBLY, Part, Points
-from mechdesign.questions.optimize.goals import Goal, unit_of
-from mechdesign.questions.optimize.question import DesignsQuestion
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
 from mechdesign.questions.optimize.variables import unit_of as variable_unit
 from mechdesign.questions.reliability.schema.limits import SUFFIXES
@@ -28,9 +29,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
 from mechdesign.work.journal import Journal, digest
 
-# Designs evaluated together: enough for long arrays, few enough that all workers finish at about the same time.
-DESIGNS_AT_ONCE = 384
-# The same where a design costs much and a search evaluates few at once.
+# Designs evaluated together where a design costs much and a search evaluates few at once.
 SLOW_DESIGNS_AT_ONCE = 16
 
 

@@ -1,271 +1,76 @@
-"""What an optimisation asks of every design: its goals and conditions, and the tables, regions and rows they need."""
+"""What an optimisation asks of every design: its goals and conditions."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
 
-from mechdesign.errors import AssemblyError, Problem, StudyError
-from mechdesign.questions.look import look
-from mechdesign.questions.optimize import stacked
-from mechdesign.questions.optimize.batch import Layout
-from mechdesign.questions.optimize.goals import Goal, conditions_of, goals_of, unit_of
-from mechdesign.questions.optimize.variables import choice_problems
-from mechdesign.questions.poses import study_poses
-from mechdesign.questions.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared
-from mechdesign.questions.workspace.tables import index_columns
-from mechdesign.results import Column, Result
-from mechdesign.rows import Chosen, UnknownColumnError
-from mechdesign.statistics import Request
+import numpy as np
+
+from mechdesign.errors import StudyError
+from mechdesign.family.batch import Evaluated
+from mechdesign.family.family import Family
+from mechdesign.family.goals import Goal, bounds_of, goal
+from mechdesign.family.question import DesignsQuestion, question_of
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.optimize.schema import OptimizeSection
+from mechdesign.questions.optimize.variables import choice_problems, entries, from_cube
 from mechdesign.study import Study
+from mechdesign.study.schema.variable import plainly
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount, QuantityError
-from mechdesign.study.variants import remeasured
-from mechdesign.terms import Sum, terms_of
-
-
-@dataclass(frozen=True, eq=False)
-class DesignsQuestion:
-    """What is asked of every design of a study.
-
-    Parameters
-    ----------
-    goals : tuple of Goal
-        Goals, then conditions, with their bounds in the units of their columns.
-    columns : mapping of str to Column
-        Columns of the workspace, without values; none where no goal is a number of that.
-    regions_together : bool
-        Whether the workspaces of all designs are computed at once.
-    together : mapping of str to mapping
-        Goals by command and table where tables of all designs are computed at once.
-    alone : mapping of str to list of Goal
-        Goals by command where each design is computed by itself.
-    outputs : set of str
-        Outputs whose extremes are needed.
-    requests : set of Request
-        Columns that are followed between the poses.
-    graded : bool
-        Whether the rows behind the goals are wanted, and how far poses are from assembling.
-    squares : frozenset of Goal
-        Goals that are the root mean square of their rows.
-    """
-
-    study: Study
-    goals: tuple[Goal, ...]
-    columns: Mapping[str, Column]
-    regions_together: bool
-    together: Mapping[str, Mapping[str, Sequence[Goal]]]
-    alone: Mapping[str, Sequence[Goal]]
-    outputs: set[str]
-    requests: set[Request]
-    graded: bool
-    squares: frozenset[Goal]
-    layout: Layout
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State for another process, which computes the regions again."""
-        return {name: value for name, value in self.__dict__.items() if name != "regions"}
-
-    @property
-    def objectives(self) -> tuple[Goal, ...]:
-        """Goals that are maximised or minimised."""
-        return tuple(goal for goal in self.goals if not goal.gate)
-
-    @property
-    def conditions(self) -> tuple[Goal, ...]:
-        """Goals that are bounded."""
-        return tuple(goal for goal in self.goals if goal.gate)
-
-    @cached_property
-    def regional(self) -> list[Goal]:
-        """Goals that are numbers of the workspace."""
-        return [goal for goal in self.goals if goal.regional]
-
-    @cached_property
-    def regions(self) -> list[Question]:
-        """A question for each value of the held coordinates; a design's worst answer counts. See `regions_of`."""
-        return regions_of(self.study, self.goals)
-
-    @property
-    def slow(self) -> bool:
-        """Whether a design costs as much in a batch as alone: where not all goals are tables of all designs at once."""
-        return bool(self.alone) or bool(self.regional)
-
-    def limited(self, most: int) -> DesignsQuestion:
-        """The question without rows of goals and margins of assembly where a design has more than `most` of them."""
-        if self.layout.width - self.layout.head <= most:
-            return self
-        return replace(self, squares=frozenset(), layout=Layout(self.goals, {}, {}))
-
-    @property
-    def meanings(self) -> dict[str, tuple[str, str]]:
-        """Unit and meaning of each number of the workspace, by its column."""
-        meanings = {name: (column.unit, column.meaning) for name, column in self.columns.items()}
-        for goal in self.goals:
-            if goal.outline is not None:
-                shape = goal.column.removeprefix("scale of ")
-                meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-                meanings[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
-        if len(self.regions) < 2:
-            return meanings
-        assert self.study.workspace is not None
-        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}" for name, values in self.study.workspace.at.items()]
-        return {
-            name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in meanings.items()
-        }
-
-
-def regions_of(study: Study, goals: Sequence[Goal]) -> list[Question]:
-    """What goals ask of the workspace of a study; nothing where none is a number of that."""
-    regional = [goal for goal in goals if goal.regional]
-    whole = [goal.column for goal in regional if goal.outline is None]
-    return questions(study, GRID_TOLERANCE, tuple(dict.fromkeys(("area", *whole)))) if regional else []
 
 
 def designs_question(study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> DesignsQuestion:
-    """Read what is asked of designs that differ in parameters or single places.
+    """Read what is asked of the designs of an optimisation.
 
     Without `goals` it is what the study asks: its goals and conditions, and its choices are tried.
 
     Raises
     ------
     StudyError
-        If no result has the column of a goal, the study lacks a section that it needs, or a choice makes no study;
-        every mistake in one go.
+        See `mechdesign.family.question.question_of`; also if a choice makes no study.
     """
-    assert study.optimize is not None
-    variables = study.optimize.variables
-    moved = study.parameters.moved(variables)
-    # Each goal and the place in the study that names it.
-    places = goals_of(study.optimize) | conditions_of(study.optimize, moved)
-    judged = tuple(dict.fromkeys(goals or places))
-    columns: Mapping[str, Column] = {}
-    regions_together = True
-    if regions := regions_of(study, judged):
-        columns = index_columns(study, regions[0])
-        together = shared(study, regions, moved) and not remeasured(study, variables)
-        regions_together = together and all(batched(column) for column in regions[0].columns)
-    reader = _Reader(study, places, graded)
-    problems = [*_misfits(study, judged, columns, places)]
-    for command in dict.fromkeys(goal.command for goal in judged if not goal.regional and not goal.expression):
-        problems += reader.read(command, [goal for goal in judged if goal.command == command and not goal.regional])
-    if not goals:
-        problems += choice_problems(study)
+    section = study.optimize
+    assert section is not None
+    places = goals_of(section) | conditions_of(section, study.parameters.moved(section.variables))
+    judged = {goal: places.get(goal, ()) for goal in goals or places}
+    problems = [] if goals else [*choice_problems(study)]
+    try:
+        question = question_of(study, judged, [*section.variables], graded=graded)
+    except StudyError as error:
+        raise StudyError([*error.problems, *problems]) from None
     if problems:
-        # A condition with two bounds has the same problem twice.
-        raise StudyError([*dict.fromkeys(problems)])
-    bounded = tuple(reader.bounded.get(goal, goal) for goal in judged)
-    question = DesignsQuestion(
-        study, bounded, columns, regions_together, reader.together, reader.alone, reader.outputs, reader.requests,
-        graded, frozenset(reader.squares), Layout(bounded, reader.rows, reader.margins),
-    )  # fmt: skip
-    return question if graded else question.limited(0)
+        raise StudyError(problems)
+    return question
 
 
-def _misfits(
-    study: Study, goals: Sequence[Goal], columns: Mapping[str, Column], places: Mapping[Goal, KeyPath]
-) -> Iterator[Problem]:  # fmt: skip
-    """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
-    units = {goal: columns[goal.column].unit for goal in goals if goal.regional and goal.column in columns}
-    units |= {goal: unit for goal in goals if goal.expression and (unit := unit_of(study, goal.column))}
-    for goal, unit in units.items():
-        try:
-            Amount.of(goal.bound).within(unit)
-        except QuantityError as error:
-            yield study.problem(str(error), *places.get(goal, ()))
+def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
+    """The goals that a section maximises, then those that it minimises, with their places in the study."""
+    return {
+        goal(
+            judged.result, smallest=key == "minimize", where=judged.where, absolute=judged.abs,
+            unassembled=judged.unassembled is not None,
+        ): ("optimize", key, k)
+        for key in ("maximize", "minimize")
+        for k, judged in enumerate(getattr(section, key))
+    }  # fmt: skip
 
 
-class _Reader:
-    """Finds the tables and rows that goals need in the answers of the study's own design.
-
-    `places` are those of goals in the study. What is read is described at `DesignsQuestion`; besides, `bounded` has
-    goals with their bounds in the unit of their column, `rows` how many rows each has, and `margins` the number of
-    assembly margins by the commands of which every pose must be valid.
-    """
-
-    def __init__(self, study: Study, places: Mapping[Goal, KeyPath], graded: bool) -> None:
-        self._study, self._places, self._graded = study, places, graded
-        self.together: dict[str, dict[str, list[Goal]]] = {}
-        self.alone: dict[str, list[Goal]] = {}
-        self.outputs: set[str] = set()
-        self.requests: set[Request] = set()
-        self.squares: set[Goal] = set()
-        self.bounded: dict[Goal, Goal] = {}
-        self.rows: dict[Goal, int] = {}
-        self.margins: dict[str, int] = {}
-
-    def read(self, command: str, goals: list[Goal]) -> Iterator[Problem]:
-        """Read what goals of a command need; yields their problems."""
-        study = self._study
-        if command == "optimize":
-            mistake = "an optimisation cannot judge itself; name a result of another command"
-            yield study.problem(mistake, *self._places.get(goals[0], ()))
-            return
-        if command in stacked.TABLES and stacked.complete(study, command):
-            judged = self._read_together(command, goals)
-            goals = [goal for goal in goals if goal not in judged]
-        if not goals:
-            return
-        # Other designs may have a result where the study's own design does not assemble.
-        with suppress(AssemblyError):
-            result = look(study, command)
-            for k, goal in enumerate(goals):
-                try:
-                    goals[k] = self._count(goal, _named(goal, result), result)
-                except UnknownColumnError as error:
-                    yield study.problem(str(error), *self._places.get(goal, ()))
-        self.alone.setdefault(command, []).extend(goals)
-
-    def _read_together(self, command: str, goals: Sequence[Goal]) -> Collection[Goal]:
-        """Read the goals that are judged in tables of all designs at once; returns them."""
-        study, poses = self._study, study_poses(self._study, command)
-        result = stacked.tables(study, command, stacked.TABLES[command], poses).result
-        named: dict[Goal, Chosen | Sum] = {}
-        for goal in goals:
-            with suppress(UnknownColumnError):
-                named[goal] = _named(goal, result)
-        if not named:
-            return named
-        for goal, terms in named.items():
-            for chosen in terms.parts:
-                if chosen.table.name == "extremes":
-                    self.outputs.update(chosen.table["output"][chosen.counts].tolist())
-                else:
-                    self.requests.update(goal.requests(chosen))
-        tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
-        stack = stacked.tables(study, command, {"motion", *tables}, poses, self.outputs, self.requests)
-        judged: dict[str, list[Goal]] = {}
-        for named_goal, terms in named.items():
-            goal = self._count(named_goal, terms, stack.result)
-            for chosen in terms.parts:
-                judged.setdefault(chosen.table.name, [])
-            judged[terms.parts[0].table.name].append(goal)
-        self.together[command] = judged
-        # Extremes may be those of a part of the poses.
-        if self._graded and (poses.listed or set(judged) != {"extremes"}):
-            self.margins[command] = stacked.assembly_margins(study, poses, stack.solved).shape[1]
-        return named
-
-    def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
-        """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
-        self.bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
-        judgement = bounded.judge(result)
-        if judgement.squares:
-            self.squares.add(bounded)
-        if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
-            self.rows[bounded] = judgement.rows.size
-        return bounded
+def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal, KeyPath]:
+    """The conditions of a section with their places in the study; designs differ in the parameters `moved`."""
+    given = enumerate(section.subject_to)
+    return {goal: ("optimize", "subject_to", k) for k, condition in given for goal in bounds_of(condition, moved)}
 
 
-def _named(goal: Goal, result: Result) -> Chosen | Sum:
-    """The rows, or the sum, that a goal names."""
-    terms = terms_of(result, goal.column, dict(goal.where))
-    if terms.missing:
-        raise UnknownColumnError(terms.missing)
-    terms.bound(goal.bound)
-    if isinstance(terms, Sum):
-        terms.numbers()
-    return terms
+class Evaluation:
+    """Evaluates designs by the values of an optimisation's variables."""
+
+    def __init__(self, question: DesignsQuestion) -> None:
+        """Evaluate what a question asks, whose study has the variables."""
+        assert question.study.optimize is not None
+        lowest = from_cube(question.study, np.zeros((1, len(question.study.optimize.variables)))).designs
+        self._study = question.study
+        self._family = Family(question, {name: plainly(values.item()) for name, values in lowest.items()})
+
+    def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
+        """The results of designs."""
+        return self._family(entries(self._study, designs))

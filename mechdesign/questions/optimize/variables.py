@@ -167,6 +167,22 @@ def shown(study: Study, name: str, values: Floats) -> NDArray[Any]:
     return np.array(words)[values.astype(np.intp)] if words else values
 
 
+def entries(study: Study, designs: Batch) -> dict[str, NDArray[Any]]:
+    """Designs as a `Family` takes them: with choices and whole numbers as the study has them."""
+
+    def own(name: str, values: Floats) -> NDArray[Any]:
+        variable = variables_of(study)[name]
+        if name in study.parameters.names() or (variable.numeric and not variable.integer):
+            return values
+        if variable.integer:
+            return values.astype(np.intp)
+        choices = np.empty(len(variable.words), dtype=object)
+        choices[:] = variable.choices
+        return choices[values.astype(np.intp)]
+
+    return {name: own(name, values) for name, values in designs.items()}
+
+
 def unit_of(study: Study, name: str) -> str:
     """Unit of a variable, where it is known; none of words."""
     if name in study.parameters.names():

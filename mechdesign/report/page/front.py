@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.errors import MechdesignError
+from mechdesign.family.stacked import grouped
 from mechdesign.motion.corners import curve_of
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Ints, evenly
@@ -21,7 +22,6 @@ from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize import pareto
 from mechdesign.questions.optimize.figures.front import front_picture, marked, pairs
 from mechdesign.questions.optimize.judge import Designs
-from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import parted
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.scene import Sweep, pose

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.rounding import cleared
-from mechdesign.questions.optimize.schema import Containment, OptimizeSection, Outline
+from mechdesign.questions.optimize.schema import Containment, Outline
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
@@ -20,7 +20,6 @@ from mechdesign.rows import Chosen
 from mechdesign.statistics import STATISTICS, Request, worst
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Condition
-from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, command_of, path_of, terms_of
 
@@ -52,6 +51,8 @@ class Goal:
         A shape that the workspace has to contain; the largest scale at which it does is judged.
     gate : bool
         Whether it is a condition.
+    single : bool
+        Whether it is the one number that a row or a statistic gives, not the worst of several rows.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Goal:
     expression: Expression | None = None  # over parameters; `command` is empty then
     outline: Outline | None = None
     gate: bool = False
+    single: bool = False
 
     @property
     def sign(self) -> float:
@@ -100,7 +102,7 @@ class Goal:
         """
         chosen = terms_of(result, self.column, dict(self.where))
         statistic = None if isinstance(chosen, Sum) else STATISTICS.get(chosen.statistic)
-        if isinstance(chosen, Sum) or (statistic is not None and statistic.end != self.sign):
+        if self.single or isinstance(chosen, Sum) or (statistic is not None and statistic.end != self.sign):
             numbers = chosen.numbers(designs, assembled=self.unassembled)
             return Judgement(np.abs(numbers) if self.absolute else numbers, None)
         absolute = self.absolute or (statistic is not None and statistic.absolute)
@@ -182,24 +184,6 @@ def goal(
     title = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
     absolute = absolute or (expression is None and column.endswith("_error"))
     return Goal(title, command, column, smallest, absolute, rows, 0.0, unassembled, expression)
-
-
-def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
-    """The goals that a section maximises, then those that it minimises, with their places in the study."""
-    return {
-        goal(
-            judged.result, smallest=key == "minimize", where=judged.where, absolute=judged.abs,
-            unassembled=judged.unassembled is not None,
-        ): ("optimize", key, k)
-        for key in ("maximize", "minimize")
-        for k, judged in enumerate(getattr(section, key))
-    }  # fmt: skip
-
-
-def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal, KeyPath]:
-    """The conditions of a section with their places in the study; designs differ in the parameters `moved`."""
-    given = enumerate(section.subject_to)
-    return {goal: ("optimize", "subject_to", k) for k, condition in given for goal in bounds_of(condition, moved)}
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:

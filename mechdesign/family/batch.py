@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.family.goals import Goal
 from mechdesign.mechanism import Reason
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.optimize.goals import Goal
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs
 
@@ -34,7 +34,7 @@ class Layout:
     """Columns of the results of designs.
 
     They are the values of the goals and their estimated errors (nan where there is none); the shortfall of the poses
-    from assembling (`mechdesign.questions.optimize.stacked.shortfall`, nan where the numbers make no design); a code
+    from assembling (`mechdesign.family.stacked.shortfall`, nan where the numbers make no design); a code
     that is 0 where the design can be built; then the `rows` behind the goals, and the `assembly` margins of commands.
     """
 

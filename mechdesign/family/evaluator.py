@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.errors import AssemblyError, MechdesignError
+from mechdesign.family import stacked
+from mechdesign.family.batch import FAILED, Batch, Evaluated, first_reason, without_numbers
+from mechdesign.family.goals import Goal, shape_of
+from mechdesign.family.question import DesignsQuestion, regions_of
+from mechdesign.family.stacked import grouped
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.look import ask
-from mechdesign.questions.optimize import stacked
-from mechdesign.questions.optimize.batch import FAILED, Batch, Evaluated, first_reason, without_numbers
-from mechdesign.questions.optimize.goals import Goal, shape_of
-from mechdesign.questions.optimize.question import DesignsQuestion, designs_question, regions_of
-from mechdesign.questions.optimize.stacked import grouped
-from mechdesign.questions.optimize.variables import entry_of, from_cube, shown, variables_of
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import Question, split
@@ -30,102 +27,25 @@ from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.forms import form
-from mechdesign.study.schema.variable import plainly
-from mechdesign.study.variants import with_entries
 from mechdesign.terms import terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"
 SAMPLES = "samples cannot be assembled"
-# Most studies of other structure that are kept.
-MAX_OTHERS = 256
 
 
 class Evaluator:
-    """Evaluates goals for designs of one study, which differ in parameters or single places.
+    """Evaluates goals for designs of one study, which differ in numbers alone: parameters or single places.
 
     Where the question is graded, it also gives the rows whose worst is a goal, or whose root mean square is one, and
     how far poses are from assembling.
     """
 
-    def __init__(self, question: DesignsQuestion, entries: Mapping[str, str] = MappingProxyType({})) -> None:
-        """Evaluate designs by the names of the variables; `entries` are those in whose place parameters stand."""
+    def __init__(self, question: DesignsQuestion) -> None:
         self.question, self.study, self.goals, self.layout = question, question.study, question.goals, question.layout
-        self._entries = dict(entries)
-        # Evaluators of studies of another structure, by what decides it; None where a number does so, too.
-        self._others: dict[tuple[float | str, ...], Evaluator | None] = {}
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State for another process, which makes its own evaluators of other studies."""
-        return self.__dict__ | {"_others": {}}
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
-        """Evaluate a batch of designs, given by the values of the variables in the study's units."""
-        designs = {self._entries.get(name, name): values for name, values in designs.items()}
-        names, variables = self.study.parameters.names(), variables_of(self.study)
-        entries = {name: variables[name] for name in designs if name not in names}
-        return self._formed(designs, [name for name, own in entries.items() if own.numeric and not own.integer])
-
-    def _formed(self, designs: Mapping[str, Floats], numbers: Collection[str]) -> Evaluated:
-        """Evaluate designs, those of one structure together; `numbers` are the entries that do not decide it."""
-        forms = [name for name in designs if name not in numbers and self._forms_study(name)]
-        if not forms and not numbers:
-            return self._alike(designs)
-        count = len(next(iter(designs.values())))
-        deciding = np.reshape([designs[name] for name in forms], (len(forms), count)).T
-        kinds, which = np.unique(deciding, axis=0, return_inverse=True)
-        table = np.full((count, self.layout.width), np.nan)
-        reasons = np.full(count, "", dtype=object)
-        for k, kind in enumerate(kinds.tolist()):
-            rows = np.flatnonzero(which.ravel() == k)
-            some = {name: values[rows] for name, values in designs.items()}
-            try:
-                other = self._of(dict(zip(forms, kind, strict=True)), numbers)
-            except MechdesignError as error:
-                reasons[rows] = without_numbers(error)
-                continue
-            own = {name: values for name, values in some.items() if name not in forms}
-            evaluated = self._formed(some, ()) if other is None else other(own)
-            # Designs of another structure may have another number of rows behind their goals.
-            width = self.layout.width if evaluated.table.shape[1] == self.layout.width else self.layout.head
-            table[rows, :width] = evaluated.table[:, :width]
-            reasons[rows] = evaluated.reasons if own else evaluated.reasons[0]
-        return Evaluated(table, reasons.tolist())
-
-    def _forms_study(self, name: str) -> bool:
-        """Whether a variable decides the structure of the study: an entry, or a whole number that is read once."""
-        parameters = self.study.parameters
-        return name not in parameters.names() or not parameters.moved([name]).isdisjoint(self.study.fixed)
-
-    def _of(self, values: Mapping[str, float], numbers: Collection[str]) -> Evaluator | None:
-        """The evaluator of the same goals for the study with these values of entries, kept for the next designs."""
-        key: tuple[float | str, ...] = (*values.values(), *numbers)
-        if key not in self._others:
-            while len(self._others) >= MAX_OTHERS:
-                self._others.pop(next(iter(self._others)))
-            self._others[key] = self._other(values, numbers)
-        return self._others[key]
-
-    def _other(self, values: Mapping[str, float], numbers: Collection[str]) -> Evaluator | None:
-        """Evaluator of a study with these values, and parameters for the `numbers`; None where one decides its form."""
-        study, graded = self.study, self.question.graded
-        design = {name: shown(study, name, np.array(value)).item() for name, value in values.items()}
-        changes = [entry_of(study, name, value) for name, value in design.items()]
-        if not numbers:
-            return Evaluator(designs_question(with_entries(study, changes), self.goals, graded=graded))
-        lowest = from_cube(study, np.zeros((1, len(variables_of(study))))).designs
-        lifted = form(study, changes, {name: plainly(lowest[name].item()) for name in numbers})
-        if lifted is None:
-            return None
-        section = lifted.study.optimize
-        assert section is not None
-        variables = {lifted.parameters.get(name, name): variable for name, variable in section.variables.items()}
-        named = lifted.study.with_sections(optimize=section.model_copy(update={"variables": variables}))
-        return Evaluator(designs_question(named, self.goals, graded=graded), lifted.parameters)
-
-    def _alike(self, designs: Mapping[str, Floats]) -> Evaluated:
-        """Evaluate designs of one study that differ in numbers."""
+        """Evaluate designs by the values of what changes, each of shape (designs,), in the study's units."""
         batch = Batch(Designs(self.study, designs), self.layout)
         values: dict[str, ArrayLike] = {**self.study.parameters.nominal, **batch.designs.parameters}
         for goal in self.goals:
@@ -152,7 +72,7 @@ class Evaluator:
     def _regions(self, batch: Batch, rows: Ints, questions: Sequence[Question]) -> None:
         """Numbers of the workspaces of some designs, the worst over all values of the held coordinates.
 
-        `asked` are the questions of the study, or of a single design.
+        `questions` are those of the study, or of a single design.
         """
         if not len(rows):
             return

@@ -1,0 +1,3 @@
+"""Many designs of a study: compiled once, evaluated together, judged by one rule."""
+
+HELP_PAGE = "howto/many_designs"
