@@ -33,6 +33,9 @@ class StudyFile(fields.Model):
     seed: Annotated[int, fields.whole(0)] = 0
     """Seed of the random numbers; ``--seed`` goes before. Example: 1"""
     mechanism: MechanismSection
+
+
+class _Gate(StudyFile):
     requirements: tuple[Requirement, ...] = ()
     """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts, along a motion the
     worst place between the rows, too. Example: [{result: kinematics.mu, abs: true, at_least: 40}, {result:
@@ -52,13 +55,14 @@ def model_of(keys: Collection[object]) -> type[StudyFile]:
 @cache
 def _model_of(sections: tuple[str, ...]) -> type[StudyFile]:
     keys: dict[str, Any] = {key: (SECTIONS[key].model | None, None) for key in sections}
-    return create_model(StudyFile.__name__, __base__=StudyFile, __doc__=StudyFile.__doc__, **keys)
+    asked = create_model(StudyFile.__name__, __base__=StudyFile, **keys)
+    return create_model(StudyFile.__name__, __base__=(_Gate, asked), __doc__=StudyFile.__doc__)
 
 
 def keys_at(path: Sequence[str | int]) -> Mapping[str, FieldInfo | None]:
     """The keys that the format has at a path of a study, with their fields below the top level."""
     if not path:
-        return dict.fromkeys((*StudyFile.model_fields, *SECTIONS))
+        return dict.fromkeys((*StudyFile.model_fields, *SECTIONS, *_Gate.model_fields))
     return schema_fields(model_of(path[:1]), path)
 
 
