@@ -33,7 +33,7 @@ LOOK = 0.2  # seconds between two checks for an interrupt
 _SECONDS = 1.0
 _GROWTH = 8
 # Seconds of work that this process does alone, before others begin: about what it costs to begin them.
-_FORKED, _FRESH = 0.1, 1.0
+_FORKED, _FRESH = 0.03, 0.5
 
 
 class LostWorkerError(MechdesignError):
