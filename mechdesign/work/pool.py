@@ -58,9 +58,9 @@ class Pool:
     @staticmethod
     def local(count: int, *, threads: bool = False) -> Pool:
         """Processes or threads of this machine; a single one is this process."""
-        if threads:
-            return Pool(partial(ThreadPoolExecutor, count, "mechdesign"), count, math.inf * (count == 1), threads=True)
-        return Pool(partial(Processes, count), count, math.inf if count == 1 else _FORKED if inherit() else _FRESH)
+        open_ = partial(ThreadPoolExecutor, count, "mechdesign") if threads else partial(Processes, count)
+        patience = math.inf if count == 1 else 0.0 if threads else _FORKED if inherit() else _FRESH
+        return Pool(open_, count, patience, threads=threads)
 
     @property
     def width(self) -> int:
