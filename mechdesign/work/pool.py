@@ -33,7 +33,7 @@ LOOK = 0.2  # seconds between two checks for an interrupt
 _SECONDS = 1.0
 _GROWTH = 8
 # Seconds of work that this process does alone, before others begin: about what it costs to begin them.
-_FORKED, _FRESH = 0.1, 1.0
+_FORKED, _FRESH = 0.03, 0.5
 
 
 class LostWorkerError(MechdesignError):
@@ -58,9 +58,9 @@ class Pool:
     @staticmethod
     def local(count: int, *, threads: bool = False) -> Pool:
         """Processes or threads of this machine; a single one is this process."""
-        if threads:
-            return Pool(partial(ThreadPoolExecutor, count, "mechdesign"), count, math.inf * (count == 1), threads=True)
-        return Pool(partial(Processes, count), count, math.inf if count == 1 else _FORKED if inherit() else _FRESH)
+        open_ = partial(ThreadPoolExecutor, count, "mechdesign") if threads else partial(Processes, count)
+        patience = math.inf if count == 1 else 0.0 if threads else _FORKED if inherit() else _FRESH
+        return Pool(open_, count, patience, threads=threads)
 
     @property
     def width(self) -> int:

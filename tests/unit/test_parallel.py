@@ -32,6 +32,16 @@ def test_order_is_that_of_the_items(jobs):
     assert list(map_chunks(slow_when_even, range(40), jobs)) == [k * k for k in range(40)]
 
 
+def test_chunks_that_do_not_travel_are_shared_by_threads():
+    both = threading.Barrier(2, timeout=10)
+
+    def meet(k):
+        both.wait()
+        return threading.get_ident()
+
+    assert len({*map_chunks(meet, range(2), 2)} - {threading.get_ident()}) == 2
+
+
 def test_an_endless_source_is_read_only_a_little_ahead():
     taken = []
 
