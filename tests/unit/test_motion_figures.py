@@ -155,8 +155,8 @@ def test_curves_of_what_moves_only():
     assert names == {"C.x", "C.y", "A.x", "A.y", "B.x", "B.y", "rod.angle", "rocker.angle"}
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels == [
-        "position\n[mm]", "angle\n[deg]", "velocity\n[mm/s]", "velocity\n[deg/s]", "acceleration\n[mm/s²]",
-        "acceleration\n[deg/s²]",
+        "position [mm]", "angle [deg]", "velocity [mm/s]", "velocity [deg/s]", "acceleration [mm/s²]",
+        "acceleration [deg/s²]",
     ]  # fmt: skip
     assert figure.axes[-1].get_xlabel() == "theta [deg]"
 
@@ -172,7 +172,7 @@ def test_what_stands_still_is_drawn_straight_and_only_where_it_is_asked_for():
     low, high = axes.get_ylim()
     assert high - low > 0.1
     assert np.ptp(axes.lines[0].get_ydata()) < 1e-6
-    assert axes.get_ylabel() == "angle\n[deg]"
+    assert axes.get_ylabel() == "angle [deg]"
 
 
 @pytest.mark.slow
@@ -201,7 +201,7 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
         figure = draw(motion_curves(study, result.tables, result.drawn.shown.poses))
     rates = result.tables["motion"]["rocker.angle_velocity"]
     usual = np.nanpercentile(np.abs(rates), 90)
-    axes = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity\n[deg/s]")
+    axes = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity [deg/s]")
     assert np.nanmax(np.abs(rates)) > 10 * usual
     assert max(map(abs, axes.get_ylim())) < 5 * usual
 

@@ -158,7 +158,7 @@ def force_panel(study: Study, ways: Iterable[PanelMark], title: str, places: Com
         (float(part.min() - _EDGE * size), float(part.max() + _EDGE * size))
         for size in [max(np.ptp(places.real), np.ptp(places.imag))] for part in (places.real, places.imag)
     ]  # fmt: skip
-    marks = [*ways, Lines([0.0], look=thin), Lines([0.0], "x", look=thin)]
+    marks = [Lines([0.0], look=thin), Lines([0.0], "x", look=thin), *ways]
     return Panel(marks, Axis("fx", unit, ends=ends[0]), Axis("fy", unit, ends=ends[1]), title, equal=True)
 
 

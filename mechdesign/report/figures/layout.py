@@ -13,43 +13,33 @@ from matplotlib.axis import Axis as Drawn
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Coloured, Lines, Own, Panel, Picture
+from mechdesign.report.figures.ticks import DIGIT, LABEL, NAMES, PAD, folded_names, tick
 
 # Axes with a label that begins so are over a sweep or a path, whose label follows.
 OVER = "over "
 PLANE = "plane"  # label of axes whose places a page marks as the mechanism moves
-# Steps of ticks that are parts of a turn in degrees.
-TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
-_STEPS = (1, 2, 2.5, 5, 10)
-_TITLE, _NOTE, _HEADING, _ASIDE, _LABEL, _WORD = 11.0, 8.5, 9.5, 8.5, 10.0, 8.0  # points
-# Inches: at the edges of a page, between what is separate, between a text and what it is of.
-_EDGE, _GAP, _PAD = 0.1, 0.14, 0.06
+_TITLE, _NOTE, _HEADING, _ASIDE = 11.0, 8.5, 9.5, 8.5  # points
+# Inches: at the edges of a page, between what is separate.
+_EDGE, _GAP = 0.1, 0.14
 # Inches: the least width of panels by their kind, and the room beside them at first.
 _NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "plane": 2.1, "grid": 1.2, "": 2.0}
 _BESIDE = 0.9
 # Inches: the height of a panel that stands alone, among up to so many below each other, among more, and the least.
 _ALONE, _SOME, _MORE, _MOST, _LOWEST = 2.6, 1.75, 1.5, 1.2, 0.7
 _MOST_SOME, _MOST_MORE = 4, 7
-_HIGHEST_MAP, _HIGHEST_OF_TWO, _HIGHEST_PAGE, _MAP = (
-    5.6,
-    3.8,
-    7.6,
-    0.8,
-)  # inches; height over width of a map whose axes are not equal
+_HIGHEST_MAP, _HIGHEST_OF_TWO, _HIGHEST_PAGE = 6.0, 3.8, 7.6  # of one of equal axes, of others, of all together
+_MAP = 0.8  # height over width of a map whose axes are not equal
 _STILL = 1e-6  # of its size, by which a curve changes that stands still
 _SLIVER = 0.45  # least height over width of axes of one scale
 _MARGIN = 0.08  # of the range, beyond curves from a given end
 _BAR, _ONE_OF_SEVERAL = 0.24, 0.16  # inches of a name with one bar, and of each of several
 _AROUND_ROWS = 1.2  # inches of legend and axis of a page
 _AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for which title and axis of a panel take room
-_UP, _ALONG, _DIGIT = 0.29, 0.47, 0.083  # inches from tick to tick, and of a digit
-_MOST_TICKS = 9
 _LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
 _LEGEND_DOT, _LEGEND_MARK = 8.0, 6.0  # points
-_NAMES = 0.4  # of the width, for names beside bars
 _BESIDE_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 _ABOVE_LEGEND: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
 _INSIDE_LEGEND: dict[str, Any] = {"frameon": True, "framealpha": 0.85, "edgecolor": "none"}
@@ -101,7 +91,8 @@ def draw(picture: Picture) -> Figure:
     for cell in cells:
         cell.tall = _height(cell, wide, rows)
         _size(cell, wide)
-    style.name_powers([cell.axes for cell in cells])
+    bars = [bar for cell in cells for bar in cell.axes.child_axes if isinstance(bar, Axes)]
+    style.name_powers([*(cell.axes for cell in cells), *bars])
     for cell in cells:
         _measure(cell, renderer)
     left, right = ([max(getattr(cell, side) for cell in cells if cell.column == column) for column in range(columns)]
@@ -154,12 +145,12 @@ def _columns(picture: Picture) -> int:
 def fitting_panels(kind: str = "", names: Sequence[str] = ()) -> int:
     """Panels of a kind that the width holds side by side, of bars beside their names."""
     letters = max(map(len, names), default=0)
-    return max(1, int((style.width() - min(_NAMES * style.width(), _DIGIT * letters)) / _NARROWEST[kind]))
+    return max(1, int((style.width() - min(NAMES * style.width(), DIGIT * letters)) / _NARROWEST[kind]))
 
 
 def fitting_rows(legend: int, most: int) -> int:
     """Panels below each other that one page has room for, with so many rows of a legend above each."""
-    room = _LOWEST + _GAP + style.line(_LABEL) * legend
+    room = _LOWEST + _GAP + style.line(LABEL) * legend
     return min(most, int((style.tallest() - _AROUND_ROWS) / room)) if style.narrow() else most
 
 
@@ -211,7 +202,7 @@ def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, a
         handle = mark.draw(axes)
         if mark.label and handle is not None:
             # A straight line is no curve, also not among those that `lost_curves` of the tests looks at.
-            handle.set_label("" if isinstance(mark, Lines) else mark.label)
+            handle.set_label("_" if isinstance(mark, Lines) else mark.label)
             (entries if several[id(mark)] > 1 else own).setdefault(mark.label, handle)
     if own and own is not entries:
         outside = (
@@ -282,8 +273,8 @@ def _height(cell: _Cell, wide: float, rows: int) -> float:
 
 def _bar_height(names: Sequence[str], bars: int) -> float:
     """Inches of a name with so many bars."""
-    lines = 1 + max((name.count("\n") for name in _folded_names(names)), default=0)
-    return max(_BAR, _ONE_OF_SEVERAL * bars + 0.04, style.line(_LABEL) * lines)
+    lines = 1 + max((name.count("\n") for name in folded_names(names)), default=0)
+    return max(_BAR, _ONE_OF_SEVERAL * bars + 0.04, style.line(LABEL) * lines)
 
 
 def _size(cell: _Cell, wide: float) -> None:
@@ -300,39 +291,6 @@ def _size(cell: _Cell, wide: float) -> None:
         axis.offsetText.set_visible(outer)
 
 
-def tick(axis: Drawn, declared: Axis, inches: float) -> None:
-    """Ticks along so many inches of an axis."""
-    upright = axis is axis.axes.yaxis
-    if declared.words or len(declared.ticks):
-        places = declared.ticks if len(declared.ticks) else range(len(declared.words))
-        room = _NAMES * style.width() if upright else inches / max(len(declared.words), 1) - _PAD
-        words = [style.folded(word, _LABEL if upright else _WORD, room) for word in declared.words]
-        # Names that have no room side by side stand upright.
-        lies = upright or all(style.length(line, _WORD) <= 72 * room for word in words for line in word.split("\n"))
-        axis.set_ticks([*places], labels=(words if lies else declared.words) or None)
-        if words and not upright:
-            axis.set_tick_params(labelsize=_WORD, labelrotation=0 if lies else 90)
-    elif declared.scale == "linear":
-        low, high = axis.get_view_interval()
-        turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > 150
-        most = max(1, min(_MOST_TICKS, int(inches / (_UP if upright else _ALONG))))
-        while most:
-            axis.set_major_locator(MaxNLocator(most, steps=TURNS if turning else _STEPS, min_n_ticks=1))
-            places = [place for place in axis.get_majorticklocs().tolist() if min(low, high) <= place <= max(low, high)]
-            numbers = axis.get_major_formatter().format_ticks(places)
-            need = _DIGIT * (max(map(len, numbers), default=0) + 0.7) * abs(high - low) / inches
-            every = [step for step in (1, 2) if len(places) <= step or places[step] - places[0] >= need]
-            if upright or every:
-                if not upright and every[0] > 1 and len(places) > 2:
-                    axis.set_major_locator(FixedLocator(places[::2]))
-                break
-            most -= 1
-
-
-def _folded_names(names: Sequence[str]) -> list[str]:
-    return [style.folded(name, _LABEL, _NAMES * style.width()) for name in names]
-
-
 def _measure(cell: _Cell, renderer: Any) -> None:
     """Inches that numbers, legends and bars of colours take about a panel, and the name of its upright axis."""
     axes = cell.axes
@@ -344,20 +302,20 @@ def _measure(cell: _Cell, renderer: Any) -> None:
     cell.left, cell.right = (max(0.0, side) / dots for side in (box.x0 - tight.x0, tight.x1 - box.x1))
     cell.below, cell.above = (max(0.0, side) / dots for side in (box.y0 - tight.y0, tight.y1 - box.y1))
     label = axes.yaxis.label
-    label.set_text(style.folded(label.get_text(), _LABEL, cell.tall))
-    cell.left += _lines(label.get_text(), _LABEL) + 2 * _PAD
+    label.set_text(style.folded(label.get_text(), LABEL, cell.tall))
+    cell.left += _lines(label.get_text(), LABEL) + 2 * PAD
 
 
 def _name(cell: _Cell, wide: float) -> None:
     """The title of a panel and the name of its lower axis, in lines of its width, for which there is room."""
     axes, panel, label = cell.axes, cell.panel, cell.axes.xaxis.label
-    label.set_text(style.folded(label.get_text(), _LABEL, wide))
-    cell.below += _lines(label.get_text(), _LABEL)
+    label.set_text(style.folded(label.get_text(), LABEL, wide))
+    cell.below += _lines(label.get_text(), LABEL)
     # Both in one line if that holds them.
     together = style.folded(f"{panel.title}   {panel.aside}", _HEADING, wide)
     words = [panel.title] if "\n" not in together else [panel.title, panel.aside]
     title = style.folded("\n".join(filter(None, words)), _HEADING, wide)
-    look: dict[str, Any] = {"pad": 72 * (cell.above + _PAD)}
+    look: dict[str, Any] = {"pad": 72 * (cell.above + PAD)}
     axes.set_title(title, loc="left", fontsize=_HEADING, **look)
     if panel.aside and len(words) == 1:
         axes.set_title(panel.aside, loc="right", fontsize=_ASIDE, color=style.VERMILION, **look)
@@ -374,7 +332,7 @@ def _place(cell: _Cell, left: float) -> None:
         if outer and not (declared.words or len(declared.ticks)):
             tick(axis, declared, width if axis is axes.xaxis else height)
         axis.label.set_visible(True)
-    axes.yaxis.set_label_coords((_PAD - left) / width, 0.5)
+    axes.yaxis.set_label_coords((PAD - left) / width, 0.5)
     axes.yaxis.label.set_verticalalignment("top")
     axes.xaxis.set_label_coords(0.5, -cell.below / height)
     axes.xaxis.label.set_verticalalignment("bottom")
@@ -382,7 +340,7 @@ def _place(cell: _Cell, left: float) -> None:
 
 def _lines(text: str, size: float) -> float:
     """Inches of a text's lines with what keeps it apart."""
-    return style.line(size) * (1 + text.count("\n")) + _PAD if text else 0.0
+    return style.line(size) * (1 + text.count("\n")) + PAD if text else 0.0
 
 
 def _heading(picture: Picture) -> tuple[list[tuple[str, float, float]], float]:
@@ -392,7 +350,7 @@ def _heading(picture: Picture) -> tuple[list[tuple[str, float, float]], float]:
         if words:
             lines.append((style.folded(words, size, style.width() - 2 * _EDGE), size, down))
             down += _lines(lines[-1][0], size)
-    return lines, down + _PAD
+    return lines, down + PAD
 
 
 def _legend(figure: Figure, entries: Mapping[str, Any]) -> Legend:

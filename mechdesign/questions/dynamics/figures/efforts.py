@@ -61,9 +61,9 @@ def _panel(view: DynamicsView, name: str, over: Along) -> Panel:
         return Panel(marks, over.axis, Axis(kind, unit, ends=ends), f"{drive}: without bound")
     place, value = at if over.name else at + 1, high if high >= -low else low
     mean = 0.0 if abs(mean) < NOTHING * size else mean
+    marks.append(Dots([place], [value], label="peak", look=PEAK))
     marks.append(Lines([-rms if high <= 0 else rms], label="root mean square", look=_RMS))
     marks.append(Lines([mean], label="mean", look=_MEAN))
-    marks.append(Dots([place], [value], label="peak", look=PEAK))
     words = (
         f"peak {quantity(value, unit)} at {place_in_words(view.study, over, place)}, "
         f"rms {quantity(rms, unit)}, mean {quantity(mean, unit)}"

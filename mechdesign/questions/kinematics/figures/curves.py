@@ -284,7 +284,12 @@ def _panel(
 
 
 def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:
-    """Near a dead centre rates grow without bound: what they are elsewhere stays legible."""
+    """What stands still is not drawn by its rounding; near a dead centre rates grow without bound, elsewhere they stay
+    legible.
+    """
+    if _still(values, 1.0):
+        middle = float(values.mean())
+        return middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1)
     low, high = np.percentile(values, (_TAIL_PERCENT, 100 - _TAIL_PERCENT)).tolist()
     if group.curves[0].order == "position" or not np.ptp(values) > _PEAK_RATIO * (high - low) > 0:
         return None, None

@@ -25,12 +25,13 @@ from mechdesign.questions.workspace.figures.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, framed
-from mechdesign.report.figures.layout import OVER, tick
+from mechdesign.report.figures.layout import OVER
 from mechdesign.report.figures.marks import Axis, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.mechanism import sketch_and_first_pose
 from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.ticks import tick
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
