@@ -46,7 +46,7 @@ class Chosen:
 
     table: Table
     column: str
-    values: Floats  # all rows; absolute values where these are judged
+    values: Floats  # all rows
     counts: Flags  # which rows count
     missing: str = ""  # where the table never has the rows that `where` names: why, and which it has
     statistic: str = ""  # number that is taken of the rows, a word of `STATISTICS`; empty for the one row itself
@@ -181,7 +181,7 @@ class Chosen:
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
 
 
-def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
+def choose(result: Result, path: str, where: Mapping[str, Any]) -> Chosen:
     """Find a column and the rows in which others have the values of `where`, or lie in its spans.
 
     Parameters
@@ -232,7 +232,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         numbers = np.where(table.lacking == "", numbers, np.nan)
     missing = "" if counts.any() or part else _missing(table, rows, where)
     return Chosen(
-        table, column, np.abs(numbers) if absolute else numbers, counts, missing, statistic, tuple(part),
+        table, column, numbers, counts, missing, statistic, tuple(part),
         f"{result.command}.{path}", picked, _strands(table, worded),
     )  # fmt: skip
 

@@ -163,13 +163,8 @@ class Sheet:
         good = np.array([end.error is None for end in group.ends])
         required = [self.judging[row].requirements[k] for row in rows.tolist()]
         if good.any():
-            scores = judged(group, required)
-            self._units[len(self._results) + k] = scores.unit
-            for column, values in (
-                (self._worst, scores.worst),
-                (self._margins, scores.margin),
-                (self._met, scores.met),
-            ):
+            worst, met, self._units[len(self._results) + k] = judged(group, required)
+            for column, values in ((self._worst, worst.values), (self._margins, worst.margins), (self._met, met)):
                 column[rows[good], k] = values[good]
         order = self._order(k)
         least = int(order[rows].argmin())
@@ -178,7 +173,7 @@ class Sheet:
             return
         answer, verdict = group.of(least), _unanswered(required[least])
         if isinstance(answer, Result):
-            verdict = requirements.judge(answer, required[least], self._mobility)
+            verdict = requirements.verdict_on(answer, required[least], self._mobility)
         self._verdicts[k] = row, verdict
 
     def _order(self, k: int) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mechdesign.experiments.schema.matrix import Named
-from mechdesign.family.goals import bounds_of
+from mechdesign.family.judge import Judgement, judge
 from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.rows import Chosen, UnknownColumnError
@@ -24,15 +24,6 @@ class Numbers(NamedTuple):
     """A number of each case, shape (cases,), and its unit."""
 
     values: Floats
-    unit: str
-
-
-class Judged(NamedTuple):
-    """The worst value of each case, its margin to the nearer limit, and whether it is met; each of shape (cases,)."""
-
-    worst: Floats
-    margin: Floats
-    met: Flags
     unit: str
 
 
@@ -88,8 +79,8 @@ def numbers_in(section: str, results: Iterable[Named]) -> list[CaseNumber]:
     ]
 
 
-def judged(group: Group, required: Sequence[Requirement]) -> Judged:
-    """Worst value and margin of each design by a requirement, as in `mechdesign.report.requirements.judge`.
+def judged(group: Group, required: Sequence[Requirement]) -> tuple[Judgement, Flags, str]:
+    """Worst value and margin of each design by a requirement, which of them meet it, and the unit.
 
     Parameters
     ----------
@@ -101,22 +92,23 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
     UnknownColumnError
         See `CaseNumber.find`; also where designs are judged on other rows.
     """
-    one, pairs = required[0], []
+    one = required[0]
     if any(other is not one and _subject(other) != _subject(one) for other in required):
         raise UnknownColumnError("designs are not judged on the same rows")
-    for goal in bounds_of(one):
-        key = "at_most" if goal.smallest else "at_least"
-        terms = _terms(group, goal.column, dict(goal.where))
-        values = goal.judge(group.result, len(group.ends)).values
+    terms = _terms(group, path_of(one.result), dict(one.where))
+
+    def bound(key: str) -> Floats | None:
+        """The bounds of the designs, in the unit of the terms."""
         own = [(getattr(other, key), text_of(getattr(other, key))) for other in required]
-        limits = {limit: terms.bound(limit[0]) for limit in {*own}}
-        beyond = values - np.array([limits[limit] for limit in own])
-        pairs.append((values, -beyond if goal.smallest else beyond))
-    values, margins = (np.stack(part) for part in zip(*pairs, strict=True))
-    nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
-    worst, margin = (np.take_along_axis(part, nearer, axis=0)[0] for part in (values, margins))
+        limits = {limit: terms.bound(limit[0]) for limit in {*own}} if getattr(one, key) is not None else {}
+        return np.array([limits[limit] for limit in own]) if limits else None
+
+    judged = judge(
+        terms, (bound("at_least"), bound("at_most")), len(group.ends), absolute=one.abs,
+        assembled=one.unassembled is not None, number=isinstance(terms, Sum) or bool(terms.statistic),
+    )  # fmt: skip
     partly = incomplete(group, terms) & (one.unassembled is None)
-    return Judged(worst, margin, (margin >= 0) & ~partly, terms.unit)
+    return judged, judged.met & ~partly, terms.unit
 
 
 def incomplete(group: Group, terms: Chosen | Sum) -> Flags:

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mechdesign.expressions import Expression
+from mechdesign.family.judge import judge
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.rounding import cleared
 from mechdesign.questions.optimize.schema import Containment, Outline
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
 from mechdesign.results import Result
 from mechdesign.rows import Chosen
-from mechdesign.statistics import STATISTICS, Request, worst
+from mechdesign.statistics import STATISTICS, Request
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Condition
 from mechdesign.study.text.units import text_of
@@ -87,7 +87,7 @@ class Goal:
         """Which values keep the bound; nan never does."""
         return self.margin(values) >= 0
 
-    def judge(self, result: Result, designs: int = 1) -> Judgement:
+    def judge(self, result: Result, designs: int = 1) -> Scored:
         """The value of each design, and the rows that make it.
 
         Parameters
@@ -102,28 +102,24 @@ class Goal:
         """
         chosen = terms_of(result, self.column, dict(self.where))
         statistic = None if isinstance(chosen, Sum) else STATISTICS.get(chosen.statistic)
-        if self.single or isinstance(chosen, Sum) or (statistic is not None and statistic.end != self.sign):
-            numbers = chosen.numbers(designs, assembled=self.unassembled)
-            return Judgement(np.abs(numbers) if self.absolute else numbers, None)
-        absolute = self.absolute or (statistic is not None and statistic.absolute)
-        values, counts = chosen.shaped(designs, assembled=self.unassembled)
-        extreme = worst(np.abs(values) if absolute else values, counts, largest=self.smallest)
+        number = self.single or isinstance(chosen, Sum) or (statistic is not None and statistic.end != self.sign)
+        absolute = self.absolute or (statistic is not None and statistic.absolute and not number)
+        bounds = (None, self.bound) if self.smallest else (self.bound, None)
+        judged = judge(chosen, bounds, designs, absolute=absolute, assembled=self.unassembled, number=number)
+        if number or isinstance(chosen, Sum):
+            return Scored(judged.values, None)
         if chosen.table.name == "targets" and chosen.column == "rms" and "motion" in result.tables:
             outputs = {str(name) for name in chosen.table["output"][chosen.counts]}
             if len(outputs) == 1:
-                return Judgement(extreme, _errors(result, outputs.pop(), extreme), squares=True)
-        alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
-        rows = values[counts].reshape(designs, -1) if alike else None
-        lost, take = (counts & np.isnan(values)).any(axis=1), np.fmax if self.smallest else np.fmin
-        for course in chosen.courses.values() if self.requests(chosen) else ():
-            between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
-            extreme = np.where(
-                lost | (course.lost > 0), np.nan, take(extreme, np.abs(between) if absolute else between)
-            )
-            extreme = cleared(extreme, course.rounding)
-            if self.gate and rows is not None:
-                rows = np.column_stack([rows, np.where(np.isnan(between), extreme, between)])
-        return Judgement(extreme, rows)
+                return Scored(judged.values, _errors(result, outputs.pop(), judged.values), squares=True)
+        values, counts = chosen.shaped(designs, assembled=self.unassembled)
+        if not designs or np.ptp(counts.sum(axis=1)):
+            return Scored(judged.values, None)
+        rows = values[counts].reshape(designs, -1)
+        if self.gate:
+            between = [np.where(np.isnan(one), judged.values, one) for one in judged.between]
+            rows = np.column_stack([rows, *between])
+        return Scored(judged.values, rows)
 
     def requests(self, chosen: Chosen) -> list[Request]:
         """How a column is followed between the poses; not at all where single poses are picked."""
@@ -133,7 +129,7 @@ class Goal:
         return [request._replace(end=0 if both else 1 if self.smallest else -1) for request in chosen.requests]
 
 
-class Judgement(NamedTuple):
+class Scored(NamedTuple):
     """The values of a goal for some designs.
 
     Parameters

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
+from mechdesign.family.judge import Judgement, along, by_rows, judge
 from mechdesign.report.row_words import place_of
 from mechdesign.results import POSES_ONLY, Drawn, Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
@@ -22,7 +22,7 @@ from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named
 
-Bounds = tuple[float | None, float | None]
+Limits = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
 # Place of a verdict where the motion never enters the part that a requirement is about.
 _OUTSIDE = "no place of the motion"
@@ -77,7 +77,7 @@ class DrawnCases(Drawn):
     ----------
     entries : sequence of str
         Columns of the entries that vary.
-    results : mapping of str to Bounds
+    results : mapping of str to Limits
         Columns of results, with the limits that a requirement sets, in the unit of the column.
     goals : mapping of str to int
         Columns of goals: 1 where one is to be small, -1 where it is to be large.
@@ -86,7 +86,7 @@ class DrawnCases(Drawn):
     """
 
     entries: Sequence[str]
-    results: Mapping[str, Bounds]
+    results: Mapping[str, Limits]
     goals: Mapping[str, int]
     verdicts: tuple[Verdict, ...]
 
@@ -213,7 +213,7 @@ def requirements(study: Study, result: Result, *, fewer: Collection[str] = ()) -
         if command_of(requirement) != result.command:
             continue
         try:
-            verdicts.append(judge(result, requirement, study.mechanism.mobility, fewer=fewer))
+            verdicts.append(verdict_on(result, requirement, study.mechanism.mobility, fewer=fewer))
         except UnknownColumnError as error:
             problems.append(study.problem(str(error), "requirements", index))
     if problems:
@@ -221,7 +221,7 @@ def requirements(study: Study, result: Result, *, fewer: Collection[str] = ()) -
     return (*verdicts, *on_warnings(study, result.warnings))
 
 
-def judge(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: Collection[str] = ()) -> Verdict:
+def verdict_on(result: Result, requirement: Requirement, freedom: int = 1, *, fewer: Collection[str] = ()) -> Verdict:
     """The verdict on one requirement; `freedom` is how many numbers make a pose, see `requirements`.
 
     Raises
@@ -248,43 +248,45 @@ def _judged(result: Result, requirement: Requirement, freedom: int, fewer: Colle
     if not is_plain(result, path):
         return _of_number(terms_of(result, path, requirement.where), requirement, freedom)
     table, column, rows = located(result, path)
-    worst, begin = None, 0
+    worst, place, begin = None, "", 0
     # A word that selects rows may occur in a few blocks only.
     for part in table.blocks() if rows.all() else [table]:
-        chosen = choose(
-            replace(result, tables={**result.tables, table.name: part}), path, requirement.where,
-            absolute=requirement.abs,
-        )  # fmt: skip
+        chosen = choose(replace(result, tables={**result.tables, table.name: part}), path, requirement.where)
         bounds = _bounds(chosen, requirement)
-        row = _worst_row(chosen, requirement, bounds)
-        if row is not None:
-            value = float(chosen.values[row])
-            place = "" if len(table) == 1 else place_of(part, row, column, freedom, begin)
-            verdict = _verdict(requirement, bounds, value, place, chosen.unit)
-            if worst is None or (not np.isnan(worst.margin) and not verdict.margin >= worst.margin):
-                worst = verdict
+        own = by_rows(chosen, bounds, absolute=requirement.abs, assembled=bool(requirement.unassembled))
+        row, margin = int(own.row[0]), own.margins[0]
+        if row >= 0 and (worst is None or not (np.isnan(worst.margins[0]) or margin >= worst.margins[0])):
+            worst, place = own, "" if len(table) == 1 else place_of(part, row, column, freedom, begin)
         begin += len(part)
     chosen = replace(chosen, table=table)
-    if worst is None and chosen.part and chosen.courses:
-        # Between two rows.
-        worst = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
-        return _over_motion(worst, chosen, requirement)
-    if worst is None and table.name not in fewer and (missing := choose(result, path, requirement.where).missing):
-        raise UnknownColumnError(missing)
-    if worst is None:
+    if worst is None and not (chosen.part and chosen.courses):
+        if table.name not in fewer and (missing := choose(result, path, requirement.where).missing):
+            raise UnknownColumnError(missing)
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return _scoped(worst, chosen, requirement) if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
+    judged = along(worst or own, chosen, bounds, absolute=requirement.abs)
+    if np.isfinite(judged.at[0]):
+        words, course = [*chosen.courses.items()][judged.strand[0]]
+        place = ", ".join(filter(None, (course.shown(float(judged.at[0])), words)))
+    elif judged.row[0] < 0:
+        # Of no row, between which the motion has no place either.
+        place = _OUTSIDE if worst is None else ""
+    return _scoped(_verdict(requirement, judged, place, chosen.unit), chosen, requirement)
 
 
 def _of_number(terms: Chosen | Sum, requirement: Requirement, freedom: int) -> Verdict:
     """The verdict on one number: a statistic of a column, or a sum."""
-    value = float(terms.numbers(assembled=requirement.unassembled is not None)[0])
-    value = abs(value) if requirement.abs else value
+    judged = judge(
+        terms,
+        _bounds(terms, requirement),
+        absolute=requirement.abs,
+        assembled=bool(requirement.unassembled),
+        number=True,
+    )
     place = _place_of_end(terms, requirement, freedom) if isinstance(terms, Chosen) else ""
-    if np.isnan(value):
+    if np.isnan(judged.values[0]):
         outside = any(chosen.part for chosen in terms.parts) and not any(chosen.lacking for chosen in terms.parts)
         place = _OUTSIDE if outside else ""
-    return _scoped(_verdict(requirement, _bounds(terms, requirement), value, place, terms.unit), terms, requirement)
+    return _scoped(_verdict(requirement, judged, place, terms.unit), terms, requirement)
 
 
 def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str:
@@ -306,33 +308,14 @@ def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str
     return place
 
 
-def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Bounds:
+def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Limits:
     low, high = (None if end is None else chosen.bound(end) for end in (requirement.at_least, requirement.at_most))
     return low, high
 
 
-def _verdict(requirement: Requirement, bounds: Bounds, value: float, place: str, unit: str) -> Verdict:
-    margin = _margin(bounds, value)
+def _verdict(requirement: Requirement, judged: Judgement, place: str, unit: str) -> Verdict:
+    value, margin = float(judged.values[0]), float(judged.margins[0])
     return Verdict(in_words(requirement), margin >= 0, value, place, margin, unit)
-
-
-def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> Verdict:
-    """The verdict on the worst row, or on a worse place of the motion between the rows, and what it does not cover."""
-    bounds = _bounds(chosen, requirement)
-    signs = [-1] * (requirement.at_least is not None) + [1] * (requirement.at_most is not None)
-    for (words, course), sign in product(chosen.courses.items(), signs):
-        value, place = (float(end[0]) for end in course.worst(sign, absolute=requirement.abs))
-        if np.isfinite(place):
-            where = ", ".join(filter(None, (course.shown(place), words)))
-            between = _verdict(requirement, bounds, value, where, verdict.unit)
-            verdict = between if not between.margin >= verdict.margin else verdict
-    if any(abs(verdict.worst) <= course.rounding for course in chosen.courses.values()):
-        # Where the motion has no place of its extremes, all of it is rounding.
-        ends = [float(course.worst(sign)[1][0]) for course in chosen.courses.values() for sign in (1, -1)]
-        verdict = _verdict(requirement, bounds, 0.0, verdict.place if np.isfinite(ends).any() else "", verdict.unit)
-    if chosen.lacking:
-        verdict = _verdict(requirement, bounds, float("nan"), "", verdict.unit)
-    return _scoped(verdict, chosen, requirement)
 
 
 def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
@@ -349,18 +332,6 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))]))
 
 
-def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
-    """The worst row: one without a value, or else the farthest beyond a limit; None without rows."""
-    rows, values = np.flatnonzero(chosen.counted(assembled=bool(requirement.unassembled))), chosen.values
-    if not rows.size:
-        return None
-    undefined = rows[np.isnan(values[rows])]
-    if undefined.size:
-        return int(undefined[0])
-    ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
-    return int(min(ends, key=lambda row: _margin(bounds, float(values[row]))))
-
-
 def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) -> Verdict:
     """The verdict on a requirement over cases: that of the worst, named in words, and how many of them miss it.
 
@@ -370,12 +341,6 @@ def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) ->
     if unmet:
         place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is case {first + 1}"
     return replace(worst, met=not unmet, place=place)
-
-
-def _margin(bounds: Bounds, value: float) -> float:
-    """How far a value is from the nearer limit, negative beyond it."""
-    low, high = bounds
-    return min([*([value - low] if low is not None else []), *([high - value] if high is not None else [])])
 
 
 def in_words(requirement: Requirement) -> str:

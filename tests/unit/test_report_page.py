@@ -16,7 +16,7 @@ from mechdesign.questions.workspace.columns import INDICES
 from mechdesign.report.figures import style
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
-from mechdesign.report.requirements import judge
+from mechdesign.report.requirements import verdict_on
 from mechdesign.results import Column, Result, Table
 from mechdesign.study.schema.conditions import Requirement
 
@@ -167,7 +167,7 @@ def test_headlines_know_a_column_by_its_kind_whatever_its_name_and_its_meaning()
 )
 def test_the_margin_is_that_of_the_row_nearest_to_a_limit(values: list[float], worst: float, margin: float) -> None:
     motion = table("motion", crank=([0.0, 1.0, 2.0], "deg", "drive"), mu=(list(values), "deg", "angle"))
-    verdict = judge(
+    verdict = verdict_on(
         Result("kinematics", {"motion": motion}),
         Requirement(result="kinematics.mu", at_least=40.0, at_most=140.0),
     )

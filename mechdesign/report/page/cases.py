@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.report.cases import RANK, best_of, short, telling_columns, text_of
 from mechdesign.report.page.headlines import shown
-from mechdesign.report.requirements import Bounds, DrawnCases
+from mechdesign.report.requirements import DrawnCases, Limits
 from mechdesign.results import Column, Result, Table
 from mechdesign.study.text.units import Amount
 
@@ -53,7 +53,7 @@ def _text(column: Column, row: int) -> str:
     return shown(value) if column.numeric else text_of(value)
 
 
-def _limits(bounds: Bounds, column: Column) -> str:
+def _limits(bounds: Limits, column: Column) -> str:
     """``≥ 78, ≤ 80``: the limits of a result, in the unit of its column."""
     signs = ("\N{GREATER-THAN OR EQUAL TO}", "\N{LESS-THAN OR EQUAL TO}")
     return ", ".join(f"{sign} {shown(Amount.of(bound).within(column.unit))}"
