@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.errors import nearest, suggestion
+from mechdesign.errors import suggestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.rounding import cleared
 from mechdesign.results import Result, Strands, Table
+from mechdesign.row_values import equal_to, present_words
 from mechdesign.statistics import (
     STATISTICS,
     Course,
@@ -28,8 +28,6 @@ from mechdesign.statistics import (
     no_value_along,
 )  # fmt: skip
 
-# Number of a column's values that a message names.
-MOST_VALUES = 12
 # Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.
 IN_UNIT = "in `unit`"
 # Number of rows that a message names.
@@ -220,7 +218,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any]) -> Chosen:
             continue
         if table.column(name).numeric and isinstance(value, Measured):
             where[name] = in_unit(value, table, name, counts)
-        equal = _equal(table[name], where[name])
+        equal = equal_to(table[name], where[name])
         counts = counts & equal
         # Words name rows of each pose, and the poses that are valid are all there are of a motion.
         whole = name == "valid" and where[name] == 1
@@ -353,7 +351,7 @@ def _place(result: Result, path: str) -> tuple[Table, str, Flags] | None:
         for column in named.names:
             word = rest.removesuffix(f".{column}")
             for words in named.columns if word != rest else ():
-                if not words.numeric and (rows := _equal(words.values, word)).any():
+                if not words.numeric and (rows := equal_to(words.values, word)).any():
                     return named, column, rows
     return None
 
@@ -373,33 +371,9 @@ def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
     stated = {name: value for name, value in where.items() if table[name].dtype.kind != "b"}
     together = rows
     for name, value in stated.items() if rows.any() else ():
-        equal = _equal(table[name], value)
+        equal = equal_to(table[name], value)
         if not (rows & equal).any():
-            return f"no row of {table.name} has {name} {value}; {_present(table[name][rows], value)}"
+            return f"no row of {table.name} has {name} {value}; {present_words(table[name][rows], value)}"
         together = together & equal
     words = ", ".join(f"{name} {value}" for name, value in stated.items())
     return f"no row of {table.name} has {words} at once" if rows.any() and not together.any() else ""
-
-
-def _present(values: NDArray[Any], stated: object) -> str:
-    """The values of a column in words: all of them, or of many numbers the smallest, the largest and the nearest."""
-    number = values.dtype.kind in "fiub"
-    present = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
-    if not number and (longer := [name for name in present if str(name).startswith(f"{stated}_")]):
-        return f"did you mean {' or '.join(map(repr, longer[:MOST_VALUES]))}?"
-    if not number and (close := nearest(str(stated), present)):
-        return f"did you mean {close!r}?"
-    if number and len(present) > MOST_VALUES and isinstance(stated, (int, float)):
-        beside = min(present, key=lambda value: abs(value - stated))
-        return f"there are {min(present):.12g} to {max(present):.12g}, {beside:.12g} the nearest"
-    shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in present[:MOST_VALUES]]
-    rest = ", ..." * (len(present) > MOST_VALUES)
-    return f"there {'is' if len(present) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"
-
-
-def _equal(values: NDArray[Any], stated: object) -> Flags:
-    if values.dtype.kind in "fiub" and isinstance(stated, (int, float)):
-        return np.asarray(np.isclose(values.astype(float), float(stated), rtol=1e-9, atol=1e-12))
-    if values.dtype.kind == "U":
-        return np.asarray(values == str(stated))
-    return np.array([str(value) == str(stated) for value in values.tolist()], dtype=bool)

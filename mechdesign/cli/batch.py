@@ -40,7 +40,7 @@ from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
 from mechdesign.study import Study
-from mechdesign.study.loading import StudySource
+from mechdesign.study.loaded import StudySource
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK

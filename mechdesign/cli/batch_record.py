@@ -23,7 +23,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
 from mechdesign.study import Study
-from mechdesign.study.loading import StudySource
+from mechdesign.study.loaded import StudySource
 from mechdesign.work.pool import LostWorkerError
 
 if TYPE_CHECKING:

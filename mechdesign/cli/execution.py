@@ -35,7 +35,8 @@ from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
-from mechdesign.study.loading import StudySource, load_bytes, read_file
+from mechdesign.study.loaded import StudySource
+from mechdesign.study.loading import load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES, leaves, read
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import ahead, shards

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mechdesign.study.loading import Study as Study
+    from mechdesign.study.loaded import Study as Study
     from mechdesign.study.loading import load as load
     from mechdesign.study.templates import template as template
     from mechdesign.study.templates import template_path as template_path

@@ -16,7 +16,8 @@ from mechdesign.expressions import Number
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.expansion import Numbers
-from mechdesign.study.loading import Study, load_document
+from mechdesign.study.loaded import Study
+from mechdesign.study.loading import load_document
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.text.document import Document
 from mechdesign.study.text.fields import Model, own_numbers, parts_of, positive

@@ -8,24 +8,20 @@ import hashlib
 import json
 import os
 import pathlib
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from mechdesign.cautions import ALL, Caution
 from mechdesign.commands import COMMANDS, SECTIONS
-from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
 from mechdesign.expressions import Expression
 from mechdesign.functions import RESERVED
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses
 from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
@@ -34,170 +30,21 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.conditions import Requirement, check_result
+from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.study_file import keys_at, model_of, override
-from mechdesign.study.schema.targets import Target
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, in_yaml, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
-from mechdesign.study.text.inputs import Folder, files
+from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread
 
 if TYPE_CHECKING:
-    from mechdesign.experiments.schema.matrix import MatrixSection
-    from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
-    from mechdesign.questions.dynamics.schema import DynamicsSection
-    from mechdesign.questions.kinematics.schema import KinematicsSection
-    from mechdesign.questions.optimize.schema import OptimizeSection
-    from mechdesign.questions.reliability.schema.section import ReliabilitySection
-    from mechdesign.questions.stiffness.schema import StiffnessSection
-    from mechdesign.questions.workspace.schema import WorkspaceSection
-
-# Characters that are replaced in the folder's name, and the name of a study without one.
-_UNFIT = re.compile(r"[^\w.-]+")
-_UNNAMED = "study"
-# Name in messages of a study given as a text.
-_TEXT = "<study>"
-
-
-@dataclass(frozen=True)
-class StudySource:
-    """What a study is read from: its file and text, empty of a mapping, and the folder of the files that it names."""
-
-    path: pathlib.Path | None
-    folder: Folder
-    text: bytes = b""
-    sha256: str = ""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Study:
-    """A validated study; sections that its file does not have are None.
-
-    >>> import mechdesign
-    >>> study = mechdesign.load(text='''
-    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
-    ... kinematics: {poses: [{arm: 60}]}
-    ... ''')
-    >>> study.questions, study.units.label("velocity"), study.mechanism.drives
-    (('kinematics',), 'mm/s', ('arm',))
-    """
-
-    name: str  #: by default that of its file
-    path: pathlib.Path | None  #: None of a study that was given as a text or a mapping
-    text: bytes  #: as it was read; empty of a mapping
-    text_sha256: str
-    seed: int  #: of the random numbers
-    overrides: tuple[str, ...]  #: as ``a.b.c=value``, in the order in which they were applied
-    units: Units  #: of lengths, angles, forces and times, in the file as in the results
-    resolved: dict[str, Any]  #: the study as plain data, overrides applied
-    mechanism: Mechanism  #: which solves any pose
-    parameters: Parameters
-    sections: Mapping[str, Any]  #: by their keys; also as attributes, ``study.kinematics``
-    requirements: tuple[Requirement, ...]  #: in the order of the file
-    fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
-    targets: Mapping[str, Target]  # by the coordinate or point
-    kinds: Mapping[KeyPath, str]  # kinds of quantities of entries outside the geometry, and of the entries below them
-    fixed: frozenset[str]  # parameters used in whole numbers, which are the same for every design
-    folder: Folder  #: folder of the files that it names, with their contents when it was loaded
-    drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
-    strict: bool = False  #: whether every kind of warning fails, not only those of `fail_on`
-    warnings: tuple[Problem, ...] = ()  #: likely mistakes, such as a parameter that nothing uses
-
-    if TYPE_CHECKING:
-        kinematics: ClassVar[KinematicsSection | None]
-        workspace: ClassVar[WorkspaceSection | None]
-        optimize: ClassVar[OptimizeSection | None]
-        reliability: ClassVar[ReliabilitySection | None]
-        stiffness: ClassVar[StiffnessSection | None]
-        dynamics: ClassVar[DynamicsSection | None]
-        matrix: ClassVar[MatrixSection | None]
-        sensitivities: ClassVar[SensitivitiesSection | None]
-
-    def __getattr__(self, name: str) -> Any:
-        if name in SECTIONS:
-            return self.sections.get(name)
-        raise AttributeError(f"a study has no {name!r}")
-
-    def with_sections(self, **sections: Any) -> Self:
-        """The study with other sections, by their keys."""
-        return dataclasses.replace(self, sections={**self.sections, **sections})
-
-    @cached_property
-    def questions(self) -> tuple[str, ...]:
-        """Commands that the study has a section for."""
-        return tuple(command for command in COMMANDS if self.sections.get(command) is not None)
-
-    @property
-    def source(self) -> StudySource:
-        """What it was read from."""
-        return StudySource(self.path, self.folder, self.text, self.text_sha256)
-
-    @property
-    def barred(self) -> tuple[str, ...]:
-        """Kinds of warnings that fail a run."""
-        return (ALL,) if self.strict else self.fail_on
-
-    @property
-    def cautions(self) -> dict[Caution, Problem]:
-        """Likely mistakes as warnings of its results, each with its place in the study."""
-        return {Caution("suspect", f"{problem.key}: {problem.message}"): problem for problem in self.warnings}
-
-    @property
-    def sizes(self) -> dict[str, float]:
-        """Nominal values of the places of the geometry, lengths and radians, and of the parameters."""
-        return {**self.mechanism.nominal, **self.parameters.nominal}
-
-    @property
-    def label(self) -> str:
-        """The name of its folder of results, that of its file or else its own."""
-        return (
-            printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
-        )
-
-    def __repr__(self) -> str:
-        questions = ", ".join(self.questions) or "no question"
-        return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
-
-    def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
-        """Files that the study reads: path of the key, file, and its text when the study was loaded."""
-        for keys, name in files(self.resolved, self.questions):
-            yield keys, self.folder.path / name, self.folder.text(name)
-
-    def motion(self, poses: Poses) -> Motion:
-        """Its mechanism in some poses."""
-        return Motion(self.mechanism, self.units, poses)
-
-    def unit_of(self, name: str) -> str | None:
-        """Unit of a number of the geometry, a drive, or a parameter; None if it is not known.
-
-        See `Parameters.kind` for that of a parameter.
-        """
-        parameters, places = self.parameters, self.mechanism.description.places
-        if name in places:
-            return self.units.label(places[name].quantity)
-        if name not in parameters.nominal:
-            return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
-        kind = parameters.kind(name, places)
-        return None if kind is None else self.units.label(kind)
-
-    def problem(self, message: str, *keys: str | int) -> Problem:
-        """A mistake at a path of the data, with its place in the text."""
-        if not self.text:
-            return Problem(message, ".".join(map(str, keys)))
-        reporter = Reporter(self._document)
-        reporter.report(keys, message)
-        return reporter.problems[-1]
-
-    @cached_property
-    def _document(self) -> Document:
-        """The text read again, with the places of its entries."""
-        document = read(self.text, str(self.path or _TEXT))
-        override(document, self.overrides)
-        return document
+    pass
+from mechdesign.study.loaded import TEXT, UNNAMED, Study, StudySource
+from mechdesign.study.text.given import override_texts, plain_data
 
 
 def load(
@@ -248,9 +95,9 @@ def load_data(
     """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
     folder. See `load`.
     """
-    data = _plain_data(mapping, "the study")
+    data = plain_data(mapping, "the study")
     source = StudySource(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
-    return _load_changed(Document.of(data), source, _texts(overrides), seed, drawn)
+    return _load_changed(Document.of(data), source, override_texts(overrides), seed, drawn)
 
 
 @one_thread()
@@ -264,7 +111,7 @@ def load_bytes(
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
     source = StudySource(path, folder, content, hashlib.sha256(content).hexdigest())
-    return _load_changed(read(content, str(path or _TEXT)), source, _texts(overrides), seed)
+    return _load_changed(read(content, str(path or TEXT)), source, override_texts(overrides), seed)
 
 
 def _drawing(document: Document) -> dict[str, Any]:
@@ -305,35 +152,6 @@ def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     return one.get("units") == other.get("units") and mechanisms[0].get("sketch") == mechanisms[1].get("sketch")
 
 
-def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
-    """Overrides as ``a.b.c=value``; a value of a mapping is written in JSON, which YAML reads."""
-    if isinstance(overrides, Mapping):
-        return tuple(
-            f"{name}={in_yaml(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
-        )
-    return (overrides,) if isinstance(overrides, str) else tuple(overrides)
-
-
-def _plain_data(value: Any, name: str) -> Any:
-    """Data of mappings, lists, texts and numbers only."""
-
-    def plainly(item: Any) -> Any:
-        if isinstance(item, Mapping):
-            return dict(item)
-        if hasattr(item, "tolist"):
-            return item.tolist()
-        if isinstance(item, os.PathLike):
-            return os.fspath(item)
-        raise TypeError(f"it holds {type(item).__name__!r}")
-
-    try:
-        return json.loads(json.dumps(value, default=plainly))
-    except (TypeError, ValueError, RecursionError) as error:
-        raise StudyError(
-            f"{name} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
-        ) from None
-
-
 @few_comparisons()
 def load_document(
     document: Document,
@@ -370,7 +188,7 @@ def load_document(
     assert mechanism is not None
     _check_poses(parts, mechanism, reporter, source.folder)
     reporter.done()
-    name = parts.get("name") or (source.path.stem if source.path is not None else _UNNAMED)
+    name = parts.get("name") or (source.path.stem if source.path is not None else UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(

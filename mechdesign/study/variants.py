@@ -16,7 +16,8 @@ from mechdesign.errors import StudyError, printable
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
-from mechdesign.study.loading import Study, adapter, context_of, load_document, same_sketch
+from mechdesign.study.loaded import Study
+from mechdesign.study.loading import adapter, context_of, load_document, same_sketch
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.schema.entries import number_at
 from mechdesign.study.schema.study_file import entry, kinds_of, override
