@@ -216,6 +216,12 @@ class AlongMotion:
         self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
         return self._evaluated_names >= {*names}
 
+    def _ends(self, names: Collection[str]) -> dict[str, int]:
+        """Which extreme of a column is asked, where it is one of them."""
+        whole = [request for request in self._requests if not request.part]
+        ends = {name: {request.end for request in whole if request.column == name} for name in names}
+        return {name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1}
+
     def _table(self, arrays: Mapping[str, Value], count: int) -> Floats:
         """The functions at so many places, by their names; those that have no value are 1."""
         self._evaluated_names = frozenset(arrays)
@@ -268,8 +274,6 @@ class PlainAlong(AlongMotion):
         self._means = {name: f"{MEAN_OF}{name}" if name in self._below else name for name in integrals}
         names = [*self.columns, *self._means.values(), *(name for name, _ in self._below.values())]
         self._names = [*dict.fromkeys(names), *([PACE] if integrals else [])]
-        ends = {name: {request.end for request in whole if request.column == name} for name in self.columns}
-        self._ends = {name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1}
         self._follow = self._series
 
     def _series(self) -> Functions:
@@ -278,7 +282,7 @@ class PlainAlong(AlongMotion):
         sizes = [float(np.median(row[np.isfinite(row)])) if np.isfinite(row).any() else 0.0 for row in table]
         return Functions(
             self.curve, self._names, self._evaluated, sizes, self._below, extremes=self.columns,
-            means=list(self._means.values()), ends=self._ends,
+            means=list(self._means.values()), ends=self._ends(self.columns),
         )  # fmt: skip
 
     def again(self, curve: Curve, requests: Collection[Request], also: Collection[str] = ()) -> PlainAlong:
