@@ -110,26 +110,13 @@ class DrawnStiffness(Drawn):
     loose: DrawnPose | None
 
 
-@dataclass(frozen=True, eq=False)
-class Unlooked(Between):
-    """Columns of motions are followed where they are asked, and not before."""
-
-    poses: Poses
-
-    @property
-    def followed(self) -> bool:
-        return self.poses.followed
-
-    closely = followed
-
-
 def _made(name: str, values: PoseValues) -> Table:
     table: Table = values.question.chosen(values, (name,))[name]
     return table
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness(MotionQuestion[Unlooked]):
+class Stiffness(MotionQuestion[Between]):
     """What a study asks of the stiffness of a body; only some tables."""
 
     body: Body
@@ -139,6 +126,7 @@ class Stiffness(MotionQuestion[Unlooked]):
 
     command: ClassVar[str] = "stiffness"
     lead: ClassVar[str] = "stiffness"
+    lazy: ClassVar[bool] = True
     a_row_a_pose: ClassVar = {name: partial(_made, name) for name in ("stiffness", "compliance")}
 
     @property
@@ -208,10 +196,10 @@ class Stiffness(MotionQuestion[Unlooked]):
             numbers[f"{BELOW}{name}"] = zero if (np.abs(zero) > RIGID * np.abs(stiff)).any() else np.ones(len(zero))
         return numbers
 
-    def between(self, passage: Passage) -> Unlooked:
-        return Unlooked(None, self.poses)
+    def between(self, passage: Passage) -> Between:
+        return Between(None)
 
-    def tables(self, passage: Passage, between: Unlooked) -> dict[str, Table]:
+    def tables(self, passage: Passage, between: Between) -> dict[str, Table]:
         return self.chosen(passage.values, self.names)
 
     def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
@@ -239,11 +227,11 @@ class Stiffness(MotionQuestion[Unlooked]):
             makers["displacements"] = lambda: displacements_table(motion, body.network, effects)
         return {name: make() for name, make in makers.items() if name in names}
 
-    def uneven(self, passage: Passage, between: Unlooked) -> Mapping[str, Ints]:
+    def uneven(self, passage: Passage, between: Between) -> Mapping[str, Ints]:
         designs = self.poses.designs
         return {"springs": _springs(passage.values).counts(designs, self.poses.count // designs)}
 
-    def say(self, passage: Passage, between: Unlooked, design: int) -> tuple[list[Caution], list[str]]:
+    def say(self, passage: Passage, between: Between, design: int) -> tuple[list[Caution], list[str]]:
         """Under-constrained poses, links without a beam, and legs without a free joint."""
         held, count = _read(Held, passage.values), self.poses.count // self.poses.designs
         rows = slice(design * count, (design + 1) * count)
@@ -266,7 +254,7 @@ class Stiffness(MotionQuestion[Unlooked]):
             *(assumed(self.body.study) if self.body.given.dynamics else ()),
         ], []
 
-    def drawn(self, passage: Passage, between: Unlooked) -> DrawnStiffness:
+    def drawn(self, passage: Passage, between: Between) -> DrawnStiffness:
         """The shown poses, the first valid one, and the first with a free twist."""
         values = passage.values
         first, loose = (
