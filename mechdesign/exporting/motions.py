@@ -11,10 +11,9 @@ import numpy as np
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy
-from mechdesign.motion.corners import curve_of
 from mechdesign.motion.motion import in_study_units
 from mechdesign.motion.rows import Poses, with_length
-from mechdesign.motion.solving import followed_angles
+from mechdesign.motion.solving import curve_with
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED
@@ -144,8 +143,7 @@ class Timed:
                 "listed poses and grids are no motion: give a 'sweep' of one coordinate, a path or a motion"
             )
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
-        plan = mechanism.plan(poses.groups[0].names)
-        curve = curve_of(study.motion(poses), followed_angles(mechanism, plan, drives))
+        curve = curve_with(study.motion(poses), drives)
         times = _instants(self._end(poses), step)
         line, places = np.zeros(len(times), dtype=np.intp), self._places(poses, times)
         solved = curve.solve(line, places)

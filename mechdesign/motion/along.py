@@ -22,6 +22,8 @@ from mechdesign.statistics import Part, Request
 
 # Prefix of the quotient of a function with poles, from which its mean is taken; how fast a motion passes its places.
 MEAN_OF, PACE = "mean of ", "pace"
+# Prefix of what is zero where a column goes to infinity.
+BELOW = "below "
 # A place within this many rows of a pose is that pose.
 AT_ROW = 1e-9
 # A swept value within this part of its range from a pose's value, or from zero, is that value.
@@ -41,7 +43,7 @@ class AlongMotion:
     """
 
     curve: Curve
-    columns: Collection[str]
+    columns: Sequence[str]
     of_poses: Collection[str] = ()
     _names: list[str]
     _means: Mapping[str, str]
@@ -214,6 +216,12 @@ class AlongMotion:
         self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
         return self._evaluated_names >= {*names}
 
+    def _ends(self, names: Collection[str]) -> dict[str, int]:
+        """Which extreme of a column is asked, where it is one of them."""
+        whole = [request for request in self._requests if not request.part]
+        ends = {name: {request.end for request in whole if request.column == name} for name in names}
+        return {name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1}
+
     def _table(self, arrays: Mapping[str, Value], count: int) -> Floats:
         """The functions at so many places, by their names; those that have no value are 1."""
         self._evaluated_names = frozenset(arrays)
@@ -246,34 +254,46 @@ class AlongMotion:
 
 
 class PlainAlong(AlongMotion):
-    """Columns that `values` gives at solved poses, along a motion; poles of theirs are not known."""
+    """Columns that `values` gives at solved poses, along a motion.
+
+    With those that are `poled`, which go to infinity at places, it gives functions that are zero there by their names
+    after `BELOW`. Rounding is judged by what they are at most places.
+    """
 
     def __init__(
         self, curve: Curve, values: Callable[[SolvedPoses], Mapping[str, Value]], requests: Collection[Request],
-        also: Collection[str] = (),
+        also: Collection[str] = (), poled: Collection[str] = (),
     ) -> None:  # fmt: skip
         super().__init__(requests)
-        self.curve, self._values, self._evaluate = curve, values, self._evaluated
+        self.curve, self._values, self._evaluate, self._poled = curve, values, self._evaluated, poled
         whole = [request for request in requests if not request.part]
         self.columns = tuple(dict.fromkeys([*also, *(request.column for request in whole)]))
         integrals = [request.column for request in whole if request.integral]
-        self._names, self._means = [*self.columns, *([PACE] if integrals else [])], {}
-        ends = {name: {request.end for request in whole if request.column == name} for name in self.columns}
-        self._follow = partial(
-            Functions, curve, self._names, self._evaluated, [0.0] * len(self._names), extremes=self.columns,
-            means=integrals, ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
+        self._below = {name: (f"{BELOW}{name}", 1) for name in self.columns if name in poled}
+        # Means are of the quotient itself where a function has poles.
+        self._means = {name: f"{MEAN_OF}{name}" if name in self._below else name for name in integrals}
+        names = [*self.columns, *self._means.values(), *(name for name, _ in self._below.values())]
+        self._names = [*dict.fromkeys(names), *([PACE] if integrals else [])]
+        self._follow = self._series
+
+    def _series(self) -> Functions:
+        pieces = self.curve.pieces
+        table = np.abs(self._evaluated(pieces.line, pieces.nodes[:, 0])[0])
+        sizes = [float(np.median(row[np.isfinite(row)])) if np.isfinite(row).any() else 0.0 for row in table]
+        return Functions(
+            self.curve, self._names, self._evaluated, sizes, self._below, extremes=self.columns,
+            means=list(self._means.values()), ends=self._ends(self.columns),
         )  # fmt: skip
 
     def again(self, curve: Curve, requests: Collection[Request], also: Collection[str] = ()) -> PlainAlong:
-        return PlainAlong(curve, self._values, requests, also)
+        return PlainAlong(curve, self._values, requests, also, self._poled)
 
     @quiet
     def _evaluated(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         there = self.curve.solve(line, s, judged=False)
         arrays = {**there.poses.named, **self._values(there), PACE: self.curve.poses.pace(line, s)}
-        return self._table(arrays, len(s)), np.broadcast_to(
-            regularity(self.curve.mechanism.linearize(there.configuration)), s.shape
-        )
+        linear = self.curve.mechanism.linearize(there.configuration)
+        return self._table(arrays, len(s)), np.broadcast_to(regularity(linear), s.shape)
 
 
 def of_swept(motion: Motion, swept: str | None, otherwise: str) -> dict[str, str]:

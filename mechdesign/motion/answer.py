@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -34,22 +34,15 @@ class Between:
 
     along: AlongMotion | None
 
-    @property
-    def followed(self) -> bool:
-        """Whether columns can be followed."""
-        return self.along is not None
-
-    @property
-    def closely(self) -> bool:
-        """Whether all of them are, so that no extreme is missed."""
-        return self.along is not None and not self.along.functions.unresolved.any()
-
 
 B = TypeVar("B", bound=Between)
 
 
 class MotionQuestion(PoseQuestion, Generic[B]):
     """A question about motions, with all that `answer` asks of it."""
+
+    #: Whether its columns are followed where they are asked, and not before.
+    lazy: ClassVar[bool] = False
 
     @abstractmethod
     def between(self, passage: Passage) -> B:
@@ -109,8 +102,10 @@ def answer_of(passage: Passage, jobs: int | None = 1) -> list[Group]:
                 for group in answer(question.at(question.poses.some(some)))]  # fmt: skip
     tables = question.tables(passage, between)
     ends = [_end(passage, between, k) for k in range(designs)]
-    whole = Scope(not between.closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, follow=Courses(question.along)) if between.followed else whole
+    along, lazily = between.along, question.lazy and question.poses.followed
+    closely = lazily if along is None else not along.functions.unresolved.any()
+    whole = Scope(not closely, ends[0].missing if designs == 1 else "")
+    a_pose = whole if along is None and not lazily else replace(whole, follow=Courses(question.along))
     scopes = dict.fromkeys(question.a_row_a_pose, a_pose)
     scopes |= dict.fromkeys(question.poses_only, replace(whole, poses_only=True))
     tables = {name: replace(table, scope=scopes.get(name, whole)) for name, table in tables.items()}

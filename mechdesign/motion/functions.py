@@ -259,7 +259,8 @@ class Functions(Means):
         x[turning] = at = chebyshev.root(
             lambda place: rise(turning, place), sides[0][turning], low[turning], sides[1][turning], high[turning]
         )
-        refined = sign[turning] * chebyshev.value(c[turning], at) / chebyshev.value(d[turning], at)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            refined = sign[turning] * chebyshev.value(c[turning], at) / chebyshev.value(d[turning], at)
         value[turning] = np.maximum(refined, value[turning])
         return x, value
 

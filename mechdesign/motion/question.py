@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.motion.corners import curve_of
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.rows import Poses
-from mechdesign.motion.solving import followed_angles, solve_poses
+from mechdesign.motion.solving import curve_with, solve_poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Table
 from mechdesign.work.chunks import map_chunks
@@ -61,10 +60,7 @@ class PoseQuestion(ABC):
     @cached_property
     def curve(self) -> Curve | None:
         """The motion between its poses; None of listed poses and grids."""
-        if not self.poses.followed:
-            return None
-        plan = self.motion.mechanism.plan(self.poses.groups[0].names)
-        return curve_of(self.motion, followed_angles(self.motion.mechanism, plan, self.watched))
+        return curve_with(self.motion, self.watched) if self.poses.followed else None
 
     @abstractmethod
     def at(self, poses: Poses) -> Self:

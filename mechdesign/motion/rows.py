@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -240,30 +240,27 @@ class Poses:
             values = {name: v.reshape(self.designs, -1)[designs].ravel() for name, v in group.values.items()}
             own = group.rows[: len(group.rows) // self.designs]
             groups.append(PoseGroup(group.names, values, (first + own).ravel()))
-        parts = (self.places, self.parameters, self.slopes, self.bends)
-        places, parameters, slopes, bends = ({name: v[rows] for name, v in part.items()} for part in parts)
-        paths = {owner: path.take(designs) for owner, path in self.paths.items()}
-        program = None if self.program is None else self.program.take(designs)
         return replace(
-            self, groups=tuple(groups), count=len(rows), designs=len(designs), places=places, parameters=parameters,
-            paths=paths, program=program, times=self.times[rows] if self.times is not None else None, slopes=slopes,
-            bends=bends,
+            self, groups=tuple(groups), count=len(rows), designs=len(designs),
+            paths={owner: path.take(designs) for owner, path in self.paths.items()},
+            program=None if self.program is None else self.program.take(designs), **self._columns(rows),
         )  # fmt: skip
 
     def take(self, rows: Ints | slice) -> Poses:
         """Some poses of a motion or a grid of one design, in their order."""
         (group,) = self.groups
-        parts = (group.values, self.places, self.parameters, self.slopes, self.bends)
-        values, places, parameters, slopes, bends = (
-            {name: column[rows] for name, column in part.items()} for part in parts
-        )
         taken = np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows
-        count = len(taken)
+        values, count = {name: column[rows] for name, column in group.values.items()}, len(taken)
         return replace(
-            self, groups=(PoseGroup(group.names, values, np.arange(count)),), count=count, grid=(count,),
-            places=places, parameters=parameters, times=self.times[rows] if self.times is not None else None,
-            slopes=slopes, bends=bends, rows=taken,
+            self, groups=(PoseGroup(group.names, values, np.arange(count)),), count=count, grid=(count,), rows=taken,
+            **self._columns(rows),
         )  # fmt: skip
+
+    def _columns(self, rows: Ints | slice) -> dict[str, Any]:
+        """What some poses have besides the coordinates that they give."""
+        parts = {key: getattr(self, key) for key in ("places", "parameters", "slopes", "bends")}
+        columns = {key: {name: column[rows] for name, column in part.items()} for key, part in parts.items()}
+        return {**columns, "times": self.times[rows] if self.times is not None else None}
 
 
 def with_length(points: Mapping[str, PointPath]) -> list[tuple[str, PointPath]]:

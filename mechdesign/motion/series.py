@@ -144,10 +144,10 @@ class Series:
             with np.errstate(invalid="ignore"):
                 size = np.maximum(np.abs(table).max(axis=2), self._sizes[self._poled, None])
                 some = _remainder(table, np.count_nonzero(lost, axis=2)) <= left * size
-            own[self._poled] = some
-            rounding = np.zeros(own.shape)
-            # Far from singular poses a value has all its digits, whatever the largest is.
-            rounding[self._poled] = np.where(some & (left > DIGITS), left * size, 0.0)
+                # Far from singular poses a value has all its digits, whatever the largest is.
+                rounded = np.where(some & (left > DIGITS), left * size, 0.0)
+            own[self._poled], rounding = some, np.zeros(own.shape)
+            rounding[self._poled] = rounded
             largest(self._noise, pieces.line, rounding)
             products[self._poled] = np.where(some[..., None], table, products[self._poled])
             divisors[own] = 1.0

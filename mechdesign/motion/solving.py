@@ -85,6 +85,12 @@ def _solve_group(
         yield SolvedPoses(motion, rows, group.names, configuration)
 
 
+def curve_with(motion: Motion, coordinates: Sequence[Coordinate]) -> Curve:
+    """The motion of some poses with the angles of coordinates, those of limits and of torsion springs."""
+    plan = motion.mechanism.plan(motion.poses.groups[0].names)
+    return curve_of(motion, followed_angles(motion.mechanism, plan, coordinates))
+
+
 def followed_angles(mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
     """Angles whose turns only the motion gives: not those given, coupled, nor drives whose limits leave one turn.
 

@@ -362,3 +362,31 @@ optimize:
 """
     best = mechdesign.optimize(mechdesign.load(text=text)).tables["best"]
     assert best["l"][0] == pytest.approx(math.sqrt(2e6 / 200), rel=1e-6)
+
+
+def test_stiffness_is_infinite_or_nothing_where_it_is_so_between_the_rows() -> None:
+    # An arm along x bears all along itself: k_x = c/(L sin theta)^2. A piston at its dead centre holds no crank.
+    arm = """
+mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: {theta: {angle: arm}}}
+stiffness: {link: arm, at: P, actuators: {theta: 2e6}, sweep: {theta: {from: -7.3, to: 27.7, step: 5}}}
+requirements: [{result: stiffness.k_x, at_least: 900}, {result: stiffness.k_x, at_most: 1e9}]
+"""
+    least, largest = verdicts(arm, "stiffness")
+    assert least.met
+    assert least.worst == pytest.approx(2e6 / (100 * math.sin(math.radians(27.7))) ** 2, rel=1e-12)
+    assert not largest.met
+    assert largest.worst == math.inf
+    pushed = (
+        PUSHED.partition("dynamics:")[0]
+        + """
+stiffness: {link: crank, at: A, actuators: {x: 1000}, sweep: {crank.angle: {from: -7.3, to: 27.7, step: 5}}}
+requirements:
+  - {result: stiffness.k_min, at_least: 1}
+  - {result: stiffness.k_min, at_least: 0}
+  - {result: stiffness.compliance.C22, at_most: 1e9}
+  - {result: stiffness.compliance.C22, at_least: 0}
+"""
+    )
+    loose, held, soft, positive = verdicts(pushed, "stiffness")
+    assert (loose.met, held.met, soft.met, positive.met) == (False, True, False, True)
+    assert (loose.worst, soft.worst) == (0.0, math.inf)

@@ -80,9 +80,6 @@ class KinematicAlong(AlongMotion):
             if name in followed
         }
         self.columns = tuple(columns)
-        ends = {
-            name: {request.end for request in whole if request.column == name} for name in columns if name not in shown
-        }
         drives = set(mechanism.drives)
         self._groups = []
         if passages and set(question.poses.names) != drives:
@@ -122,7 +119,7 @@ class KinematicAlong(AlongMotion):
             Functions, curve, self._names, self._evaluate, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
             magnitudes=[name for name in (*magnitudes, *_CONDITIONS) if name in columns],
-            ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
+            ends=self._ends([name for name in columns if name not in shown]),
         )  # fmt: skip
 
     @property

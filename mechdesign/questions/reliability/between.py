@@ -11,10 +11,10 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
-from mechdesign.motion.corners import curve_of, divide
+from mechdesign.motion.corners import divide
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.rows import Poses
-from mechdesign.motion.solving import followed_angles
+from mechdesign.motion.solving import curve_with
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.questions.kinematics.corners import variables_of
 from mechdesign.questions.loads import coordinates_in, corners_in
@@ -53,8 +53,7 @@ def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
     loads = study.dynamics.loads if forced and study.dynamics is not None else ()
     coordinates = [channel.coordinate for channel in channels if isinstance(channel, CoordinateChannel)]
     coordinates += coordinates_in(study, loads)
-    plan = study.mechanism.plan(poses.groups[0].names)
-    curve = curve_of(study.motion(poses), followed_angles(study.mechanism, plan, coordinates))
+    curve = curve_with(study.motion(poses), coordinates)
     expressions = expressions_of(coordinates)
     corners = [*corners_of(coordinates), *corners_in(loads)]
     return divide(curve, corners, variables_of(study, pace(study), curve, expressions))[0]

@@ -14,8 +14,9 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.motion.along import PlainAlong
+from mechdesign.motion.along import BELOW, PlainAlong
 from mechdesign.motion.answer import Between, MotionQuestion, alone
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.passage import Passage
@@ -30,6 +31,7 @@ from mechdesign.questions.stiffness.body import Body, ask, hold, pushes, under_l
 from mechdesign.questions.stiffness.compliance import Held
 from mechdesign.questions.stiffness.effects import Effects, effects_of
 from mechdesign.questions.stiffness.elements import Hinge, SlideElement
+from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import (
     Springs,
     compliance_table,
@@ -49,6 +51,11 @@ from mechdesign.work.threads import one_thread
 CHUNK = 8192
 # Tables in the order in which they are shown.
 ORDER = ("stiffness", "compliance", "eigen", "springs", "deflections", "forces", "displacements")
+# Columns of which nothing is said between the poses: directions, which jump, and counts.
+OF_POSES = ("k_angle", "free_x", "free_y", "free_phi", "rank", "valid")
+# Columns that go to infinity: where the body is rigid in a direction, and of compliances where a twist is free.
+POLED = frozenset(["k_x", "k_y", "k_phi", "k_min", "k_max", "k_direction", *(f"{letter}{i}{j}" for letter in "KC"
+                   for i in (1, 2, 3) for j in (1, 2, 3))])  # fmt: skip
 # Smallest singular value of the unit wrenches below which a pose gets a warning: its stiffness depends on rounding and
 # tolerances.
 NEAR_SINGULAR = 1e-4
@@ -103,26 +110,13 @@ class DrawnStiffness(Drawn):
     loose: DrawnPose | None
 
 
-@dataclass(frozen=True, eq=False)
-class Unlooked(Between):
-    """Columns of motions are followed where they are asked, and not before."""
-
-    poses: Poses
-
-    @property
-    def followed(self) -> bool:
-        return self.poses.followed
-
-    closely = followed
-
-
 def _made(name: str, values: PoseValues) -> Table:
     table: Table = values.question.chosen(values, (name,))[name]
     return table
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness(MotionQuestion[Unlooked]):
+class Stiffness(MotionQuestion[Between]):
     """What a study asks of the stiffness of a body; only some tables."""
 
     body: Body
@@ -132,6 +126,7 @@ class Stiffness(MotionQuestion[Unlooked]):
 
     command: ClassVar[str] = "stiffness"
     lead: ClassVar[str] = "stiffness"
+    lazy: ClassVar[bool] = True
     a_row_a_pose: ClassVar = {name: partial(_made, name) for name in ("stiffness", "compliance")}
 
     @property
@@ -173,20 +168,38 @@ class Stiffness(MotionQuestion[Unlooked]):
 
     def along(self, requests: Collection[Request]) -> PlainAlong | None:
         curve = self.curve
-        return None if curve is None or curve.spent.all() else PlainAlong(curve, self._columns, requests)
+        if curve is None or curve.spent.all():
+            return None
+        along = PlainAlong(curve, self._columns, requests, poled=POLED)
+        along.of_poses = OF_POSES
+        return along
 
+    @quiet
     def _columns(self, there: SolvedPoses) -> dict[str, Floats]:
-        """Numbers of a row a pose, at solved poses."""
+        """Numbers of a row a pose, at solved poses; and what is zero where they go to infinity.
+
+        With C the compliance, a radian counted as a length, all is measured by its trace, which has the poles of C.
+        """
         values = unfilled(self.at(there.poses))
         values.fill(there)
         tables = values.question.chosen(values, self.a_row_a_pose)
-        return {column.name: column.values.astype(float)
-                for table in tables.values() for column in table.columns if column.numeric}  # fmt: skip
+        numbers = {column.name: column.values.astype(float)
+                   for table in tables.values() for column in table.columns if column.numeric}  # fmt: skip
+        soft = values.arrays["compliance"]
+        size = np.append(np.ones(2), self.body.extent)[: soft.shape[1]]
+        soft = soft * size[:, None] * size
+        stiff = 1.0 / np.trace(soft, axis1=1, axis2=2)
+        below = {"C": stiff, "K": np.linalg.det(np.nan_to_num(soft * stiff[:, None, None]))}
+        for name in POLED.intersection(numbers):
+            zero = below[name[0]] if name[0] in below else stiff / numbers[name]
+            # What is rigid everywhere has no poles.
+            numbers[f"{BELOW}{name}"] = zero if (np.abs(zero) > RIGID * np.abs(stiff)).any() else np.ones(len(zero))
+        return numbers
 
-    def between(self, passage: Passage) -> Unlooked:
-        return Unlooked(None, self.poses)
+    def between(self, passage: Passage) -> Between:
+        return Between(None)
 
-    def tables(self, passage: Passage, between: Unlooked) -> dict[str, Table]:
+    def tables(self, passage: Passage, between: Between) -> dict[str, Table]:
         return self.chosen(passage.values, self.names)
 
     def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
@@ -214,11 +227,11 @@ class Stiffness(MotionQuestion[Unlooked]):
             makers["displacements"] = lambda: displacements_table(motion, body.network, effects)
         return {name: make() for name, make in makers.items() if name in names}
 
-    def uneven(self, passage: Passage, between: Unlooked) -> Mapping[str, Ints]:
+    def uneven(self, passage: Passage, between: Between) -> Mapping[str, Ints]:
         designs = self.poses.designs
         return {"springs": _springs(passage.values).counts(designs, self.poses.count // designs)}
 
-    def say(self, passage: Passage, between: Unlooked, design: int) -> tuple[list[Caution], list[str]]:
+    def say(self, passage: Passage, between: Between, design: int) -> tuple[list[Caution], list[str]]:
         """Under-constrained poses, links without a beam, and legs without a free joint."""
         held, count = _read(Held, passage.values), self.poses.count // self.poses.designs
         rows = slice(design * count, (design + 1) * count)
@@ -241,7 +254,7 @@ class Stiffness(MotionQuestion[Unlooked]):
             *(assumed(self.body.study) if self.body.given.dynamics else ()),
         ], []
 
-    def drawn(self, passage: Passage, between: Unlooked) -> DrawnStiffness:
+    def drawn(self, passage: Passage, between: Between) -> DrawnStiffness:
         """The shown poses, the first valid one, and the first with a free twist."""
         values = passage.values
         first, loose = (
