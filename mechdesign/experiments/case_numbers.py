@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +18,6 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, path_of, terms_of
 from mechdesign.terms import command_of as command_named
-
-
-class Numbers(NamedTuple):
-    """A number of each case, shape (cases,), and its unit."""
-
-    values: Floats
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -41,11 +34,14 @@ class CaseNumber:
         Only rows whose columns have these values count.
     keys : tuple
         Where the study names it.
+    whole : bool
+        Whether it is nan where poses, samples or a part of the motion are missing.
     """
 
     name: str
     where: tuple[tuple[str, Any], ...] = ()
     keys: KeyPath = ()
+    whole: bool = False
 
     @property
     def title(self) -> str:
@@ -58,8 +54,8 @@ class CaseNumber:
         """The command that computes it."""
         return command_named(self.name) or "workspace"
 
-    def find(self, group: Group) -> Numbers:
-        """The number of each design, shape (designs,); nan where a row that counts has none.
+    def find(self, group: Group) -> tuple[Floats, str]:
+        """The number of each design, shape (designs,), nan where a row that counts has none; and its unit.
 
         Raises
         ------
@@ -68,7 +64,8 @@ class CaseNumber:
             differ in their number of rows, so that each has to be read by itself.
         """
         terms = _terms(group, path_of(self.name), dict(self.where))
-        return Numbers(terms.numbers(len(group.ends)), terms.unit)
+        numbers = terms.numbers(len(group.ends))
+        return np.where(incomplete(group, terms), np.nan, numbers) if self.whole else numbers, terms.unit
 
 
 def numbers_in(section: str, results: Iterable[Named]) -> list[CaseNumber]:

@@ -9,10 +9,9 @@ import numpy as np
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import AssemblyError, Problem, StudyError
-from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
-from mechdesign.family import forms
+from mechdesign.family import forms, stacked
 from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look, with_fewer_rows
@@ -45,11 +44,11 @@ def answers(
     could not be loaded or answered. A batch has many cases where their questions can be asked of many designs at once,
     else one. Cases before `begin` are left out, and batches of other shards.
     """
-    together = set(commands_of(study, results)) <= batches.TOGETHER.keys()
+    together = set(commands_of(study, results)) <= stacked.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
     if begin >= len(cases):
         return
-    # A computation that is resumed has the same batches.
+    # A computation that is resumed has the same stacked.
     chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
     answer = Answer(study, tuple(results), cases[0])
     yield from map_chunks(answer, shard.share(chunks), jobs, travels=True)
@@ -121,7 +120,7 @@ class Answer:
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
         """Answer designs of a study, each a case; a study without changes is that of all the cases."""
         for command in commands_of(designs.study, self.results):
-            for group in batches.answers(designs, command).groups:
+            for group in stacked.answers(designs, command).groups:
                 for some in [rows[group.rows]] if designs.changed else rows[:, None]:
                     sheet.note(some, group)
 

@@ -7,36 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.experiments.case_numbers import CaseNumber, Numbers, incomplete
+from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.schema.matrix import Best
-from mechdesign.motion.group import Group
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
 from mechdesign.report.cases import FRONT, RANK
 from mechdesign.results import Column
-from mechdesign.terms import path_of, terms_of
 
 # Differences up to this part of the largest number count as none, the precision of tables.
 _RESOLUTION = 1e-12
 
 
-@dataclass(frozen=True)
-class Goal(CaseNumber):
-    """A number of a case that is maximised or minimised; nan where a part of the motion is missing."""
-
-    def find(self, group: Group) -> Numbers:
-        """The number of each design; see `CaseNumber.find`."""
-        numbers = super().find(group)
-        terms = terms_of(group.result, path_of(self.name), dict(self.where))
-        return numbers._replace(values=np.where(incomplete(group, terms), np.nan, numbers.values))
-
-
-def goals_of(best: Best | None) -> dict[Goal, int]:
+def goals_of(best: Best | None) -> dict[CaseNumber, int]:
     """The goals, with the sign -1 where they are maximised and 1 where they are minimised."""
     chosen = [] if best is None else [("maximize", -1, best.maximize), ("minimize", 1, best.minimize)]
     return {
-        Goal(result.result, tuple(result.where.items()), ("matrix", "best", key, k)): sign
+        CaseNumber(result.result, tuple(result.where.items()), ("matrix", "best", key, k), whole=True): sign
         for key, sign, results in chosen
         for k, result in enumerate(results)
     }

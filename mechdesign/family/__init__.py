@@ -1,3 +1,1 @@
 """Many designs of a study: compiled once, evaluated together, judged by one rule."""
-
-HELP_PAGE = "howto/many_designs"

@@ -1,11 +1,12 @@
-"""Thousands of designs at once: tables with the same number of rows for each, and the poses' margins of assembly."""
+"""Thousands of designs at once: tables with the same number of rows for each, whole answers, margins of assembly."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,9 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.along import AlongMotion
+from mechdesign.motion.answer import MotionQuestion, answer
 from mechdesign.motion.followed import courses_of
+from mechdesign.motion.group import Answers, Group
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import evaluate
 from mechdesign.motion.rows import Poses
@@ -22,6 +25,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.dynamics.analysis import Dynamics
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.answers import Kinematics
+from mechdesign.questions.look import ask
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
@@ -30,6 +34,7 @@ from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import remeasured
+from mechdesign.work.threads import one_thread
 
 # Tables with a row a pose, or several, that are followed between the poses.
 A_ROW_A_POSE = {*Kinematics.a_row_a_pose, *Dynamics.a_row_a_pose, *Stiffness.a_row_a_pose}
@@ -40,6 +45,12 @@ TABLES: Mapping[str, Collection[str]] = {
     "dynamics": (*Dynamics.a_row_a_pose, "extremes"),
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
+
+
+# Questions that many designs are asked at once.
+TOGETHER: Mapping[str, Callable[[Study, Poses], MotionQuestion[Any]]] = {
+    "kinematics": Kinematics.of, "stiffness": Stiffness.of, "dynamics": Dynamics.of
+}  # fmt: skip
 
 
 class Stack(NamedTuple):
@@ -152,6 +163,36 @@ def _followed(tables: Mapping[str, Table], along: AlongMotion | None) -> dict[st
     """Tables of which those with a row a pose are followed along the motions."""
     scope = Scope(follow=None if along is None else partial(courses_of, along))
     return {name: replace(table, scope=scope) if name in A_ROW_A_POSE else table for name, table in tables.items()}
+
+
+@one_thread()
+def at_poses(study: Study, command: str, poses: Poses) -> Answers:
+    """Answers for the poses of several designs, each as if it were asked alone, without pictures.
+
+    The poses are solved together: their arrays are held as a whole. A design without a valid pose has an error.
+    """
+    return Answers(answer(TOGETHER[command](study, poses)))
+
+
+def answers(designs: Designs, command: str) -> Answers:
+    """A command's answer for each design, or the error of a design that has none."""
+    answered: list[Group] = []
+    if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
+        # Where a group has an error, its designs are answered one by one.
+        for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
+            with suppress(MechdesignError):
+                groups = at_poses(study, command, poses).groups
+                answered += [replace(group, rows=rows[group.rows]) for group in groups]
+    left = set(range(designs.count)).difference(*(group.rows.tolist() for group in answered))
+    return Answers([*answered, *(_alone(designs, k, command) for k in sorted(left))])
+
+
+def _alone(designs: Designs, k: int, command: str) -> Group:
+    try:
+        group = Group.alone(ask(designs.one(k), command))
+    except Exception as error:
+        group = Group.failed(command, error)
+    return replace(group, rows=np.array([k]))
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

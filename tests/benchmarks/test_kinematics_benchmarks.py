@@ -21,8 +21,8 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.experiments.batches import at_poses
 from mechdesign.family.evaluator import Evaluator
+from mechdesign.family.stacked import at_poses
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.questions.kinematics.analysis import kinematics

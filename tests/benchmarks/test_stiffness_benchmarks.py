@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.experiments.batches import answers
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
+from mechdesign.family.stacked import answers
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.questions.optimize.question import Evaluation
+from mechdesign.questions.optimize.question import VariableFamily
 from mechdesign.work.journal import NAME, Journal, digest
 
 STUDY = """\
@@ -37,7 +37,7 @@ METHODS = {"grid": "number: 40", "search": "step: 0.1", "pareto": "step: 0.1"}
 @pytest.fixture
 def interrupt(monkeypatch):
     """Press Ctrl-C when so many batches have been evaluated."""
-    evaluate = Evaluation.__call__
+    evaluate = VariableFamily.__call__
 
     def press(after):
         calls = []
@@ -48,7 +48,7 @@ def interrupt(monkeypatch):
             calls.append(len(next(iter(designs.values()))))
             return evaluate(self, designs)
 
-        monkeypatch.setattr(Evaluation, "__call__", counted)
+        monkeypatch.setattr(VariableFamily, "__call__", counted)
         return calls
 
     return press

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mechdesign.errors import AssemblyError
-from mechdesign.experiments.batches import at_poses
+from mechdesign.family.stacked import at_poses
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

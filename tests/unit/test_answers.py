@@ -9,7 +9,7 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.errors import AssemblyError
-from mechdesign.experiments.batches import at_poses
+from mechdesign.family.stacked import at_poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.poses import study_poses

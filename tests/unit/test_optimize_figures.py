@@ -21,7 +21,7 @@ from mechdesign.questions.optimize.figures.scores import (
     parallel_axes,
     score_curves,
 )
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.marks import Dots, Panel, Picture
@@ -96,13 +96,13 @@ def designed() -> mechdesign.Study:
     return study_of(ARM, f"optimize={{method: search, variables: {RANGES}, maximize: kinematics.P.x}}")
 
 
-def many(count: int = 500) -> Designs:
+def many(count: int = 500) -> DesignSet:
     x, y, z = np.random.default_rng(0).random((3, count))
     goals = Goal("cost", "", "", smallest=True), Goal("mass", "", "", smallest=True)
     values = dict(zip(goals, (x + y, 1 - x + z), strict=True))
     codes = (np.arange(count) == 3).astype(np.int32)
     variables, weights = {"a": x, "b": y, "c": z}, np.array([[1.0, 0.0]])
-    return Designs(
+    return DesignSet(
         designed(), variables, goals, (), values, {}, codes, ["", "wrong"], np.full(len(codes), np.nan), weights, {}
     )
 
@@ -166,8 +166,8 @@ def test_labels_of_a_front_of_three_goals_lie_apart(look: str) -> None:
     names = "kinematics.max_theta_effort", "workspace.largest_radius", "stiffness.min_k_min"
     goals = tuple(Goal(name, "", "", smallest=True) for name in names)
     values = dict(zip(goals, (x, y, z), strict=True))
-    designs = Designs(designed(), {"a": x, "b": y, "c": z}, goals, (), values, {}, np.zeros(200, dtype=np.int32), [""],
-                      np.full(200, np.nan), np.ones((1, 3)), {})  # fmt: skip
+    designs = DesignSet(designed(), {"a": x, "b": y, "c": z}, goals, (), values, {}, np.zeros(200, dtype=np.int32),
+                        [""], np.full(200, np.nan), np.ones((1, 3)), {})  # fmt: skip
     front = table(a=x[:3], b=y[:3], c=z[:3], knee=[False, True, False],
                   **{name: values[:3] for name, values in zip(names, (x, y, z), strict=True)})  # fmt: skip
     with style.context(look):
@@ -204,7 +204,7 @@ def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
     x, y = np.random.default_rng(0).random((2, 2000))
     cost = Goal("cost", "", "", smallest=True)
     values = {cost: 1 + (x - 0.5) ** 2 + y}
-    designs = Designs(designed(), {"a": x, "b": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
+    designs = DesignSet(designed(), {"a": x, "b": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
                       np.full(2000, np.nan), np.ones((1, 1)), {})  # fmt: skip
     with style.context():
         figure = draw(score_curves(designs))

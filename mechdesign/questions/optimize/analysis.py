@@ -23,8 +23,8 @@ from mechdesign.questions.optimize import pareto
 from mechdesign.questions.optimize import search as searching
 from mechdesign.questions.optimize.explorer import Explorer
 from mechdesign.questions.optimize.files import design_files
-from mechdesign.questions.optimize.judge import Designs, Judge
-from mechdesign.questions.optimize.question import Evaluation, designs_question
+from mechdesign.questions.optimize.judge import DesignSet, Judge
+from mechdesign.questions.optimize.question import VariableFamily, designs_question
 from mechdesign.questions.optimize.tables import (
     best_table,
     bounds_table,
@@ -78,7 +78,7 @@ def optimize(
         else searching.allowance(len(section.variables), len(weights), alone=bool(question.alone))
     )
     question, meanings = question.limited(MAX_KEPT_ROWS // budget), question.meanings
-    with workers(Evaluation(question), jobs, travels=True) as compute:
+    with workers(VariableFamily(question), jobs, travels=True) as compute:
         judge = Judge(question, compute, progress, journal)
         try:
             doubts = _ask(study, judge, weights, budget, study.seed if seed is None else seed)
@@ -164,7 +164,7 @@ def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) ->
             )  # fmt: skip
 
 
-def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
+def _optima(designs: DesignSet) -> dict[str, tuple[int, str]]:
     """The optima by the names of their files: ``optimum`` for the first row, then ``optimum_2``; and a front's knee."""
     files = {}
     for row, winner in enumerate(designs.winners.tolist()):
@@ -178,7 +178,7 @@ def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
     return files | ({"knee": files["optimum"]} if len(designs.chosen) else {})
 
 
-def _nothing_feasible(study: Study, designs: Designs, nearest: int | None) -> AssemblyError:
+def _nothing_feasible(study: Study, designs: DesignSet, nearest: int | None) -> AssemblyError:
     """Why no design is feasible, and by how much the nearest one misses each condition."""
     message = _none_feasible(designs)
     if nearest is None:
@@ -196,7 +196,7 @@ def _nothing_feasible(study: Study, designs: Designs, nearest: int | None) -> As
     return AssemblyError(message, Result("optimize", tables, tuple(wrong), counts, failed=message, files=files))
 
 
-def _none_feasible(designs: Designs) -> str:
+def _none_feasible(designs: DesignSet) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
@@ -214,14 +214,14 @@ def _none_feasible(designs: Designs) -> str:
     return f"no design of {len(designs)} is feasible: {message}"
 
 
-def _finished_part(designs: Designs) -> Result:
+def _finished_part(designs: DesignSet) -> Result:
     table = designs_table(designs)
     message = f"interrupted after {len(designs)} designs; --resume goes on"
     partly = Caution("incomplete", message, table.name)
     return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=message)
 
 
-def _warnings(question: DesignsQuestion, designs: Designs) -> Iterator[Caution]:
+def _warnings(question: DesignsQuestion, designs: DesignSet) -> Iterator[Caution]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MAX_REASONS]:
         place = in_words(designs.design(first))
@@ -266,7 +266,7 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
     return [complex(np.asarray(fitted(shape, panels)[1].centre)[0]) for shape in shapes]
 
 
-def _places(designs: Designs, question: DesignsQuestion) -> dict[str, Complexes]:
+def _places(designs: DesignSet, question: DesignsQuestion) -> dict[str, Complexes]:
     """Places of shapes without a given centre in the workspaces of the optima; none where there are several regions."""
     free = [
         condition
@@ -317,7 +317,7 @@ class DrawnDesign:
 class DrawnDesigns(Drawn):
     """All designs that were evaluated."""
 
-    designs: Designs
+    designs: DesignSet
 
     @cached_property
     def best(self) -> DrawnDesign:
@@ -325,7 +325,7 @@ class DrawnDesigns(Drawn):
         return drawn_design(self.designs, self.designs.design(self.designs.best))
 
 
-def drawn_design(designs: Designs, design: Design) -> DrawnDesign:
+def drawn_design(designs: DesignSet, design: Design) -> DrawnDesign:
     """Compute what pictures of one design show: its workspace if that was judged, or else its motion."""
     study, numbers = parted(designs.study, design)
     made = variant(study, numbers)

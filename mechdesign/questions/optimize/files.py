@@ -14,7 +14,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.motion.rows import PoseGroup, Poses
 from mechdesign.motion.solving import solve_poses
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import in_words, parted
 from mechdesign.questions.poses import study_poses
 from mechdesign.region.curves import workspace_nodes
@@ -29,7 +29,7 @@ BETWEEN = 100
 
 
 def design_files(
-    study: Study, designs: Designs, optima: Mapping[str, tuple[int, str]]
+    study: Study, designs: DesignSet, optima: Mapping[str, tuple[int, str]]
 ) -> tuple[dict[str, str], list[Caution]]:
     """Texts by file name, and warnings about them.
 
@@ -67,7 +67,7 @@ def design_files(
     return files, doubts
 
 
-def _parted(study: Study, designs: Designs) -> Iterator[str]:
+def _parted(study: Study, designs: DesignSet) -> Iterator[str]:
     """A warning of listed poses between which the single drive cannot move the mechanism."""
     if not any(goal.command == "kinematics" and not goal.expression for goal in designs.goals):
         return

@@ -34,7 +34,7 @@ SLOW_DESIGNS_AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Designs:
+class DesignSet:
     """Evaluated designs, compared by the weighted sums of their normalised goals [S1, eqs. 27, 28].
 
     Arrays are of shape (designs,).
@@ -325,13 +325,13 @@ class Judge:
         evaluated.table[:, self.layout.code] = codes
         return evaluated.table
 
-    def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> Designs:
-        """Everything evaluated so far; see `Designs` of the arguments."""
+    def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> DesignSet:
+        """Everything evaluated so far; see `DesignSet` of the arguments."""
         head = self.layout.head
         rows = np.concatenate([np.empty((0, head)), *(part[:, :head] for part in self._rows)])
         variables = np.concatenate([np.empty((0, len(self._names))), *self._variables])
         errors = zip(self.layout.column, rows[:, self.layout.errors].T, strict=True)
-        return Designs(
+        return DesignSet(
             self.study, dict(zip(self._names, variables.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, rows[:, self.layout.values].T, strict=True)),
             {goal: column for goal, column in errors if not np.isnan(column).all()},

@@ -18,7 +18,7 @@ from mechdesign.numerics.evolution import offspring, simplex, survivors
 from mechdesign.questions.optimize.columns import HYPERVOLUME, PARETO
 from mechdesign.questions.optimize.descent import descend
 from mechdesign.questions.optimize.explorer import Explorer, Points, Spent
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.search import sample, search
 from mechdesign.results import Table
 
@@ -295,12 +295,12 @@ class Front:
         return [int(self.rows[k]) for k in ends(normalised(self.values))]
 
 
-def signs_of(designs: Designs) -> Floats:
+def signs_of(designs: DesignSet) -> Floats:
     """1 for each goal that is minimised, -1 for one that is maximised."""
     return np.array([goal.sign for goal in designs.goals])
 
 
-def front_of(designs: Designs) -> Front:
+def front_of(designs: DesignSet) -> Front:
     """The front over all feasible designs that were evaluated."""
     feasible = np.flatnonzero(designs.feasible)
     values = designs.values[feasible] * signs_of(designs)
@@ -310,7 +310,7 @@ def front_of(designs: Designs) -> Front:
     return Front(feasible[rows], values[rows])
 
 
-def optima(designs: Designs, pareto_front: Front, typed: Floats) -> Designs:
+def optima(designs: DesignSet, pareto_front: Front, typed: Floats) -> DesignSet:
     """The designs with the optima of their front: its knee, its ends, and the best for the study's own weights.
 
     The weights of the knee are the factors of the goals in the plane from which it is the farthest.
@@ -341,7 +341,7 @@ def doubts(growth: Table, evaluations: int) -> Iterator[Caution]:
         )  # fmt: skip
 
 
-def growth_table(designs: Designs) -> Table:
+def growth_table(designs: DesignSet) -> Table:
     """Hypervolume of the front by the number of designs, and its growth."""
     rows = np.flatnonzero(designs.feasible)
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
@@ -355,7 +355,7 @@ def growth_table(designs: Designs) -> Table:
     ))  # fmt: skip
 
 
-def pareto_table(designs: Designs, pareto_front: Front) -> Table:
+def pareto_table(designs: DesignSet, pareto_front: Front) -> Table:
     """The designs on the front."""
     marks = PARETO.columns(
         {}, knee=pareto_front.rows == pareto_front.knee, crowding=fronts.crowding(pareto_front.values)

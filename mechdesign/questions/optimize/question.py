@@ -61,7 +61,7 @@ def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal
     return {goal: ("optimize", "subject_to", k) for k, condition in given for goal in bounds_of(condition, moved)}
 
 
-class Evaluation:
+class VariableFamily:
     """Evaluates designs by the values of an optimisation's variables."""
 
     def __init__(self, question: DesignsQuestion) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.optimize.columns import BEST, BOUNDS, DESIGNS, NEAREST, OPTIMUM, SENSITIVITY
-from mechdesign.questions.optimize.judge import Designs, Judge
+from mechdesign.questions.optimize.judge import DesignSet, Judge
 from mechdesign.questions.optimize.variables import BOUND_ROUNDING, Batch, bounds, ranges, steps
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -24,7 +24,7 @@ AT_BOUND = 1e-4
 PLACE_ROUNDING = 1e-9
 
 
-def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
+def optimum_table(designs: DesignSet, places: Mapping[str, Complexes]) -> Table:
     """The best design for each row of weights; `places` are those of the shapes that its workspace contains."""
     study, rows, variables = designs.study, designs.winners, designs.variables
     scores = [designs.score(row)[winner] for row, winner in zip(designs.weights, rows, strict=True)]
@@ -54,13 +54,13 @@ def _settled(study: Study, places: Floats) -> Floats:
     return np.where(np.abs(places) < PLACE_ROUNDING * study.mechanism.size, 0.0, places)
 
 
-def designs_table(designs: Designs) -> Table:
+def designs_table(designs: DesignSet) -> Table:
     """Every design that was evaluated."""
     ends = DESIGNS.columns({}, feasible=designs.feasible, reason=designs.reasons)
     return DESIGNS.table([*designs.columns(slice(None), errors=True), *ends])
 
 
-def nearest_table(designs: Designs, row: int) -> Table:
+def nearest_table(designs: DesignSet, row: int) -> Table:
     """The value of each condition of an infeasible design, and by how much it misses the bound."""
     if word := designs.words[designs.codes[row]]:
         rows = [(word, np.nan, np.nan, designs.shortfall[row], "")]
@@ -84,7 +84,7 @@ def nearest_table(designs: Designs, row: int) -> Table:
     ))  # fmt: skip
 
 
-def bounds_table(designs: Designs) -> Table:
+def bounds_table(designs: DesignSet) -> Table:
     """Extremes of each goal, by which it is normalised, and where they are."""
     names = [*(goal.name for goal in designs.goals), "CPI"]
     values = np.where(designs.feasible[:, None], np.column_stack([designs.values, designs.cpi]), np.nan)
@@ -98,7 +98,7 @@ def bounds_table(designs: Designs) -> Table:
     return BOUNDS.table(columns)
 
 
-def best_table(designs: Designs) -> Table:
+def best_table(designs: DesignSet) -> Table:
     """The best designs for each row of weights, without those next to a better one."""
     section = designs.study.optimize
     step = steps(designs.study, {name: column[designs.winners] for name, column in designs.variables.items()})
@@ -125,7 +125,7 @@ def best_table(designs: Designs) -> Table:
     ])  # fmt: skip
 
 
-def _active(designs: Designs) -> NDArray[np.object_]:
+def _active(designs: DesignSet) -> NDArray[np.object_]:
     """Bounds and conditions at which each optimum lies, in words: ``l_a from, workspace.area at least 4``.
 
     On a grid a design is at the upper bound if no further step fits below it.
@@ -150,7 +150,7 @@ def _active(designs: Designs) -> NDArray[np.object_]:
     return np.array([", ".join(words) for words in held], dtype=object)
 
 
-def sensitivity_table(designs: Designs, judge: Judge) -> Table:
+def sensitivity_table(designs: DesignSet, judge: Judge) -> Table:
     """How the score changes a step down and a step up each variable that has a range, the others held."""
     study, variables, names = designs.study, list(designs.variables), ranges(designs.study)
     at = {name: column[designs.winners] for name, column in designs.variables.items()}

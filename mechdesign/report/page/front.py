@@ -21,7 +21,7 @@ from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize import pareto
 from mechdesign.questions.optimize.figures.front import front_picture, marked, pairs
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import parted
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.scene import Sweep, pose
@@ -45,7 +45,7 @@ _CLOUD = 200  # more dots than this are drawn as an image
 Entry = tuple[str, list[Cell | None]]
 
 
-def front(drawn: Designs, table: Table, name: str) -> MovingPicture | None:
+def front(drawn: DesignSet, table: Table, name: str) -> MovingPicture | None:
     """The designs of a front, each of which moves when it is chosen; use inside `style.context`.
 
     None where the study has no motion in which they can be drawn.
@@ -97,7 +97,7 @@ def _fitting(sheet: Canvas, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, di
     return choices
 
 
-def _named(drawn: Designs, table: Table, row: int, mark: str) -> dict[str, Any]:
+def _named(drawn: DesignSet, table: Table, row: int, mark: str) -> dict[str, Any]:
     """What a design of a front is called, with those of its variables that are words."""
     words = [f"{name} = {table[name][row]}" for name in drawn.variables if not table.column(name).numeric]
     title = ", ".join([f"design {row + 1} of {len(table)} on the front", *([mark] if mark else []), *words])
@@ -116,7 +116,7 @@ def _drawing(sheet: Canvas, sweep: Sweep) -> str:
     return tostring(root, encoding="unicode")
 
 
-def _spread(drawn: Designs, table: Table, first: Sequence[int]) -> Ints:
+def _spread(drawn: DesignSet, table: Table, first: Sequence[int]) -> Ints:
     """Rows of a front: `first` these, then always the one that is farthest in the goals from those before."""
     values = np.stack([np.asarray(table[goal.name], dtype=float) for goal in drawn.goals], axis=1)
     share = pareto.normalised(values)
@@ -128,7 +128,7 @@ def _spread(drawn: Designs, table: Table, first: Sequence[int]) -> Ints:
     return np.array(rows)
 
 
-def _sweeps(drawn: Designs, table: Table, rows: Ints) -> Iterator[tuple[int, Sweep]]:
+def _sweeps(drawn: DesignSet, table: Table, rows: Ints) -> Iterator[tuple[int, Sweep]]:
     """Designs of a front in their motions, those of one mechanism solved in one batch; not those that have none."""
     numeric = drawn.study.parameters.names()
     numbers = {name: np.asarray(table[name], dtype=float) for name in drawn.variables if name in numeric}
@@ -197,7 +197,9 @@ def _draw(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     sketcher.draw()
 
 
-def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
+def _numbers(
+    drawn: DesignSet, table: Table, rows: Ints, begin: int
+) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
     """Variables and goals of the designs of a page: their numbers, a row each, and how the script names them."""
     names = [*drawn.variables, *(goal.name for goal in drawn.goals if goal.name not in drawn.variables)]
     columns = [table.column(name) for name in names if table.column(name).numeric]
@@ -211,7 +213,7 @@ def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[Show
     return numbers, entries, fields
 
 
-def _points(figure: Figure, drawn: Designs, table: Table, rows: Ints) -> list[list[list[float]]]:
+def _points(figure: Figure, drawn: DesignSet, table: Table, rows: Ints) -> list[list[list[float]]]:
     """Where some designs of a front stand in each panel of its picture, x and y, in points from its upper left."""
     wide, tall = (72 * inches for inches in figure.get_size_inches())
     points = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.errors import counted
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import Design, variables_of
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis
@@ -22,7 +22,7 @@ _AROUND_CHOICES = 0.2  # of their range
 MAX_TICKS = 8  # of an axis with a number at each choice
 
 
-def listed(designs: Designs, design: Design) -> list[str]:
+def listed(designs: DesignSet, design: Design) -> list[str]:
     """``l_a = 1 mm`` for each variable of a design."""
     return [f"{name} = {value_text(value)} {style.printed(designs.unit_of(name))}".rstrip()
             for name, value in design.items()]  # fmt: skip
@@ -35,12 +35,12 @@ def value_text(value: float | str) -> str:
     return f"{value:.4g}" if value == 0 or 1e-4 <= abs(value) < 1e6 else style.in_powers(value)
 
 
-def quantity_axis(designs: Designs, name: str, **options: Any) -> Axis:
+def quantity_axis(designs: DesignSet, name: str, **options: Any) -> Axis:
     """The axis of a variable or a goal."""
     return Axis(name, designs.unit_of(name), **options)
 
 
-def variable_axis(designs: Designs, name: str, margin: float) -> Axis:
+def variable_axis(designs: DesignSet, name: str, margin: float) -> Axis:
     """The axis of a variable with the places of its choices, unless they are many numbers."""
     variable = variables_of(designs.study)[name]
     axis = quantity_axis(designs, name, margin=margin if variable.choices is None else _AROUND_CHOICES)
@@ -69,7 +69,7 @@ def outside(near: Flags) -> str:
     return f"{counted(int((~near).sum()), 'far worse design')} outside"
 
 
-def on_front(designs: Designs, front: Table) -> Ints:
+def on_front(designs: DesignSet, front: Table) -> Ints:
     """Rows of the designs whose goals are those of a front's designs."""
     best = set(zip(*(front[goal.name].tolist() for goal in designs.goals), strict=True))
     return np.flatnonzero([tuple(values) in best for values in designs.values.tolist()])

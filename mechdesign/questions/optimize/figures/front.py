@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.questions.optimize.figures.designs import FEW, GREY_DOTS, listed
 from mechdesign.questions.optimize.figures.view import DesignsView
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Dots, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
@@ -24,18 +24,18 @@ def pareto_picture(view: DesignsView) -> Picture | None:
     return front_picture(view.designs, view.front) if view.front is not None else None
 
 
-def front_picture(designs: Designs, front: Table) -> Picture:
+def front_picture(designs: DesignSet, front: Table) -> Picture:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
     title = f"Pareto front: {len(front)} of {int(designs.feasible.sum())} feasible designs"
     return Picture(title, [_front(designs, front, pair) for pair in pairs(designs)], across=2)
 
 
-def pairs(designs: Designs) -> list[tuple[int, int]]:
+def pairs(designs: DesignSet) -> list[tuple[int, int]]:
     """The goals of each panel, along and up."""
     return [*combinations(range(len(designs.goals)), 2)]
 
 
-def _front(designs: Designs, front: Table, pair: tuple[int, int]) -> Panel:
+def _front(designs: DesignSet, front: Table, pair: tuple[int, int]) -> Panel:
     goals, every = [designs.goals[k] for k in pair], designs.values[designs.feasible][:, pair].T
     fronts = [np.asarray(front[goal.name], dtype=float) for goal in goals]
     order = np.argsort(fronts[0], kind="stable")
@@ -80,7 +80,7 @@ def growth_picture(view: DesignsView) -> Picture | None:
     return Picture(words, [panel])
 
 
-def marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
+def marked(designs: DesignSet, front: Table) -> list[tuple[str, int]]:
     """Designs of a front that are shown, and their rows: the best of each goal, and the knee between them."""
     marks: dict[int, str] = {}
     for letter, goal in zip(ascii_uppercase, designs.goals, strict=False):
@@ -91,11 +91,11 @@ def marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
     return [(marks[row], row) for row in sorted(marks)]
 
 
-def chosen(designs: Designs, front: Table, row: int) -> dict[str, float | str]:
+def chosen(designs: DesignSet, front: Table, row: int) -> dict[str, float | str]:
     return {name: front[name][row].item() for name in designs.variables}
 
 
-def described(designs: Designs, front: Table, name: str, row: int) -> str:
+def described(designs: DesignSet, front: Table, name: str, row: int) -> str:
     """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
     lines = listed(designs, chosen(designs, front, row))
     lines += [f"{goal.column} = {front[goal.name][row]:.3g} {style.printed(designs.unit_of(goal.name))}"

@@ -28,7 +28,7 @@ from mechdesign.questions.optimize.figures.designs import (
     variable_axis,
 )
 from mechdesign.questions.optimize.figures.view import DesignsView
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import variables_of
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import (
@@ -65,7 +65,7 @@ def score_picture(view: DesignsView) -> dict[str, Picture]:
     return {name: score_map(view.designs) if view.mapped else score_curves(view.designs, view.front)}
 
 
-def score_curves(designs: Designs, front: Table | None = None) -> Picture:
+def score_curves(designs: DesignSet, front: Table | None = None) -> Picture:
     """Every design's score over each variable, and the best design at each value of it [S1, Fig. 3(a)].
 
     Of a single variable also the goals of that design; of a Pareto front the designs that are on it.
@@ -147,7 +147,7 @@ def _steep(values: Floats) -> bool:
     return bool((finite > 0).all() and finite.max() > 30 * finite.min())
 
 
-def score_map(designs: Designs) -> Picture:
+def score_map(designs: DesignSet) -> Picture:
     """The score over two variables as a map, with the best design for each row of weights [S1, Fig. 3(b)]."""
     goals = [goal.name for goal in designs.goals]
     many = len(goals) > 1
@@ -178,14 +178,14 @@ def goal_maps(view: DesignsView) -> Picture | None:
     return Picture("Each goal over the design variables", maps, across=2)
 
 
-def _map(designs: Designs, values: Floats, name: str, *, smallest: bool) -> Panel:
+def _map(designs: DesignSet, values: Floats, name: str, *, smallest: bool) -> Panel:
     """Values over two variables, with a bar of colours of this name."""
     mark = Coloured(partial(_fill, designs=designs, values=values, smallest=smallest), bar=name)
     x, y = (variable_axis(designs, variable, 0.02) for variable in designs.variables)
     return Panel([mark], x, y)
 
 
-def _fill(axes: Axes, designs: Designs, values: Floats, *, smallest: bool) -> tuple[ScalarMappable, dict[str, Any]]:
+def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> tuple[ScalarMappable, dict[str, Any]]:
     """Contours over two variables whose bounds may depend on each other; cells of few designs, dots of scattered.
 
     Also returned is at which end of the bar of colours far worse designs lie beyond it.
@@ -232,7 +232,7 @@ def designs_picture(view: DesignsView) -> Picture | None:
     return parallel_axes(view.designs) if len(view.designs.variables) > 2 else None
 
 
-def parallel_axes(designs: Designs) -> Picture:
+def parallel_axes(designs: DesignSet) -> Picture:
     """Each feasible design a line across its variables and goals, the colour its score, the best of all on top."""
     names = [*designs.variables, *(goal.name for goal in designs.goals)]
     columns = np.column_stack([*designs.variables.values(), designs.values])
@@ -283,7 +283,7 @@ def convergence_picture(view: DesignsView) -> Picture | None:
     return convergence(view.designs) if searched else None
 
 
-def convergence(designs: Designs) -> Picture:
+def convergence(designs: DesignSet) -> Picture:
     """The best score found so far over the number of designs evaluated, a line a row of weights."""
     count, along = np.arange(1, len(designs) + 1), Axis("designs evaluated", margin=0.01)
     if len(designs.goals) > 1:

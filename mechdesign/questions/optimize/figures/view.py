@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from mechdesign.questions.optimize.analysis import DrawnDesigns
-from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.report.figures.pictures import View
 from mechdesign.results import Table
 
@@ -21,7 +21,7 @@ class DesignsView(View):
         return DrawnDesigns.of(self.result)
 
     @property
-    def designs(self) -> Designs:
+    def designs(self) -> DesignSet:
         """The designs with variables and goals."""
         return self.drawn.designs
 
