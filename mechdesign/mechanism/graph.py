@@ -13,7 +13,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Line, Prismatic
+from mechdesign.mechanism.model import Description
 
 GROUND = "ground"
 # Words behind a link's name that are coordinates of the link, ``rod.angle``, and no points of it.
@@ -213,7 +215,7 @@ def build_graph(description: Description) -> Graph:
     )
 
 
-def _named_points(joint: Joint) -> list[tuple[str, str]]:
+def _named_points(joint: AnyJoint) -> list[tuple[str, str]]:
     if isinstance(joint, Fixed):
         return [(link, joint.point) for link in joint.links]
     line = joint.line

@@ -8,9 +8,11 @@ from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
 from mechdesign.mechanism.graph import GROUND, rod_of
-from mechdesign.mechanism.model import Link, Mass, Physical, Place, Quantity, Term
+from mechdesign.mechanism.model import Link, Mass, Place
 from mechdesign.study.building import section as models
+from mechdesign.study.building.elements import Keys
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context
@@ -69,6 +71,13 @@ class Builder:
         if measured:
             self.measured.add(name)
         return name
+
+    def numbers(self, given: Keys, prefix: str, *, turning: bool = False) -> dict[str, Term]:
+        """Register the numbers of an element that are given as places of the geometry; their names by their keys."""
+        return {
+            key: self.place(f"{prefix}.{key}", value, size.kind_of(turning=turning))
+            for key, size, value in given.numbers()
+        }
 
     def check_name(self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int]) -> bool:
         """Whether a name is among the names; if not, report it with the nearest one (a missing ground only once)."""
