@@ -11,7 +11,7 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.elements import declared
 from mechdesign.mechanism.elements.declared import Element
-from mechdesign.mechanism.elements.joints import Line, Points
+from mechdesign.mechanism.elements.joints import LinkLine, Points
 
 # Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
 # in a study has a colon.
@@ -61,7 +61,7 @@ class Cam(Element):
     """
     steps: Annotated[int, declared.Whole(8, 100_000)] = 360
     """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
-    face: Line = field(kw_only=True)  # of the follower; of a roller only the point counts
+    face: LinkLine = field(kw_only=True)  # of the follower; of a roller only the point counts
 
     @classmethod
     def misfits(cls, given: Any) -> Iterator[str]:

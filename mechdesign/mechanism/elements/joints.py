@@ -13,7 +13,7 @@ Points = Annotated[tuple[declared.PointName, ...], declared.Notation("points of 
 
 
 @dataclass(frozen=True)
-class Line:
+class LinkLine:
     """A line fixed in a link: through a point, at an angle to the link's x axis or towards a second point."""
 
     link: str
@@ -68,7 +68,7 @@ class Prismatic:
     """Point `point` of `slider` slides along `line`; the slider's x axis stays at `angle` to the line."""
 
     name: str
-    line: Line
+    line: LinkLine
     slider: str
     point: str
     angle: Term = 0.0
@@ -84,7 +84,7 @@ class Slot:
     """A pin, `point` of another link, slides along `line` and is free to turn."""
 
     name: str
-    line: Line
+    line: LinkLine
     point: str
 
     @property

@@ -17,7 +17,7 @@ from mechdesign.mechanism.coordinates import coupled
 from mechdesign.mechanism.elements.couplings import MEASURED, Cam, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
-from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, Line, Prismatic, Slot
+from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.elements.springs import Spring
@@ -96,7 +96,7 @@ def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> No
 
 def _line(
     builder: Builder, name: str, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath
-) -> Line:
+) -> LinkLine:
     """A line of a link through one point or two; its direction is a place of `name`."""
     for k, point in enumerate(through):
         _check_on_link(builder, link, point, (*path, k))
@@ -109,12 +109,12 @@ def _line(
         first, second = ([builder.nominal(term) for term in points[point]] for point in through)
         if first == second:
             _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
-        return Line(link, through[0], 0.0, through[1])
+        return LinkLine(link, through[0], 0.0, through[1])
     angle = builder.place(f"{name}.direction", 0.0 if direction is None else direction, "angle")
-    return Line(link, through[0] if through else None, angle)
+    return LinkLine(link, through[0] if through else None, angle)
 
 
-def _line_of_joint(builder: Builder, name: str, section: Written[Joint], link: str) -> Line:
+def _line_of_joint(builder: Builder, name: str, section: Written[Joint], link: str) -> LinkLine:
     return _line(builder, name, section.through or (), section.direction, link, ("joints", name, "through"))
 
 
@@ -456,7 +456,7 @@ def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, fu
         _refuse(builder, key, f"point {through[0]!r} is on the cam {given.link!r} itself; give one of its follower")
     link = next((link for link in _moved(section, sets) if link in owners), owners[0])
     if given.flat is None:
-        face = Line(link, through[0])
+        face = LinkLine(link, through[0])
         radius = builder.place(f"{name}.radius", given.radius or 0.0)
     else:
         face, radius = _line(builder, name, through, given.direction, link, key), None
