@@ -23,10 +23,10 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.elements.joints import Fixed, Prismatic
+from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.forces import Forces, center, inertia_about_center
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Mass
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.study.text.units import measure
 

@@ -14,10 +14,10 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, winding
+from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.model import Mass
 from mechdesign.mechanism.outputs import Rates, pulled
 
 

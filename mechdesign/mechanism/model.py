@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.elements.couplings import Coupling
-from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
+from mechdesign.mechanism.elements.declared import Physical, Quantity
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.joints import AnyJoint, Friction
+from mechdesign.mechanism.elements.links import Link, Mass
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.elements.springs import Spring
@@ -32,52 +32,6 @@ class Place:
     nominal: float
     quantity: Quantity | Physical = "length"
     in_coupling: bool = False  # whether the function of a coupling names it
-
-
-@dataclass(frozen=True)
-class Link:
-    """A rigid link, or a telescopic leg (two bodies and a slide), whose length is a coordinate.
-
-    `points` has the coordinates (x, y) of each point in the link's frame. The x axis of a binary or telescopic link
-    runs from its first end, at (0, 0), to its second, at (length, 0); the second end of a telescopic leg is not among
-    its points.
-    """
-
-    name: str
-    points: Mapping[str, tuple[Term, Term]]
-    ends: tuple[str, str] | None = None
-    telescopic: bool = False
-
-    @property
-    def corners(self) -> tuple[str, ...]:
-        """The points between which its beams run where it bends; of a telescopic link a single beam."""
-        return self.ends or tuple(self.points)
-
-    @property
-    def tip(self) -> str | None:
-        """The second end of a telescopic leg, which is on its rod; None of a rigid link."""
-        return self.ends[1] if self.telescopic and self.ends is not None else None
-
-    @property
-    def all_points(self) -> tuple[str, ...]:
-        """Names of its points, its ends first, with the tip of a telescopic leg."""
-        return tuple(dict.fromkeys((*(self.ends or ()), *self.points)))
-
-
-@dataclass(frozen=True)
-class Mass:
-    """Mass of a body, its centre in the body's frame, and its moment of inertia about this centre.
-
-    Without a centre it is the middle of some `points` of the body, its joints. A `slender` one is a bar between these,
-    two, whose inertia follows; one that is `left_out` is 0, of a point mass.
-    """
-
-    mass: Term | Value
-    center: tuple[Term | Value, Term | Value] | None = None
-    inertia: Term | Value = 0.0
-    points: tuple[str, ...] = ()
-    slender: bool = False
-    left_out: bool = False
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from mechdesign.errors import StudyError, printable
 from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.study.building.section import LINK_KEYS
+from mechdesign.study.building.notations import LINK_KEYS
 from mechdesign.study.loading import Study, adapter, context_of, load_document, same_sketch
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.schema.entries import number_at

@@ -22,7 +22,7 @@ from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.elements.couplings import Coupling
 from mechdesign.mechanism.elements.joints import Fixed, Prismatic
-from mechdesign.mechanism.model import Link
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.questions.stiffness.schema import CouplingStiffness, CrossSection
 from mechdesign.study import Study
 

@@ -18,10 +18,10 @@ from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
-from mechdesign.mechanism.model import Mass
 from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.motion.motion import SolvedPoses

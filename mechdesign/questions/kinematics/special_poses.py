@@ -75,7 +75,8 @@ class SpecialPoses:
 
 
 def special_poses(
-    motion: PoseValues, kept: Shown, along: KinematicAlong | None, limits: Sequence[LimitPlace], toggles: Sequence[Toggle]
+    motion: PoseValues, kept: Shown, along: KinematicAlong | None, limits: Sequence[LimitPlace],
+    toggles: Sequence[Toggle],
 ) -> SpecialPoses:  # fmt: skip
     """The limits of a motion and its toggles, with evenly spread poses where these are few; else listed poses.
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.model import Link
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.schema import CrossSection, StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist

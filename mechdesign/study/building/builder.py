@@ -5,14 +5,16 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
+from mechdesign.mechanism.elements.links import Link, Mass
 from mechdesign.mechanism.graph import GROUND, rod_of
-from mechdesign.mechanism.model import Link, Mass, Place
+from mechdesign.mechanism.model import Place
 from mechdesign.study.building import section as models
-from mechdesign.study.building.elements import Keys
+from mechdesign.study.building.elements import Keys, Written
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context
@@ -155,9 +157,9 @@ class Builder:
                 for point, (x, y) in self.links[name].points.items():
                     self.sketch[point] = complex(self.nominal(x), self.nominal(y))
 
-    def _weigh(self, name: str, section: models.Link) -> None:
+    def _weigh(self, name: str, section: Written[Link]) -> None:
         """Masses of a link's bodies, with places for their numbers."""
-        bodies: list[tuple[str, str, models.Link | models.Rod | None]] = [
+        bodies: list[tuple[str, str, Any]] = [
             (name, name, section), (rod_of(name), f"{name}.rod", section.rod),
         ]  # fmt: skip
         for body, prefix, given in bodies:
@@ -181,7 +183,7 @@ class Builder:
             inertia = self.place(f"{prefix}.inertia", moment, "moment_of_inertia")
             self.masses[body] = Mass(mass, center, inertia, points, left_out=given.inertia is None)
 
-    def _joined(self, name: str, section: models.Link, body: str) -> tuple[str, ...]:
+    def _joined(self, name: str, section: Written[Link], body: str) -> tuple[str, ...]:
         """The joints of a body, or where it has a single one its ends, or all its points."""
         if body != name:
             return (section.to or "",)
@@ -194,7 +196,7 @@ class Builder:
         """Nominal value of a term (angles in radians)."""
         return self.places[term].nominal if isinstance(term, str) else term
 
-    def _link(self, name: str, section: models.Link) -> Link:
+    def _link(self, name: str, section: Written[Link]) -> Link:
         ends, points = None, {}
         # The ground's frame is the world: without a length its two points stay where they are drawn.
         drawn = name == GROUND and section.length is None and not section.telescopic
@@ -211,9 +213,10 @@ class Builder:
             terms = [self.place(f"{name}.{point}.{axis}", value, measured=point not in given)
                      for axis, value in (("x", x), ("y", y))]  # fmt: skip
             points[point] = (terms[0], terms[1])
-        return Link(name, points, ends, section.telescopic)
+        start, end = ends or (None, None)
+        return Link(name, start, end, telescopic=section.telescopic, points=points)
 
-    def _ends(self, name: str, section: models.Link, ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
+    def _ends(self, name: str, section: Written[Link], ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
         """The ends of a binary link in its frame: at its origin and on its x axis, where it is not telescopic."""
         start, end = ends
         points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
@@ -234,7 +237,7 @@ class Builder:
         return points
 
     def _measured(
-        self, name: str, measured: list[str], given: Mapping[str, models.PointValues], ends: tuple[str, str] | None
+        self, name: str, measured: list[str], given: Mapping[str, tuple[Amount, Amount]], ends: tuple[str, str] | None
     ) -> dict[str, complex]:
         """Local coordinates of points without numbers, measured in the sketch.
 

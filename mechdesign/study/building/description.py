@@ -18,12 +18,13 @@ from mechdesign.mechanism.elements.couplings import MEASURED, Cam, Coupling, pla
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import GROUND, build_graph
-from mechdesign.mechanism.model import Description, Link
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.sketch import locate
 from mechdesign.notation import ExpressionError, Step
 from mechdesign.study.building import section as models

@@ -8,58 +8,16 @@ from functools import cache
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Self, TypeVar, get_args, get_origin, get_type_hints
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from mechdesign.mechanism.elements.declared import Choice, Element, Notation, Size, Two, Whole
+from mechdesign.mechanism.elements.links import Link
+from mechdesign.study.building import notations
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_rows, shown
-from mechdesign.study.text.inputs import file_of
+from mechdesign.study.text.fields import failure
 from mechdesign.study.text.units import Amount
 
 E = TypeVar("E", bound=Element)
-
-
-def _through(raw: Any) -> Any:
-    if isinstance(raw, str):
-        return [raw]
-    if not isinstance(raw, list) or len(raw) != 2:
-        raise failure(f"expected a point or two points [P, R], not {shown(raw)}")
-    return raw
-
-
-_LINE = Annotated[
-    tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort({**fields.NAME_FORM, "title": "point"})
-]
-
-
-_TABLE_FORM: fields.Form = {"type": ["string", "object", "array"], "title": "table"}
-
-
-def _table(raw: Any, context: Context) -> str | tuple[tuple[float, ...], ...]:
-    file = file_of(raw)
-    if file is not None:
-        return file
-    if not isinstance(raw, list):
-        raise failure(f"expected a file of two columns, lift.csv, or rows [[0, 0], [30, 2.5], ...], not {shown(raw)}")
-    return read_rows(raw, context, 2, "every row holds two numbers", "an empty table")
-
-
-# What a mark of a form reads.
-_FORMS: dict[str, Any] = {
-    "link": fields.LinkName,
-    "point": fields.PointName,
-    "end": fields.EndName,
-    "joint": fields.JointName,
-    "drive": fields.DriveName,
-    "measure": fields.MeasureName,
-    "coordinate": fields.CoordinateName,
-    "text": str,
-    "function": fields.Bound,
-    "points of a line": _LINE,
-    "range": Annotated[tuple[fields.Number, fields.Number], fields.pair_of("[first, last]")],
-    "table": Annotated[Any, fields.Read(_table, _TABLE_FORM)],
-    "diameters": dict[fields.PointName, fields.PositiveLengthPlace],
-}
 
 
 class Keys(fields.Model):
@@ -80,6 +38,17 @@ class Keys(fields.Model):
         for key, size in self.sizes.items():
             if (value := getattr(self, key)) is not None:
                 yield key, size, value
+
+
+class _LinkKeys(Keys):
+    """Base of a link's keys, which have short forms."""
+
+    short = notations.LINK_SHORT
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        return notations.long_link(raw)
 
 
 if TYPE_CHECKING:
@@ -116,17 +85,19 @@ def _keys_of(element: Any) -> type[Keys]:
             keys[name] = annotation, Field(default_factory=field.default_factory)
             continue
         if field.default is not dataclasses.MISSING:
-            default = field.default if isinstance(marks[0], Choice | Whole) else None
+            default = field.default if isinstance(field.default, bool | int | str) else None
             annotation = annotation | None if default is None else annotation
         if isinstance(marks[0], Size) and not marks[0].fixed:
             sizes[name] = marks[0]
         alias = name.removesuffix("_")
         keys[name] = annotation, Field(default, alias=None if alias == name else alias)
+    base = _LinkKeys if element is Link else Keys
     model = create_model(
-        element.__name__, __base__=Keys, __module__=element.__module__, __doc__=element.__doc__, **keys
+        element.__name__, __base__=base, __module__=element.__module__, __doc__=element.__doc__, **keys
     )
     model.declares, model.one_of, model.bare, model.sizes = element, element.one_of, element.bare, sizes
-    model.short = ({**fields.NAME_FORM, "title": element.bare},) if element.bare else ()
+    if element.bare:
+        model.short = ({**fields.NAME_FORM, "title": element.bare},)
     return model
 
 
@@ -148,7 +119,7 @@ def _read(hint: Any) -> Any:
         case Notation("part"):
             return _keys_of(get_args(hint)[0])
         case Notation():
-            return _FORMS[mark.word]
+            return notations.BY_WORD[mark.word]
         case Size():
             kind = None if mark.between else mark.kind
             number = fields.number(kind, mark.least, exclusive=mark.exclusive, place=not mark.fixed, fixed=mark.fixed)

@@ -11,26 +11,27 @@ from contextlib import suppress
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
-from mechdesign.errors import cut, suggestion
+from mechdesign.errors import cut
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.elements.couplings import Coupling
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.joints import Friction, Joint
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, OF_LINKS
 from mechdesign.notation import ExpressionError
+from mechdesign.study.building import notations
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.inputs import file_of
-from mechdesign.study.text.units import Amount, QuantityError, check_unit
+from mechdesign.study.text.units import QuantityError, check_unit
 
-LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod", "width", "layer")
 _BRANCHES = {
     "side": "in every pose each joint lies on the side on which the sketch has it",
     "follow": "a sweep goes on smoothly through change points, where the sides meet",
@@ -38,133 +39,7 @@ _BRANCHES = {
 TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
 
 
-def names_to_mapping(raw: Any) -> Any:
-    """Bring ``[A, B]`` to ``{A: null, B: null}``; anything else passes."""
-    if not isinstance(raw, list):
-        return raw
-    for name in raw:
-        if not isinstance(name, str):
-            raise failure(f"expected a name, not {shown(name)}")
-        if raw.count(name) > 1:
-            raise failure(f"{name!r} is listed twice")
-    return dict.fromkeys(raw)
-
-
-Point = Annotated[tuple[fields.LengthPlace, fields.LengthPlace], fields.pair_of("[x, y]")]
-PointValues = tuple[Amount, Amount]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
-TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
-TwoEnds = Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two names")]
-
-
-class Rod(fields.Model):
-    """Mass of the second body of a telescopic link, whose frame has its origin at ``to`` and the link's direction."""
-
-    mass: fields.NonNegativeMassPlace
-    """Mass of this body. Example: 1.2 kg"""
-    center: Point | None = None
-    """Centre of mass, [x, y] from ``to``, x along the link. Left out: at ``to``. Example: [-100, 0]"""
-    inertia: fields.NonNegativeInertiaPlace | None = None
-    """Moment of inertia about the centre of mass. Left out: 0. Example: 0.004 kg*m^2"""
-
-
-class Link(fields.Model):
-    """A rigid body: [from, to, length], a telescopic leg, or its points in its own frame, {Q: [0, 0], S: [3, 1]}."""
-
-    short = (
-        {
-            "type": "array",
-            "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM],
-            "minItems": 2,
-            "maxItems": 3,
-        },
-        {
-            "type": "object",
-            "additionalProperties": {"anyOf": [fields.PAIR_FORM, {"type": "null"}]},
-            "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
-        },
-    )
-    from_: fields.PointName | None = Field(None, alias="from")
-    """First end of a binary link: origin of its frame, whose x axis leads to ``to``."""
-    to: fields.PointName | None = None
-    """Second end of a binary link."""
-    length: fields.PositiveLengthPlace | None = None
-    """Distance from ``from`` to ``to``. Left out: measured from the sketch. Example: 90 Example: 90 mm"""
-    telescopic: bool = False
-    """Whether the length is a coordinate, NAME.length: two bodies and a slide. Further points belong to the body at
-    ``from``; ``length`` is left out.
-    """
-    points: Annotated[
-        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
-    ] = Field(default_factory=dict)
-    """Points in the link's own frame, [x, y]; of a binary link those besides its ends. A list of names, or a point
-    without a place, is measured from the sketch. Example: {P: [60, 15]}
-    """
-
-    mass: fields.NonNegativeMassPlace | None = None
-    """Mass; of a telescopic link that of the body at ``from``. Left out: that of its beams where stiffness has a
-    ``density``, else massless. Example: 0.5 kg
-    """
-    center: Point | None = None
-    """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its joints; of a link
-    with a single joint, of its ends, or of all its points. Example: [45, 0]
-    """
-    inertia: fields.BarInertiaPlace | None = None
-    """Moment of inertia about the centre of mass; 'rod' is that of a slender bar between its two joints, m l^2/12. Left
-    out: 0, a point mass. Example: 0.002 kg*m^2 Example: rod
-    """
-    rod: Rod | None = None
-    """Mass of the second body of a telescopic link, the one with ``to``. Example: {mass: 1.2 kg, center: [-100, 0]}"""
-    width: fields.PositiveLengthPlace | None = None
-    """Width of the link as a plate: its ends are round with half of it. Left out: that of ``plates``. Example: 12 mm"""
-    layer: Annotated[int, fields.whole(1, 1000)] | None = None
-    """Layer in which the link lies as a plate, counted from the bottom. Left out: `mechdesign export --to layers.csv`
-    finds one. Example: 2
-    """
-
-    @model_validator(mode="before")
-    @classmethod
-    def _long_form(cls, raw: Any) -> Any:
-        if isinstance(raw, list):
-            if len(raw) not in (2, 3):
-                raise failure("expected [from, to, length], {from, to, length} or the link's points {A: [x, y], ...}")
-            return dict(zip(("from", "to", "length"), raw, strict=False))
-        if not isinstance(raw, dict):
-            expected = "[from, to, length], {from, to, length} or its points {A: [x, y], ...}"
-            raise failure(f"expected a link, {expected}, not {shown(raw)}")
-        # A point may be named `center`, or `rod`.
-        if any(key in raw and (key in LINK_KEYS[:6] or not isinstance(raw[key], list)) for key in LINK_KEYS):
-            for key, value in raw.items():
-                if key not in LINK_KEYS and isinstance(value, list):
-                    raise failure(f"beside 'from', 'to' and 'length' a point stands under 'points': {{{key}: [x, y]}}")
-            return raw
-        for key, value in raw.items():
-            if not isinstance(value, list) and value is not None:
-                hint = suggestion(key, LINK_KEYS)
-                raise failure(f"{key!r} is neither a key of a link nor a point [x, y]{hint}")
-        return {"points": raw}
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Link:
-        if (self.from_ is None) != (self.to is None):
-            raise failure("a binary link needs both 'from' and 'to'")
-        if self.from_ is None:
-            if self.length is not None or self.telescopic:
-                raise failure("a length belongs to a link with 'from' and 'to'")
-            if not self.points:
-                raise failure("a link needs at least one point, such as {A: [0, 0]}")
-        elif self.from_ == self.to:
-            raise failure(f"a link from {self.from_!r} to itself")
-        elif self.telescopic and self.length is not None:
-            raise failure("a telescopic leg has no fixed length; leave out 'length', or 'telescopic'")
-        if self.mass is None and (extra := self.given("center", "inertia")):
-            raise failure(f"{extra[0]!r} belongs to a mass; give 'mass'")
-        if self.rod is not None and not self.telescopic:
-            raise failure("'rod' is the second body of a telescopic link; give 'mass'")
-        for end in (self.from_, self.to):
-            if end in self.points:
-                raise failure(f"point {end!r} is an end of the link; its place in the frame is not given twice")
-        return self
 
 
 def _named_limits(raw: Any) -> Any:
@@ -216,7 +91,7 @@ class MechanismSection(fields.Model):
     parameters: dict[str, fields.AnyPlace] = Field(default_factory=dict)
     """Numbers with a name for expressions anywhere in the study; each may use those above it. Example: {r: 40, l: 3*r}
     """
-    links: Annotated[dict[fields.LinkName, Link], BeforeValidator(_not_too_many)]
+    links: Annotated[dict[fields.LinkName, Written[Link]], BeforeValidator(_not_too_many)]
     """Rigid bodies by name. ``ground`` is required; its frame is the world. A point that two links name is a pin
     between them. Example: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
     """
@@ -226,7 +101,7 @@ class MechanismSection(fields.Model):
     """
     drives: Annotated[
         dict[fields.DriveName, Written[Drive] | None],
-        BeforeValidator(names_to_mapping),
+        BeforeValidator(notations.names_to_mapping),
         fields.OrShort(fields.NAMES_FORM),
     ] = Field(default_factory=dict)
     """Driven coordinates by name, as many as the mobility. A list names links (their angle), telescopic links (their
@@ -248,7 +123,7 @@ class MechanismSection(fields.Model):
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
-    sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
+    sketch: dict[fields.PointName, notations.Point] = Field(default_factory=dict)
     """Rough places of the joints in the wanted assembly, [x, y]; any pose will do. In a dyad only the side on which
     each joint lies counts; what is left out elsewhere is measured here exactly. Example: {A: [0, 30], B: [75, 55]}
     """
