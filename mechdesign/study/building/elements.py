@@ -92,9 +92,8 @@ def _keys_of(element: Any) -> type[Keys]:
         alias = name.removesuffix("_")
         keys[name] = annotation, Field(default, alias=None if alias == name else alias)
     base = _LinkKeys if element is Link else Keys
-    model = create_model(
-        element.__name__, __base__=base, __module__=element.__module__, __doc__=element.__doc__, **keys
-    )
+    named: dict[str, Any] = {"__module__": element.__module__, "__doc__": element.__doc__}
+    model = create_model(element.__name__, __base__=base, **named, **keys)
     model.declares, model.one_of, model.bare, model.sizes = element, element.one_of, element.bare, sizes
     if element.bare:
         model.short = ({**fields.NAME_FORM, "title": element.bare},)
