@@ -26,11 +26,15 @@ WOUND = "wound:"
 
 @dataclass(frozen=True)
 class Place:
-    """One number of the mechanism: its name, nominal value (angles in radians, else the study's unit) and kind."""
+    """One number of the mechanism: its name, nominal value (angles in radians, else the study's unit) and kind.
+
+    `path` is where a study's mechanism says it; empty of what is no dimension of a part.
+    """
 
     name: str
     nominal: float
     quantity: Quantity | Physical = "length"
+    path: tuple[str | int, ...] = ()
     in_coupling: bool = False  # whether the function of a coupling names it
 
 

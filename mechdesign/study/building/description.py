@@ -95,10 +95,8 @@ def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> No
         _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
 
 
-def _line(
-    builder: Builder, name: str, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath
-) -> LinkLine:
-    """A line of a link through one point or two; its direction is a place of `name`."""
+def _line(builder: Builder, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath) -> LinkLine:
+    """A line of a link through one point or two, which stand at `path`."""
     for k, point in enumerate(through):
         _check_on_link(builder, link, point, (*path, k))
     if len(through) == 2:
@@ -111,12 +109,12 @@ def _line(
         if first == second:
             _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
         return LinkLine(link, through[0], 0.0, through[1])
-    angle = builder.place(f"{name}.direction", 0.0 if direction is None else direction, "angle")
+    angle = builder.place((*path[:-1], "direction"), 0.0 if direction is None else direction, "angle")
     return LinkLine(link, through[0] if through else None, angle)
 
 
 def _line_of_joint(builder: Builder, name: str, section: Written[Joint], link: str) -> LinkLine:
-    return _line(builder, name, section.through or (), section.direction, link, ("joints", name, "through"))
+    return _line(builder, section.through or (), section.direction, link, ("joints", name, "through"))
 
 
 def _prismatic(builder: Builder, name: str, section: Written[Joint], pair: tuple[str, str]) -> Prismatic:
@@ -129,7 +127,7 @@ def _prismatic(builder: Builder, name: str, section: Written[Joint], pair: tuple
     elif len(points) != 1:
         _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
     line = _line_of_joint(builder, name, section, guide)
-    angle = builder.place(f"{name}.angle", 0.0 if section.angle is None else section.angle, "angle")
+    angle = builder.place((*path, "angle"), 0.0 if section.angle is None else section.angle, "angle")
     return Prismatic(name, line, slider, section.point or points[0], angle)
 
 
@@ -157,14 +155,14 @@ def _fixed(builder: Builder, name: str, section: Written[Joint], pair: tuple[str
         _refuse(builder, path, message)
     point = section.point or shared[0]
     if section.angle is not None:
-        return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
+        return Fixed(name, pair, point, builder.place((*path, "angle"), section.angle, "angle"))
     one, other = (builder.link_direction(link) for link in pair)
     if one is None or other is None:
         lost = pair[0] if one is None else pair[1]
         message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
         _refuse(builder, path, message)
     angle = (other - one) / builder.units.angle_factor
-    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
+    return Fixed(name, pair, point, builder.place((*path, "angle"), angle, "angle", measured=True))
 
 
 def _check_pins(builder: Builder) -> None:
@@ -282,7 +280,7 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             noun, listed = "coordinate or parameter", [*above, *parameters]
             if all(builder.check_name(item, listed, noun, path) for item in sorted(expression.names)):
                 for item in expression.names & parameters.keys():
-                    builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
+                    builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
                 measures[name] = Measure(name, expression=expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             measures[name] = Measure(name, **{section.kind: pair})
@@ -298,7 +296,7 @@ def _springs(builder: Builder) -> dict[str, Spring]:
     """Springs without mistakes in their names; their numbers become places."""
     section, springs = builder.section, dict[str, Spring]()
     for name, spring in section.springs.items():
-        path: KeyPath = ("springs", name)
+        path = ("springs", name)
         one, other = spring.between
         turning = any(end in section.links for end in spring.between)
         turning &= not any(end in section.owners or end in section.ends for end in spring.between)
@@ -312,7 +310,7 @@ def _springs(builder: Builder) -> dict[str, Spring]:
             kind, right = ("links", "free_angle") if turning else ("points", "free_length")
             builder.report((*path, key), f"between two {kind} there is no {key!r}; its stiffness counts from {right!r}",
                            at_key=True)  # fmt: skip
-        numbers = builder.numbers(spring, name, turning=turning)
+        numbers = builder.numbers(spring, *path, turning=turning)
         for key in numbers:
             builder.reporter.kind((*ROOT, *path, key), builder.places[f"{name}.{key}"].quantity)
         springs[name] = Spring(name, spring.between, turning=turning, **numbers)
@@ -324,7 +322,7 @@ def _friction(builder: Builder) -> dict[str, Friction]:
     section, friction = builder.section, dict[str, Friction]()
     names = [*section.owners, *section.slides, *section.legs]
     for name, given in section.friction.items():
-        path: KeyPath = ("friction", name)
+        path = ("friction", name)
         joint = section.joints.get(name)
         if joint is not None and joint.fixed is not None:
             builder.report(path, f"{name!r} is a clamp, in which nothing moves: leave it out", at_key=True)
@@ -348,7 +346,7 @@ def _friction(builder: Builder) -> dict[str, Friction]:
             if given.length is not None and joint is not None and joint.slot:
                 message = "the pin in a slot bears no moment: its friction has no 'length'"
                 builder.report((*path, "length"), message, at_key=True)
-        friction[name] = Friction(name, **builder.numbers(given, f"friction.{name}"))
+        friction[name] = Friction(name, **builder.numbers(given, *path))
     return friction
 
 
@@ -356,7 +354,9 @@ def _plates(builder: Builder) -> Plates | None:
     """Plates without mistakes in their names, where the study gives a width; their numbers become places."""
     given, links = builder.section.plates, builder.section.links
     widths = {
-        name: builder.place(f"{name}.width", link.width) for name, link in links.items() if link.width is not None
+        name: builder.place(("links", name, "width"), link.width)
+        for name, link in links.items()
+        if link.width is not None
     }
     layers = {name: link.layer for name, link in links.items() if link.layer is not None}
     lengths = builder.numbers(given, "plates") if given is not None else {}
@@ -368,7 +368,7 @@ def _plates(builder: Builder) -> Plates | None:
         return None
     lengths.setdefault("width", min(widths.values(), key=builder.nominal, default=0.0))
     pins = {
-        name: builder.place(f"plates.{name}.pin", diameter)
+        name: builder.place(("plates", "pins", name), diameter)
         for name, diameter in (given.pins if given is not None else {}).items()
         if builder.reporter.check_name(
             name, builder.section.owners, "point", (*ROOT, "plates", "pins", name), at_key=True
@@ -430,7 +430,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         pressure = Coupling.pressure_angle if angle is None else angle * builder.units.angle_factor
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
-        builder.place(play(name), 0.0, kind)
+        builder.place((play(name),), 0.0, kind)
         cam = None
         if given.cam is not None:
             with contextlib.suppress(_WrongJoint):
@@ -458,9 +458,9 @@ def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, fu
     link = next((link for link in _moved(section, sets) if link in owners), owners[0])
     if given.flat is None:
         face = LinkLine(link, through[0])
-        radius = builder.place(f"{name}.radius", given.radius or 0.0)
+        radius = builder.place((*path, "radius"), given.radius or 0.0)
     else:
-        face, radius = _line(builder, name, through, given.direction, link, key), None
+        face, radius = _line(builder, through, given.direction, link, key), None
     span, kind = given.range, section.coordinates[followed[0]]
     builder.reporter.kind((*ROOT, *path, "range"), kind)
     if span is None:
@@ -493,7 +493,7 @@ def _function(
         if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
             return None
         for item in to.names & parameters.keys():
-            builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
+            builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
         named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
         return replace(to.substituted(named), angle_unit=unit)
@@ -506,7 +506,6 @@ def _function(
         table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
     assert given.ratio is not None
-    ratio, phase = f"{name}.ratio", f"{name}.phase"
     if float(given.ratio) == 0.0:
         message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
         builder.report((*path, "ratio"), message)
@@ -514,8 +513,8 @@ def _function(
     if section.coordinates[of] == kind or unit != 1.0:
         builder.reporter.kind((*ROOT, *path, "ratio"), "none")
     builder.reporter.kind((*ROOT, *path, "phase"), kind)
-    builder.place(ratio, given.ratio, "none", in_coupling=True)
-    builder.place(phase, 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
+    ratio = builder.place((*path, "ratio"), given.ratio, "none", in_coupling=True)
+    phase = builder.place((*path, "phase"), 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
     steps: tuple[Step, ...] = (("name", ratio), ("name", of), ("call", "*"), ("name", phase), ("call", "+"))
     return Expression(f"{ratio}*{of} + {phase}", steps, unit)
 
@@ -568,7 +567,7 @@ def _with_phases(builder: Builder, description: Description) -> Description:
         follower, followed = (0.0 if value is None else value / unit for value, unit in zip(drawn, units, strict=True))
         if drawn[0] is not None:
             phase = follower - description.places[f"{name}.ratio"].nominal * followed
-            builder.place(f"{name}.phase", phase, pair.follower.quantity, measured=True, in_coupling=True)
+            builder.place(("couplings", name, "phase"), phase, pair.follower.quantity, measured=True, in_coupling=True)
     return description
 
 
@@ -589,7 +588,7 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
             if quantity != "none":
                 builder.reporter.kind((*ROOT, *path, end), quantity)
             if value is not None:
-                bounds[end] = builder.place(f"limits.{index}.{end}", value, quantity)
+                bounds[end] = builder.place((*path, end), value, quantity)
         expression = (
             kind == "measure" and items[0] in builder.section.measures and builder.section.measures[items[0]].expression
         )
