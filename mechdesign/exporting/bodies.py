@@ -22,9 +22,11 @@ from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic
+from mechdesign.mechanism.elements.links import Mass
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.forces import Forces, center, inertia_about_center
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Fixed, Mass, Prismatic, Spring
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.study.text.units import measure
 
@@ -231,13 +233,10 @@ class RigidBodies:
     def pull_of(self, spring: Spring) -> Pull:
         """A spring and damper in SI units."""
         scales, geometry = self.scales, self.mechanism.geometry
-        stiffness, free, preload, push, damping = (
-            float(geometry.term(term, {}))
-            for term in (spring.stiffness, spring.free, spring.preload, spring.push, spring.damping)
-        )
+        pull, stiffness, free, damping = spring.pull(lambda term: float(geometry.term(term, {})))
         # Of a moment per radian, or of a force per length.
         arm = scales.length if spring.turning else 1.0 / scales.length
-        pull = (preload - push) * scales.force * (arm if spring.turning else 1.0)
+        pull = pull * scales.force * (arm if spring.turning else 1.0)
         stiffness, damping = stiffness * scales.force * arm, damping * scales.force * scales.time * arm
         terms, rest = None, free * scales.length
         if spring.turning:

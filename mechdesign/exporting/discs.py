@@ -11,7 +11,7 @@ from mechdesign.cautions import Caution
 from mechdesign.exporting.drawing import DrawnCircle, Path, Shape, around
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.algebra import cross
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.plates import hull, joined
 from mechdesign.numerics.arrays import Complexes
 
@@ -88,11 +88,11 @@ def _cautions(view: PosedStudy) -> Iterator[Caution]:
             yield Caution("cam", f"cam {cam.coupling}: its profile is undercut, and the line of the cut crosses itself")
 
 
-def _cams(view: PosedStudy, link: str) -> list[Cam]:
+def _cams(view: PosedStudy, link: str) -> list[CamFollower]:
     return [cam for cam in view.mechanism.cams if cam.links[1] == link]
 
 
-def _disc(view: PosedStudy, cam: Cam, kerf: float) -> CamDisc | None:
+def _disc(view: PosedStudy, cam: CamFollower, kerf: float) -> CamDisc | None:
     """A cam to cut; None where its profile bounds no part.
 
     A ring and a cam with a groove have a rim as wide as the link. The ends of a profile of a part of a turn are joined
@@ -142,6 +142,6 @@ def _crosses(one: Complexes, other: Complexes) -> bool:
     return bool(np.any(apart & (cross(d - c, a - c) * cross(d - c, b - c) < 0)))
 
 
-def _profile(view: PosedStudy, cam: Cam, side: str, kerf: float) -> Complexes:
+def _profile(view: PosedStudy, cam: CamFollower, side: str, kerf: float) -> Complexes:
     scale = view.millimetres
     return scale * cam.cut(side, kerf / 2 / scale, DEVIATION / scale)

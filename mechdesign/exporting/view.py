@@ -13,7 +13,8 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.configuration import joined
-from mechdesign.mechanism.model import Fixed, Plates
+from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.plates import Sizes
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
@@ -85,7 +86,7 @@ class PosedStudy:
         """The plates of the study, else such of a width that fits its size."""
         given = self.mechanism.description.plates
         width = float(f"{WIDTH * self.mechanism.size:.1g}")
-        return given if given is not None else Plates(width)
+        return given if given is not None else Plates("plates", width)
 
     @property
     def assumed(self) -> tuple[Caution, ...]:

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.mechanism import model
 from mechdesign.mechanism.algebra import TURN, Value, Vector, cross, dot, norm2, quiet, rotation, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.elements.couplings import Cam, play
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Turn
 from mechdesign.mechanism.outputs import Rates, first
@@ -77,8 +77,8 @@ class Touch(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Cam:
-    """The cam of a coupling.
+class CamFollower:
+    """The cam of a coupling with its follower.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Cam:
 
     coupling: str
     index: int
-    given: model.Cam
+    given: Cam
     followed: Coordinate
     follower: Coordinate
     links: tuple[str, str]
@@ -153,7 +153,7 @@ class Cam:
 
     def outside(self, configuration: Configuration) -> Flags:
         """Poses at which what is followed lies beyond the profile; whole turns aside where the law repeats."""
-        first, last = self.given.span
+        first, last = self.given.range
         slack = SLACK * (last - first)
         away = np.asarray(configuration.value(self.followed)) - first + slack
         away = np.mod(away, TURN) if self._repeats else away
@@ -174,7 +174,7 @@ class Cam:
     @property
     def values(self) -> Floats:
         """Values of the coordinate that is followed over the whole profile."""
-        return np.linspace(*self.given.span, self.given.steps + 1)
+        return np.linspace(*self.given.range, self.given.steps + 1)
 
     @cached_property
     def _whole(self) -> Configuration:
@@ -198,7 +198,7 @@ class Cam:
         """
         parts = 2 * self.given.steps
         while True:
-            outline = self._outline(self.along(np.linspace(*self.given.span, parts + 1)), side, away)
+            outline = self._outline(self.along(np.linspace(*self.given.range, parts + 1)), side, away)
             chord, arm = outline[2::2] - outline[:-2:2], outline[1::2] - outline[:-2:2]
             beside = np.abs(cross(chord, arm)) / np.abs(chord)
             if not np.any(beside > deviation) or parts > MOST_PARTS:
@@ -313,7 +313,7 @@ class Cam:
             pitch, pace = -dot(normal, curved) / norm2(moved), speed
             place, touched, size = center - radius * normal, center, 1 / pitch - radius
         # The follower's own motion while the cam is held: by play between them, the drives moved back.
-        parted = linear.sensitivity([model.play(self.coupling)])
+        parted = linear.sensitivity([play(self.coupling)])
         back = first(configuration, self.followed, parted) * self.against(velocity, touched, configuration)
         own = np.asarray(self.against(parted, touched, configuration) - back)[0]
         pressure = np.arctan(cross(own, normal) / dot(own, normal))
@@ -326,7 +326,7 @@ class Cam:
 
         That is by play between them, the drives moved back; `velocity` is that for each unit of what is followed.
         """
-        parted = linear.sensitivity([model.play(self.coupling)])
+        parted = linear.sensitivity([play(self.coupling)])
         back = first(linear.configuration, self.followed, parted)
         own = self.against(parted, place, linear.configuration)
         moved: Vector = np.atleast_1d(own - back * self.against(velocity, place, linear.configuration))[0]

@@ -11,18 +11,13 @@ import numpy as np
 from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import TURN
+from mechdesign.mechanism.elements.couplings import MEASURED, Coupling, play
+from mechdesign.mechanism.elements.declared import Quantity
+from mechdesign.mechanism.elements.drives import Drive
+from mechdesign.mechanism.elements.measures import Measure
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import (
-    MEASURED,
-    WOUND,
-    Coupling,
-    Description,
-    Drive,
-    Measure,
-    Quantity,
-    Spring,
-    play,
-)
+from mechdesign.mechanism.model import WOUND, Description
 from mechdesign.notation import Step
 
 # The law of a cam closes after a turn where it misses its begin by less than this part of its lift.
@@ -180,7 +175,7 @@ def _measure(name: str, measure: Measure, description: Description, graph: Graph
 
 def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupled:
     """Coordinates of a coupling; its function, with the play, and its gap have the unit of the one that follows."""
-    follower = resolve(coupling.sets, description, graph)
+    follower = resolve(coupling.set_, description, graph)
     name = play(coupling.name).removeprefix(MEASURED)
     law = _cam_law(coupling, description, graph)
     with_play = replace(law, program=(*law.program, ("name", name), ("call", "+")))
@@ -195,14 +190,14 @@ def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupl
 
 def _cam_law(coupling: Coupling, description: Description, graph: Graph) -> Expression:
     """What a coupling gives; the law of a cam that ends after a turn as it begins, with every turn of the cam again."""
-    law, cam = coupling.of, coupling.cam
-    if cam is None or abs(cam.span[1] - cam.span[0] - TURN) > LIKE_A_TURN * TURN or law.table is not None:
+    law, cam = coupling.function, coupling.cam
+    if cam is None or abs(cam.range[1] - cam.range[0] - TURN) > LIKE_A_TURN * TURN or law.table is not None:
         return law
     parts, unit = _parts(law, description, graph), law.angle_unit
     (followed,) = (part for part in parts.values() if part.kind != "parameter")
     if followed.quantity != "angle":
         return law
-    first, turn = cam.span[0] / unit, TURN / unit
+    first, turn = cam.range[0] / unit, TURN / unit
     places = [
         description.places.get(MEASURED + name) or description.places[name] for name in parts if name != followed.name
     ]

@@ -15,9 +15,11 @@ from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import TURN, Value, Vector, norm2, wrap
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.measures import Limit
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
-from mechdesign.mechanism.model import Description, Limit, Term
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.rigidity import LoopEquations
 from mechdesign.mechanism.sketch import Sketch, locate
 from mechdesign.mechanism.wheels import Mesh, meshes
@@ -237,5 +239,5 @@ class Core:
             coordinate = names.between("-".join(limit.items), limit.kind, limit.items, self.graph)
         else:
             coordinate = self.coordinate(limit.items[0])
-        label = limit.label or f"limits.{index}"
-        return Bound(coordinate, limit.minimum, limit.maximum, label, limit.kind == "drive")
+        label = limit.name
+        return Bound(coordinate, limit.min, limit.max, label, limit.kind == "drive")

@@ -11,10 +11,14 @@ from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import winding
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.diagnosis import joints_in_words, near_singular
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.measures import Limit, Measure
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Spring, Term
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
@@ -85,7 +89,8 @@ def describe(mechanism: Mechanism) -> str:
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
     lines += [
-        f"coupling: {name} ({coupling.sets} = {coupling.of.text})" for name, coupling in description.couplings.items()
+        f"coupling: {name} ({coupling.set_} = {coupling.function.text})"
+        for name, coupling in description.couplings.items()
     ]
     lines += [f"spring: {name} ({', '.join(spring.between)}){_wound(mechanism, spring)}"
               for name, spring in description.springs.items()]  # fmt: skip
@@ -124,7 +129,7 @@ def _wound(mechanism: Mechanism, spring: Spring) -> str:
     """How far a torsion spring is wound where the mechanism is drawn."""
     if not spring.turning:
         return ""
-    angle = mechanism.drawn_windings[winding(spring).name] - mechanism.geometry.term(spring.free, {})
+    angle = mechanism.drawn_windings[winding(spring).name] - mechanism.geometry.term(spring.free_angle, {})
     return f", wound by {float(angle) / mechanism.description.angle_unit:.6g} in the sketch"
 
 
@@ -135,7 +140,7 @@ def _limit(mechanism: Mechanism, limit: Limit) -> str:
         place = mechanism.description.places[term]
         return place.nominal / (mechanism.description.angle_unit if place.quantity == "angle" else 1.0)
 
-    ends = (("from", limit.minimum), ("to", limit.maximum))
+    ends = (("from", limit.min), ("to", limit.max))
     bounds = [f"{word} {value(term):.6g}" for word, term in ends if term is not None]
     return f"{limit.kind} {'-'.join(limit.items)} {' '.join(bounds)}"
 

@@ -11,8 +11,9 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description, Fixed, Prismatic
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.numerics.arrays import Floats

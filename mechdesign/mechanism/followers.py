@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import dot
-from mechdesign.mechanism.cams import UNMOVED, Cam
+from mechdesign.mechanism.cams import UNMOVED, CamFollower
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.graph import turns_of
@@ -19,7 +19,7 @@ from mechdesign.mechanism.plan import Plan
 
 def cams(
     couplings: Sequence[Coupled], forward: Plan, plan: Callable[[Sequence[str]], Plan]
-) -> list[Cam]:  # fmt: skip
+) -> list[CamFollower]:  # fmt: skip
     """The cams of couplings.
 
     Raises
@@ -39,7 +39,7 @@ def cams(
         follower = graph.holder(given.face.link, point)
         base = next(graph.nodes.index(name) for body, name in graph.points if body == given.link)
         whole = _plan_with(followed, [c.name for c in forward.structure.given], plan, coupling.name)
-        cam = Cam(
+        cam = CamFollower(
             coupling.name, index, given, followed, coupling.follower, (follower, given.link), graph.nodes.index(point),
             base, turns_of(given.face), forward, whole,
         )  # fmt: skip
@@ -61,7 +61,7 @@ def _plan_with(followed: Coordinate, drives: Sequence[str], plan: Callable[[Sequ
     raise MechanismError(message, f"mechanism.couplings.{name}.cam")
 
 
-def _check_follower(cam: Cam) -> None:
+def _check_follower(cam: CamFollower) -> None:
     """The follower moves against the cam by the one coordinate alone, and the cam can push it."""
     core = cam.forward.core
     drawn, size = core.sketch_configuration, core.size

@@ -14,9 +14,10 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, winding
+from mechdesign.mechanism.elements.links import Mass
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.model import Mass, Spring
 from mechdesign.mechanism.outputs import Rates, pulled
 
 
@@ -245,11 +246,7 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
     potential: Value = 0.0
     lost: Value = 0.0
     for spring in elements:
-        stiffness, free, preload, push, damping = (
-            geometry.term(term, places)
-            for term in (spring.stiffness, spring.free, spring.preload, spring.push, spring.damping)
-        )
-        constant = preload - push
+        constant, stiffness, free, damping = spring.pull(lambda term: geometry.term(term, places))
         rate: Value = 0.0
         if spring.turning:
             one, other = spring.between

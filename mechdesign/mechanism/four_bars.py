@@ -21,9 +21,9 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, norm2
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic, Slot
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Fixed, Prismatic, Slot
 from mechdesign.mechanism.outputs import Rates
 
 Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]

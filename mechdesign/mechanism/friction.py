@@ -15,11 +15,11 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.elements.joints import Friction
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction_equations import FrictionSystem
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.joint_contacts import PIN, Joints
-from mechdesign.mechanism.model import Friction
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.mechanism.wheels import Engagement

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, norm2, picked, plus, rotation, vector
+from mechdesign.mechanism.elements.couplings import MEASURED
+from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.graph import Edge, Graph, Turn
-from mechdesign.mechanism.model import MEASURED, Place, Term
+from mechdesign.mechanism.model import Place
 from mechdesign.numerics.arrays import Ints
 
 

@@ -13,7 +13,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, LinkLine, Prismatic
+from mechdesign.mechanism.model import Description
 
 GROUND = "ground"
 # Words behind a link's name that are coordinates of the link, ``rod.angle``, and no points of it.
@@ -98,7 +100,7 @@ class Graph:
         return [self.nodes[node] for node in dict.fromkeys(ends) if ":" not in self.nodes[node]]
 
 
-def turns_of(line: Line) -> tuple[Turn, ...]:
+def turns_of(line: LinkLine) -> tuple[Turn, ...]:
     """From the x axis of a line's link to the line."""
     if line.toward is not None and line.through is not None:
         return (Turn(1, towards=(line.link, line.through, line.toward)),)
@@ -168,7 +170,7 @@ def build_graph(description: Description) -> Graph:
             ties.append((name, rod, ()))
             legs.append((name, *link.ends))
 
-    lines: list[tuple[str, Line, str, tuple[tuple[int, str, str], ...]]] = []
+    lines: list[tuple[str, LinkLine, str, tuple[tuple[int, str, str], ...]]] = []
     for joint in description.joints.values():
         if isinstance(joint, Fixed):
             a, b = joint.links
@@ -213,7 +215,7 @@ def build_graph(description: Description) -> Graph:
     )
 
 
-def _named_points(joint: Joint) -> list[tuple[str, str]]:
+def _named_points(joint: AnyJoint) -> list[tuple[str, str]]:
     if isinstance(joint, Fixed):
         return [(link, joint.point) for link in joint.links]
     line = joint.line

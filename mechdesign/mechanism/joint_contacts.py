@@ -10,9 +10,10 @@ from typing import NamedTuple
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import coupled
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic, Slot
 from mechdesign.mechanism.forces import bases
 from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
-from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.wheels import Engagement
 
 # Prefix of the pin of several links; its point follows.

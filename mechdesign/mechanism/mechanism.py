@@ -16,9 +16,10 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.followers import cams
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.model import Description, Quantity
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH

@@ -20,7 +20,9 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
-from mechdesign.mechanism.model import Description, Fixed, Plates
+from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.plates import Plates
+from mechdesign.mechanism.model import Description
 
 # Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
 PIN, THICKNESS = 0.4, 0.25

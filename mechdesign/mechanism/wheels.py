@@ -18,8 +18,9 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, dot
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
+from mechdesign.mechanism.elements.joints import Prismatic
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description, Prismatic
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.outputs import pulled
 
 # Links of a mesh, its carrier, the nodes of its axes, and of a rack a slide and its sense.

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mechdesign.errors import StudyError
-from mechdesign.mechanism.model import Description, Term
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.model import Description
 from mechdesign.motion.paths import PointPath, Polyline, Round, Spline, SplineOfEach
 from mechdesign.motion.paths import bends as bends_of
 from mechdesign.motion.rows import MAX_POSES, PoseGroup, Poses, by_length, by_time, with_length
@@ -262,7 +263,7 @@ def default(description: Description, numbers: Numbers = OWN) -> Poses:
     drive = next(iter(description.drives.values()))
     factor = description.angle_unit if drive.kind == "angle" else 1.0
     for limit in description.limits:
-        low, high = limit.minimum, limit.maximum
+        low, high = limit.min, limit.max
         if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
             ends = [_place(description, end, numbers) / factor for end in (low, high)]
             return of_designs(_grid({drive.name: np.linspace(ends[0], ends[1], 51, axis=1)}), numbers)

@@ -13,9 +13,9 @@ import yaml
 from pydantic import ValidationError
 
 from mechdesign.errors import StudyError, printable
+from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Fixed
-from mechdesign.study.building.section import LINK_KEYS
+from mechdesign.study.building.notations import LINK_KEYS
 from mechdesign.study.loaded import Study
 from mechdesign.study.loading import adapter, context_of, load_document, same_sketch
 from mechdesign.study.schema.conditions import Requirement
@@ -166,36 +166,19 @@ def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
     data: dict[str, Any] = plain(study.resolved)
     mechanism = data["mechanism"]
     for name, value in changed.items():
-        owner, _, last = name.rpartition(".")
-        holder: Any = mechanism
-        key: str | int = last
         if name in study.parameters.nominal:
-            holder, key = mechanism["parameters"], name
-        elif owner.startswith("limits."):
-            holder = mechanism["limits"][int(owner.partition(".")[2])]
-        elif owner in study.mechanism.description.springs:
-            holder = mechanism["springs"][owner]
-        elif owner in study.mechanism.description.couplings:
-            holder = mechanism["couplings"][owner]
-        elif owner.startswith("friction."):
-            holder = mechanism["friction"][owner.partition(".")[2]]
-        elif last in ("mass", "inertia") or owner.endswith(".center"):
-            link, *inner = owner.split(".")
-            holder, key = mechanism["links"][link], "xy".index(last) if owner.endswith(".center") else last
-            for part in inner:
-                holder = holder[part]
-        elif last in ("direction", "angle"):
-            holder = mechanism["joints"][owner]
-        elif last == "length":
-            link = mechanism["links"][owner]
-            if isinstance(link, list):
-                link[2:] = [float(value)]
-                continue
-            holder = link
-        else:
-            link, _, point = owner.rpartition(".")
-            holder, key = _points(study, mechanism["links"], link)[point], "xy".index(last)
-        holder[key] = float(value)
+            mechanism["parameters"][name] = float(value)
+            continue
+        kind, *path = study.mechanism.description.places[name].path
+        holder: Any = mechanism[kind]
+        if path[1:2] == ["points"]:
+            holder, path = _points(study, holder, str(path[0])), path[2:]
+        elif isinstance(holder[path[0]], list):
+            holder[path[0]][2:] = [float(value)]
+            continue
+        for part in path[:-1]:
+            holder = holder[part]
+        holder[path[-1]] = float(value)
     return data
 
 
@@ -210,7 +193,11 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
         for point, terms in described.points.items()
         if point not in (described.ends or ())
     }
-    links[name] = points if described.ends is None else {**raw, "points": points}
+    # The ends of the ground may be among its points.
+    other = {key: raw[key] for key in raw if key in LINK_KEYS and given is not raw}
+    if described.ends is None:
+        other = {key: value for key, value in other.items() if key not in ("from", "to")}
+    links[name] = {**other, "points": points} if other.keys() - {"points"} else points
     return points
 
 

@@ -20,7 +20,9 @@ import numpy as np
 
 from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.model import Coupling, Fixed, Link, Prismatic
+from mechdesign.mechanism.elements.couplings import Coupling
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.questions.stiffness.schema import CouplingStiffness, CrossSection
 from mechdesign.study import Study
 
@@ -251,7 +253,7 @@ class Structure:
         self.frame.couple(terms, None if gives is None else gives.force)
 
     def _coupling(self, coupling: Coupling, gives: CouplingStiffness | None) -> None:
-        unit, names = coupling.of.angle_unit, sorted(coupling.of.names)
+        unit, names = coupling.function.angle_unit, sorted(coupling.function.names)
         values = {
             name: float(np.ravel(self.pose.value(self.study.mechanism.coordinate(name)))[0])
             / (unit if name.endswith(".angle") else 1.0)
@@ -259,12 +261,12 @@ class Structure:
         }  # fmt: skip
 
         def moved(name: str, step: float) -> float:
-            return float(coupling.of.evaluate(values | {name: values[name] + step}))
+            return float(coupling.function.evaluate(values | {name: values[name] + step}))
 
-        factors = {coupling.sets: 1.0}
+        factors = {coupling.set_: 1.0}
         for name in names:
             slope = (moved(name, 1e-4) - moved(name, -1e-4)) / 2e-4
-            units = [unit if other.endswith(".angle") else 1.0 for other in (coupling.sets, name)]
+            units = [unit if other.endswith(".angle") else 1.0 for other in (coupling.set_, name)]
             factors[name] = -slope * units[0] / units[1]
         terms = []
         for name, factor in factors.items():

@@ -202,3 +202,38 @@ optimize: {variables: {c: {from: 45, to: 46, step: 1}}, maximize: kinematics.B.x
     assert len(told) == 1
     assert "between poses 2 and 3 (60 to 320 deg) the mechanism is stopped" in told[0]
     assert "kinematics.conditioning, at_least" in told[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("links", "more", "variable", "place"),
+    [
+        pytest.param(
+            "arm: {points: {O: [0, 0], P: [100, 0]}, mass: 2 kg, center: [30, 5]}", "drives: [arm]", "arm.P.x",
+            ("links", "arm", "points", "P", 0), id="a point of a link with a mass",
+        ),
+        pytest.param(
+            "arm: [O, A, 20]\n    follower: {points: {F: [0, 0]}}\n"
+            "  joints: {guide: {prismatic: [ground, follower], through: O, direction: 90}}",
+            "drives: [arm]\n  couplings: {lift: {set: guide, to: 40 + 5*cos(arm), cam: "
+            "{link: arm, roller: F, radius: 8}}}\n  sketch: {A: [20, 0], F: [0, 45]}",
+            "lift.radius", ("couplings", "lift", "cam", "radius"), id="the roller of a cam",
+        ),
+    ],
+)  # fmt: skip
+def test_a_dimension_stands_in_the_file_of_the_optimum_where_the_study_has_it(tmp_path, links, more, variable, place):
+    text = (
+        f"mechanism:\n  links:\n    ground: {{O: [0, 0]}}\n    {links}\n  {more}\n"
+        "kinematics: {sweep: {arm: {from: 0, to: 90, step: 45}}}\n"
+        f"optimize: {{variables: {{{variable}: {{choices: [9, 11]}}}}, method: grid,\n"
+        "  minimize: kinematics.arm.angle.max}\n"
+    )
+    study = mechdesign.load(text=text)
+    written(study, tmp_path)
+    optimum = mechdesign.load(tmp_path / "optimum.yaml")
+    expected, found = study.resolved["mechanism"], optimum.resolved["mechanism"]
+    holder = expected
+    for key in place[:-1]:
+        holder = holder[key]
+    holder[place[-1]] = 9
+    assert found == expected

@@ -180,7 +180,7 @@ def test_limits_and_measures(load):
     assert found["limits.0.max"] == 120.0
     assert found["limits.1.max"] == pytest.approx(math.pi / 2)
     assert found["limits.2.max"] == pytest.approx(1.0)
-    assert description.limits[0].minimum is None
+    assert description.limits[0].min is None
 
 
 def test_units_of_the_study_apply(load):

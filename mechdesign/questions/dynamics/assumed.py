@@ -8,9 +8,9 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import norm2
+from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.forces import local_center
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Mass
 from mechdesign.questions.dynamics.question import pace
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.study import Study

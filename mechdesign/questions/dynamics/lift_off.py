@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mechdesign.cautions import Caution
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.followed import Followed
 from mechdesign.motion.passage import Mark
 from mechdesign.motion.question import PoseValues
@@ -25,7 +25,9 @@ def contacts(question: ForceQuestion) -> dict[str, str]:
     """By the coupling of each cam whose follower nothing pulls, such as a groove, the column of its contact force."""
     pairs = zip(question.forces, (contact.engaged for contact in question.joints.contacts), strict=True)
     return {
-        cam.coupling: f"{name}.normal" for name, cam in pairs if isinstance(cam, Cam) and cam.given.side != "groove"
+        cam.coupling: f"{name}.normal"
+        for name, cam in pairs
+        if isinstance(cam, CamFollower) and cam.given.side != "groove"
     }
 
 

@@ -17,10 +17,11 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
+from mechdesign.mechanism.elements.declared import Term
+from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
-from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.motion.motion import SolvedPoses
@@ -122,8 +123,8 @@ class ForceQuestion:
         forces = [pull * size(mass.mass) for mass in mechanism.description.masses.values()]
         for spring in mechanism.description.springs.values():
             way, arm = (np.pi, length) if spring.turning else (length, 1.0)
-            give = (size(spring.stiffness) + size(spring.damping) * self.tempo) * way
-            forces.append((size(spring.preload) + size(spring.push) + give) / arm)
+            constant, stiffness, _, damping = spring.pull(size)
+            forces.append((abs(constant) + (stiffness + damping * self.tempo) * way) / arm)
         for load in self.section.loads:
             for _, quantity, kind in load.numbers:
                 if not isinstance(quantity, Expression):

@@ -20,7 +20,7 @@ from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
-from mechdesign.questions.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
+from mechdesign.questions.kinematics.limits import LimitPlace, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
 from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, valued, without_centre, without_value
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
@@ -41,7 +41,7 @@ class Events(Between):
 
     along: KinematicAlong | None
     shapes: Sequence[Sequence[FourBar]]
-    limits: Sequence[Limit]
+    limits: Sequence[LimitPlace]
     toggles: Sequence[Toggle]
     changes: Sequence[Change]
     cams: Sequence[CamSide]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import TURN
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.motion import in_study_units
 from mechdesign.motion.passage import Mark
 from mechdesign.motion.question import PoseValues
@@ -33,7 +33,7 @@ MOST_NAMED = 8
 class CamSide:
     """One side of a cam of several designs; arrays are of shape (designs, places), lengths and angles of the study."""
 
-    cam: Cam
+    cam: CamFollower
     side: str
     coordinates: Mapping[str, Floats]  # of the cam and of its follower, by name
     columns: Mapping[str, Floats]  # the other numbers of the table, by the name of their column
@@ -93,7 +93,7 @@ def beyond_profile(
     for cam in study.mechanism.cams:
         number, row = marks.get(f"{OUTSIDE}{cam.coupling}", Mark(0, 0))
         if number:
-            low, high = (float(in_study_units(study.units, cam.followed, end)) for end in cam.given.span)
+            low, high = (float(in_study_units(study.units, cam.followed, end)) for end in cam.given.range)
             pose = pose_in_words(study, poses, row + design * count)
             words = (
                 f"cam {cam.coupling}: {number} of {count} poses lie outside of its range, {cam.followed.name} from "
@@ -142,6 +142,6 @@ def cautions(study: Study, sides: Sequence[CamSide], design: int) -> Iterator[Ca
         values = ", ".join(f"{value:.6g}" for value in side.coordinates[cam.followed.name][design][corner][:MOST_NAMED])
         text = f"the profile is broken, as the law of the follower has a corner ({values})"
         yield from side.caution(study, design, "cam", corner, text)
-        if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.span), TURN):
+        if not cam.closed and cam.followed.quantity == "angle" and np.isclose(np.ptp(cam.given.range), TURN):
             end = np.arange(cam.given.steps + 1) == cam.given.steps
             yield from side.caution(study, design, "cam", end, "the profile does not close after a turn")

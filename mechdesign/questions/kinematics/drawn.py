@@ -14,7 +14,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.along import KinematicAlong
-from mechdesign.questions.kinematics.limits import Limit
+from mechdesign.questions.kinematics.limits import LimitPlace
 from mechdesign.questions.kinematics.loops import Toggle
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.special_poses import SpecialPoses, special_poses
@@ -92,13 +92,13 @@ class DrawnMotion(DrawnPoses):
 
     Parameters
     ----------
-    limits, toggles : sequence of Limit and of Toggle
+    limits, toggles : sequence of LimitPlace and of Toggle
         Ends of the motion, and poses at which two links come into line.
     modes : mapping of str to Shown
         The same poses in each assembly of the links that has a valid one, by its name; empty unless all were asked for.
     """
 
-    limits: Sequence[Limit]
+    limits: Sequence[LimitPlace]
     toggles: Sequence[Toggle]
     modes: Mapping[str, Shown] = field(default_factory=dict)
 

@@ -20,7 +20,7 @@ MOST_NAMED = 4
 
 
 @dataclass(frozen=True)
-class Limit:
+class LimitPlace:
     """A place along the motion of a design, in rows, at which it ends or passes a singularity; `end` of one that ends.
 
     `line` is the number of the motion.
@@ -32,16 +32,16 @@ class Limit:
     end: End | None = None
 
 
-def limits_of(along: KinematicAlong) -> list[Limit]:
+def limits_of(along: KinematicAlong) -> list[LimitPlace]:
     """Limits and singularities of motions, one after the other, in the order of their places."""
-    limits = [Limit(end.line, end.place, end.cause, end) for end in along.ends.ends]
-    limits += [Limit(line, place, cause) for line, place, cause in along.passages()]
+    limits = [LimitPlace(end.line, end.place, end.cause, end) for end in along.ends.ends]
+    limits += [LimitPlace(line, place, cause) for line, place, cause in along.passages()]
     places = along.snapped(np.array([limit.place for limit in limits])).tolist()
     limits = [replace(limit, place=place) for limit, place in zip(limits, places, strict=True)]
     return sorted(limits, key=lambda limit: (limit.line, limit.place))
 
 
-def limits_table(limits: Sequence[Limit], along: KinematicAlong) -> Table:
+def limits_table(limits: Sequence[LimitPlace], along: KinematicAlong) -> Table:
     """The places at which the motions end or pass a singularity, and the outputs there.
 
     `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`.
@@ -76,7 +76,7 @@ def place_in_words(along: KinematicAlong, line: int, place: float) -> str:
     return f"row {place:.6g} ({motion.at(poses.along(lines, s)).in_words(0)})"
 
 
-def hidden(limits: Sequence[Limit], along: KinematicAlong, valid: Flags) -> list[Caution]:
+def hidden(limits: Sequence[LimitPlace], along: KinematicAlong, valid: Flags) -> list[Caution]:
     """A warning where a motion ends between neighbouring poses that are both valid: the motion table hides it."""
     places = [
         place_in_words(along, limit.line, limit.place)
@@ -92,7 +92,7 @@ def hidden(limits: Sequence[Limit], along: KinematicAlong, valid: Flags) -> list
     return [Caution("unassembled", words, "limits", pose=places[0])]
 
 
-def passed(limits: Sequence[Limit], along: KinematicAlong) -> list[Caution]:
+def passed(limits: Sequence[LimitPlace], along: KinematicAlong) -> list[Caution]:
     """A warning where a motion passes a forward singularity."""
     places = [place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None]
     if not places:

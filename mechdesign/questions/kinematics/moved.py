@@ -17,8 +17,8 @@ from mechdesign.mechanism import Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import Linearization, regularity
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.forces import Moving
-from mechdesign.mechanism.model import Quantity
 from mechdesign.motion.motion import Motion, SolvedPoses, in_study_units, radians
 from mechdesign.motion.question import PoseQuestion, unfilled
 from mechdesign.motion.rows import PoseGroup, Poses

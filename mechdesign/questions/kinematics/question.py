@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import Self
 
 from mechdesign.errors import counted
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.jacobians import mixes
-from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
@@ -48,14 +48,14 @@ class KinematicQuestion(MovedQuestion):
         outputs) as drives.
     targeted : tuple of str
         Coordinates whose values the errors need.
-    cams : sequence of Cam
+    cams : sequence of CamFollower
         Cams whose pressure angle and radius of curvature are computed.
     """
 
     listed: Sequence[Coordinate] = ()
     square: bool = False
     targeted: tuple[str, ...] = ()
-    cams: Sequence[Cam] = ()
+    cams: Sequence[CamFollower] = ()
 
     @classmethod
     def of(cls, study: Study, poses: Poses) -> Self:

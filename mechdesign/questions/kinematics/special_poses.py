@@ -17,7 +17,7 @@ from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Ints, distinct
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.instant_centres import Centre
-from mechdesign.questions.kinematics.limits import Limit
+from mechdesign.questions.kinematics.limits import LimitPlace
 from mechdesign.questions.kinematics.loops import Toggle
 from mechdesign.questions.kinematics.question import KinematicQuestion
 from mechdesign.questions.kinematics.rates import drive_rates
@@ -75,7 +75,8 @@ class SpecialPoses:
 
 
 def special_poses(
-    motion: PoseValues, kept: Shown, along: KinematicAlong | None, limits: Sequence[Limit], toggles: Sequence[Toggle]
+    motion: PoseValues, kept: Shown, along: KinematicAlong | None, limits: Sequence[LimitPlace],
+    toggles: Sequence[Toggle],
 ) -> SpecialPoses:  # fmt: skip
     """The limits of a motion and its toggles, with evenly spread poses where these are few; else listed poses.
 
@@ -129,7 +130,7 @@ def _spread(motion: PoseValues, kept: Shown, special: Sequence[float]) -> Ints:
 
 
 def _events(
-    question: KinematicQuestion, along: KinematicAlong, limits: Sequence[Limit], toggles: Sequence[Toggle]
+    question: KinematicQuestion, along: KinematicAlong, limits: Sequence[LimitPlace], toggles: Sequence[Toggle]
 ) -> list[Event]:  # fmt: skip
     """Limits, singularities and toggles in the order of the motion; those at one place are one."""
     events = []

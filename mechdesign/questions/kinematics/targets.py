@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import dot, norm2
-from mechdesign.mechanism.model import Quantity
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints

@@ -10,9 +10,9 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
+from mechdesign.mechanism.elements.couplings import play
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.jacobians import Jacobian, mixes
-from mechdesign.mechanism.model import play
 from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.mechanism.plates import CLEARANCE, Clearances
 from mechdesign.mechanism.statics import balance

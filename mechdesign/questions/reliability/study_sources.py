@@ -12,8 +12,9 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.elements.couplings import MEASURED, play
+from mechdesign.mechanism.elements.joints import AnyJoint, Prismatic
 from mechdesign.mechanism.geometry import offset_names, slide_offset
-from mechdesign.mechanism.model import MEASURED, Joint, Prismatic, play
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
@@ -189,7 +190,7 @@ def _backlash(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pi
     return Pin(name, size, law, *laws, "slide", ({moved.name: slope},), quantity)
 
 
-def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...]:
+def _slider(joint: AnyJoint, length: Number | None) -> tuple[dict[str, Number], ...]:
     """Directions of the rear and front end of a slider: it shifts by their mean and tilts by their difference/length.
 
     A pin in a slot only shifts.

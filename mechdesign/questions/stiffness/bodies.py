@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, leaves
+from mechdesign.mechanism.elements.drives import Drive
+from mechdesign.mechanism.elements.joints import Fixed, Prismatic
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.wheels import Engagement
 from mechdesign.questions.stiffness.elements import (
     Beam,
@@ -244,7 +246,7 @@ class _Builder:
     def spring(self, spring: Spring, holders: Mapping[str, list[str]]) -> None:
         """Add a spring between two links, or between bodies at its points, about which it turns freely."""
         coil = SpringElement(spring, self.mechanism.geometry)
-        if not self.mechanism.geometry.term(spring.stiffness, {}):
+        if not self.mechanism.geometry.term(spring.rate, {}):
             return
         one, other = spring.between
         if spring.turning:

@@ -16,8 +16,9 @@ import numpy as np
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.elements.links import Link
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.model import Link, Spring
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.schema import CrossSection, StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist
@@ -85,7 +86,7 @@ class SpringElement:
     def freedoms(self, configuration: Configuration, at: Complexes) -> Iterator[tuple[Floats, Value]]:
         """Twists (3, n) that it allows, seen from places `at`, and their compliances."""
         spring, places = self.spring, configuration.places
-        soft = 1 / self.geometry.term(spring.stiffness, places)
+        soft = 1 / self.geometry.term(spring.rate, places)
         if spring.turning:
             yield hinge_twist(at - at), soft
             return
@@ -101,7 +102,7 @@ class SpringElement:
     def isotropic(self) -> bool:
         """Whether it gives alike in every direction."""
         spring = self.spring
-        return not any(self.geometry.term(term, {}) for term in (spring.free, spring.preload, spring.push))
+        return not any(self.geometry.term(term, {}) for term in (spring.free, spring.preload, spring.force))
 
 
 Element = Hinge | SlideElement | Beam | Shift | JointCompliance | SpringElement

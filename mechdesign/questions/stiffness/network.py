@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.bodies import TARGET, Bodies, NetworkEdge, is_pin
@@ -55,7 +55,7 @@ class Network(Bodies):
 
         A cam presses along its normal whatever the sign.
         """
-        cams = [isinstance(transmission.engagement, Cam) for transmission in self.transmissions]
+        cams = [isinstance(transmission.engagement, CamFollower) for transmission in self.transmissions]
         return [presses and not cam for presses, cam in zip(self.pressing, cams, strict=True)]
 
     @cached_property

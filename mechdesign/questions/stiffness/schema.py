@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Quantity
 from mechdesign.study.schema.checker import NO_MOMENT, Checker
 from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import PoseSection

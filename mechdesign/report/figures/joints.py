@@ -36,7 +36,7 @@ _EDGE = 0.06  # of the largest component, about hodographs
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class JointLoad:
     """What a joint bears in some cases: a force (x + iy) or a moment on one link by another, shape (poses, cases).
 
     Joints that bear as much at every pose are drawn as one, such as the two of a link that nothing else acts on; `name`
@@ -53,18 +53,18 @@ class Joint:
         return float(np.nan_to_num(np.abs(self.values)).max(initial=0.0))
 
 
-def peak(joints: Sequence[Joint]) -> float:
+def peak(joints: Sequence[JointLoad]) -> float:
     """Largest magnitude of any of some joints."""
     return max((joint.peak for joint in joints), default=0.0)
 
 
-def loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
+def loaded(joints: Sequence[JointLoad], rounding: float) -> list[JointLoad]:
     """Joints with a peak above rounding, largest first; joints with equal magnitudes at every pose share one curve."""
-    borne: list[Joint] = []
+    borne: list[JointLoad] = []
     for joint in joints:
         if joint.peak <= rounding:
             continue
-        gaps = [Joint("", "", np.abs(joint.values) - np.abs(other.values)).peak for other in borne]
+        gaps = [JointLoad("", "", np.abs(joint.values) - np.abs(other.values)).peak for other in borne]
         if gaps and min(gaps) <= rounding:
             equal = gaps.index(min(gaps))
             borne[equal] = replace(borne[equal], name=f"{borne[equal].name}, {joint.name}")
@@ -74,7 +74,7 @@ def loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
 
 
 def joint_curves(
-    study: Study, heading: str, kinds: Mapping[str, Sequence[Joint]], cases: Sequence[str], over: Along, *,
+    study: Study, heading: str, kinds: Mapping[str, Sequence[JointLoad]], cases: Sequence[str], over: Along, *,
     cut: bool = True,
 ) -> Picture:  # fmt: skip
     """Panels of forces and of moments for each case, the largest of each marked.
@@ -133,7 +133,8 @@ def place_in_words(study: Study, over: Along, value: float) -> str:
 
 
 def joint_hodographs(
-    study: Study, joints: Sequence[Joint], cases: Sequence[str], over: Along, *, noun: str = "force", cut: bool = True
+    study: Study, joints: Sequence[JointLoad], cases: Sequence[str], over: Along, *, noun: str = "force",
+    cut: bool = True,
 ) -> Picture:  # fmt: skip
     """Where the tip of each joint's force goes, drawn from the origin, a panel a case with its title."""
     shown = np.array([joint.values[:, : len(cases)] for joint in joints])

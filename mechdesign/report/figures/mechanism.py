@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.model import Fixed
+from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import evenly
 from mechdesign.questions.dynamics.free_bodies import mass_centers

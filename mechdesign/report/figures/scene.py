@@ -13,10 +13,12 @@ import numpy as np
 
 from mechdesign.mechanism import Mechanism, plates
 from mechdesign.mechanism.algebra import Vector
-from mechdesign.mechanism.cams import Cam
+from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.elements.joints import Fixed, Slot
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description, Fixed, Slot, Spring
+from mechdesign.mechanism.model import Description
 from mechdesign.motion.motion import radians
 from mechdesign.motion.solving import anchors_of
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
@@ -209,7 +211,7 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
 
 
 def _cam_pair(
-    mechanism: Mechanism, cam: Cam, configuration: Configuration, pick: Callable[[Vector], complex]
+    mechanism: Mechanism, cam: CamFollower, configuration: Configuration, pick: Callable[[Vector], complex]
 ) -> CamPair:
     """A cam and its follower in the pose that `pick` takes."""
     start, turn = (pick(value) for value in mechanism.frame(cam.links[1], configuration))

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.colors import to_rgb
 
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Spring
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label
 from mechdesign.report.figures.scene import CamPair, Guide, Scene, Wheels, hull, spring_points
@@ -288,7 +288,7 @@ def _spring(scene: Scene, spring: Spring) -> list[Shape]:
     points = spring_points(spring)
     places = scene.points[points[0]], scene.points[points[1]]
     looks: dict[str, Any] = {"color": SPRING_COLOR, "width": 1.4, "layer": 0.14}
-    if spring.push != 0.0:
+    if spring.force != 0.0:
         cylinder = [complex(x, y) for x, y in ((0.08, -4), (0.6, -4), (0.6, 4), (0.08, 4), (0.08, -4))]
         return [Strut(places, points, ((0j, 1 + 0j),), **looks | {"width": 2.4}),
                 Strut(places, points, (cylinder,), fill="#DDDDDD", **looks | {"layer": 0.15})]  # fmt: skip

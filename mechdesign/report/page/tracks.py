@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Link
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.page.linkage import Canvas

@@ -5,12 +5,16 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
+from mechdesign.mechanism.elements.links import Link, Mass
 from mechdesign.mechanism.graph import GROUND, rod_of
-from mechdesign.mechanism.model import Link, Mass, Physical, Place, Quantity, Term
+from mechdesign.mechanism.model import Place
 from mechdesign.study.building import section as models
+from mechdesign.study.building.elements import Keys, Written
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context
@@ -19,6 +23,24 @@ from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Amount, kind_of
 
 ROOT: KeyPath = ("mechanism",)
+
+
+# Sections of which the names of places begin with the section, and keys that these names leave out.
+_PREFIXED, _BETWEEN = ("limits", "friction", "plates"), {"links": "points", "couplings": "cam"}
+
+
+def place_name(path: KeyPath) -> str:
+    """Name of the number at a path of the mechanism, which may go through a short form."""
+    kind, *rest = path
+    if kind == "links" and rest[1:] == [2]:
+        return f"{rest[0]}.length"
+    if rest[:1] == ["pins"]:
+        return f"plates.{rest[1]}.pin"
+    if rest[1:2] == [_BETWEEN.get(str(kind))]:
+        del rest[1]
+    if len(rest) > 2 and rest[-1] in (0, 1):
+        rest[-1] = "xy"[int(rest[-1])]
+    return ".".join(map(str, [kind, *rest] if kind in _PREFIXED or not rest else rest))
 
 
 class Builder:
@@ -58,17 +80,27 @@ class Builder:
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
     def place(
-        self, name: str, value: float, quantity: Quantity | Physical = "length", *, measured: bool = False,
+        self, path: KeyPath, value: float, quantity: Quantity | Physical = "length", *, measured: bool = False,
         in_coupling: bool = False,
-    ) -> Term:  # fmt: skip
-        """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
+    ) -> str:  # fmt: skip
+        """Register a number of the geometry, perhaps measured from the sketch, and return its name.
+
+        It stands at a path below ``mechanism``; of what is no dimension of a part this is a name alone.
+        """
+        name = place_name(path)
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        self.places[name] = Place(name, value * factor, quantity, in_coupling)
+        self.places[name] = Place(name, value * factor, quantity, path if len(path) > 1 else (), in_coupling)
         if isinstance(value, Amount) and value.expression is not None:
             self.formulas[name] = value.expression
         if measured:
             self.measured.add(name)
         return name
+
+    def numbers(self, given: Keys, *path: str, turning: bool = False) -> dict[str, Term]:
+        """Register the numbers of an element that are given as places of the geometry; their names by their keys."""
+        return {
+            key: self.place((*path, key), value, size.kind_of(turning=turning)) for key, size, value in given.numbers()
+        }
 
     def check_name(self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int]) -> bool:
         """Whether a name is among the names; if not, report it with the nearest one (a missing ground only once)."""
@@ -146,12 +178,11 @@ class Builder:
                 for point, (x, y) in self.links[name].points.items():
                     self.sketch[point] = complex(self.nominal(x), self.nominal(y))
 
-    def _weigh(self, name: str, section: models.Link) -> None:
+    def _weigh(self, name: str, section: Written[Link]) -> None:
         """Masses of a link's bodies, with places for their numbers."""
-        bodies: list[tuple[str, str, models.Link | models.Rod | None]] = [
-            (name, name, section), (rod_of(name), f"{name}.rod", section.rod),
-        ]  # fmt: skip
-        for body, prefix, given in bodies:
+        path: KeyPath = ("links", name)
+        bodies: list[tuple[str, KeyPath, Any]] = [(name, path, section), (rod_of(name), (*path, "rod"), section.rod)]
+        for body, path, given in bodies:
             if given is None or given.mass is None:
                 continue
             if name == GROUND:
@@ -159,9 +190,9 @@ class Builder:
                 continue
             center = None
             if given.center is not None:
-                x, y = (self.place(f"{prefix}.center.{axis}", at) for axis, at in zip("xy", given.center, strict=True))
+                x, y = (self.place((*path, "center", axis), at) for axis, at in enumerate(given.center))
                 center = x, y
-            mass, points = self.place(f"{prefix}.mass", given.mass, "mass"), self._joined(name, section, body)
+            mass, points = self.place((*path, "mass"), given.mass, "mass"), self._joined(name, section, body)
             if given.inertia == "rod":
                 if len(points) != 2:
                     message = f"a rod runs between two joints, and {name!r} has {len(points)}; give the inertia"
@@ -169,10 +200,10 @@ class Builder:
                 self.masses[body] = Mass(mass, center, points=points, slender=True)
                 continue
             moment = 0.0 if given.inertia is None else given.inertia
-            inertia = self.place(f"{prefix}.inertia", moment, "moment_of_inertia")
+            inertia = self.place((*path, "inertia"), moment, "moment_of_inertia")
             self.masses[body] = Mass(mass, center, inertia, points, left_out=given.inertia is None)
 
-    def _joined(self, name: str, section: models.Link, body: str) -> tuple[str, ...]:
+    def _joined(self, name: str, section: Written[Link], body: str) -> tuple[str, ...]:
         """The joints of a body, or where it has a single one its ends, or all its points."""
         if body != name:
             return (section.to or "",)
@@ -185,7 +216,7 @@ class Builder:
         """Nominal value of a term (angles in radians)."""
         return self.places[term].nominal if isinstance(term, str) else term
 
-    def _link(self, name: str, section: models.Link) -> Link:
+    def _link(self, name: str, section: Written[Link]) -> Link:
         ends, points = None, {}
         # The ground's frame is the world: without a length its two points stay where they are drawn.
         drawn = name == GROUND and section.length is None and not section.telescopic
@@ -199,12 +230,13 @@ class Builder:
         for point in own:
             at = local.get(point, 0j)
             x, y = given.get(point, (at.real, at.imag))
-            terms = [self.place(f"{name}.{point}.{axis}", value, measured=point not in given)
-                     for axis, value in (("x", x), ("y", y))]  # fmt: skip
+            path: KeyPath = ("links", name, "points", point)
+            terms = [self.place((*path, axis), value, measured=point not in given) for axis, value in enumerate((x, y))]
             points[point] = (terms[0], terms[1])
-        return Link(name, points, ends, section.telescopic)
+        start, end = ends or (None, None)
+        return Link(name, start, end, telescopic=section.telescopic, points=points)
 
-    def _ends(self, name: str, section: models.Link, ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
+    def _ends(self, name: str, section: Written[Link], ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
         """The ends of a binary link in its frame: at its origin and on its x axis, where it is not telescopic."""
         start, end = ends
         points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
@@ -221,11 +253,11 @@ class Builder:
                     f"{start!r} and {end!r} are at one place in the sketch: no length to measure; give the length",
                 )
                 length = 1.0
-        points[end] = (self.place(f"{name}.length", length, measured=section.length is None), 0.0)
+        points[end] = (self.place(("links", name, "length"), length, measured=section.length is None), 0.0)
         return points
 
     def _measured(
-        self, name: str, measured: list[str], given: Mapping[str, models.PointValues], ends: tuple[str, str] | None
+        self, name: str, measured: list[str], given: Mapping[str, tuple[Amount, Amount]], ends: tuple[str, str] | None
     ) -> dict[str, complex]:
         """Local coordinates of points without numbers, measured in the sketch.
 

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from typing import Literal, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
@@ -14,41 +14,27 @@ from mechdesign.errors import MechanismError, StudyError, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.functions import Tabulated
 from mechdesign.mechanism.coordinates import coupled
+from mechdesign.mechanism.elements.couplings import MEASURED, Cam, Coupling, play
+from mechdesign.mechanism.elements.declared import Quantity
+from mechdesign.mechanism.elements.drives import Drive
+from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
+from mechdesign.mechanism.elements.links import Link
+from mechdesign.mechanism.elements.measures import Limit, Measure
+from mechdesign.mechanism.elements.plates import Plates
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import GROUND, build_graph
-from mechdesign.mechanism.model import (
-    MEASURED,
-    Cam,
-    Coupling,
-    Description,
-    Drive,
-    Fixed,
-    Friction,
-    Joint,
-    Limit,
-    Line,
-    Link,
-    Measure,
-    Physical,
-    Plates,
-    Prismatic,
-    Quantity,
-    Slot,
-    Spring,
-    Term,
-    play,
-)
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.sketch import locate
 from mechdesign.notation import ExpressionError, Step
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
+from mechdesign.study.building.elements import Written
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import APART
 from mechdesign.study.text.units import Amount
 
-# Of teeth as ISO 53 has them (radians).
-PRESSURE_ANGLE = np.radians(20.0)
 # Rows from which a cubic spline is told.
 FEWEST_ROWS = 4
 # A table spans a turn where it misses one by less than this in its last decimal, and by less than this part of a turn:
@@ -80,10 +66,10 @@ class _WrongJoint(Exception):
     """A mistake of a joint, already reported."""
 
 
-def _joints(builder: Builder) -> dict[str, Joint]:
+def _joints(builder: Builder) -> dict[str, AnyJoint]:
     """Build every joint of the section whose names are right."""
-    makers: dict[str, Callable[..., Joint]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
-    joints: dict[str, Joint] = {}
+    makers: dict[str, Callable[..., AnyJoint]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
+    joints: dict[str, AnyJoint] = {}
     for name, section in builder.section.joints.items():
         with contextlib.suppress(_WrongJoint):
             joints[name] = makers[section.kind](builder, name, section, getattr(section, section.kind))
@@ -109,10 +95,8 @@ def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> No
         _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
 
 
-def _line(
-    builder: Builder, name: str, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath
-) -> Line:
-    """A line of a link through one point or two; its direction is a place of `name`."""
+def _line(builder: Builder, through: Sequence[str], direction: Amount | None, link: str, path: KeyPath) -> LinkLine:
+    """A line of a link through one point or two, which stand at `path`."""
     for k, point in enumerate(through):
         _check_on_link(builder, link, point, (*path, k))
     if len(through) == 2:
@@ -124,16 +108,16 @@ def _line(
         first, second = ([builder.nominal(term) for term in points[point]] for point in through)
         if first == second:
             _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
-        return Line(link, through[0], 0.0, through[1])
-    angle = builder.place(f"{name}.direction", 0.0 if direction is None else direction, "angle")
-    return Line(link, through[0] if through else None, angle)
+        return LinkLine(link, through[0], 0.0, through[1])
+    angle = builder.place((*path[:-1], "direction"), 0.0 if direction is None else direction, "angle")
+    return LinkLine(link, through[0] if through else None, angle)
 
 
-def _line_of_joint(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
-    return _line(builder, name, section.through or (), section.direction, link, ("joints", name, "through"))
+def _line_of_joint(builder: Builder, name: str, section: Written[Joint], link: str) -> LinkLine:
+    return _line(builder, section.through or (), section.direction, link, ("joints", name, "through"))
 
 
-def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic:
+def _prismatic(builder: Builder, name: str, section: Written[Joint], pair: tuple[str, str]) -> Prismatic:
     path: KeyPath = ("joints", name)
     _check_named(builder, "link", pair, (*path, "prismatic"))
     guide, slider = pair
@@ -143,11 +127,11 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[s
     elif len(points) != 1:
         _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
     line = _line_of_joint(builder, name, section, guide)
-    angle = builder.place(f"{name}.angle", 0.0 if section.angle is None else section.angle, "angle")
+    angle = builder.place((*path, "angle"), 0.0 if section.angle is None else section.angle, "angle")
     return Prismatic(name, line, slider, section.point or points[0], angle)
 
 
-def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot:
+def _slot(builder: Builder, name: str, section: Written[Joint], guide: str) -> Slot:
     path: KeyPath = ("joints", name)
     _check_named(builder, "link", (guide,), (*path, "slot"))
     if section.point is None:
@@ -159,7 +143,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
     return Slot(name, _line_of_joint(builder, name, section, guide), section.point)
 
 
-def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
+def _fixed(builder: Builder, name: str, section: Written[Joint], pair: tuple[str, str]) -> Fixed:
     path: KeyPath = ("joints", name)
     _check_named(builder, "link", pair, (*path, "fixed"))
     shared = [point for point in builder.section.points_of(pair[0]) if point in builder.section.points_of(pair[1])]
@@ -171,14 +155,14 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
         _refuse(builder, path, message)
     point = section.point or shared[0]
     if section.angle is not None:
-        return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
+        return Fixed(name, pair, point, builder.place((*path, "angle"), section.angle, "angle"))
     one, other = (builder.link_direction(link) for link in pair)
     if one is None or other is None:
         lost = pair[0] if one is None else pair[1]
         message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
         _refuse(builder, path, message)
     angle = (other - one) / builder.units.angle_factor
-    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
+    return Fixed(name, pair, point, builder.place((*path, "angle"), angle, "angle", measured=True))
 
 
 def _check_pins(builder: Builder) -> None:
@@ -272,7 +256,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
                     mistake = "the angle of a link from itself never changes; name another link"
                     builder.report(("drives", name, "from"), mistake)
         if right:
-            drives[name] = Drive(name, kind, item, reference)
+            drives[name] = Drive(name, **{kind: item, "from_": reference})
     return drives
 
 
@@ -296,10 +280,10 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             noun, listed = "coordinate or parameter", [*above, *parameters]
             if all(builder.check_name(item, listed, noun, path) for item in sorted(expression.names)):
                 for item in expression.names & parameters.keys():
-                    builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
-                measures[name] = Measure(name, "expression", None, expression)
+                    builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
+                measures[name] = Measure(name, expression=expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
-            measures[name] = Measure(name, section.kind, pair)
+            measures[name] = Measure(name, **{section.kind: pair})
             one, other = (item.rpartition(".")[2] for item in pair)
             if section.distance is not None and one == other:
                 message = f"{one!r} twice is one place, whose distance has no sign: give {pair[1]}.x - {pair[0]}.x"
@@ -308,23 +292,11 @@ def _measures(builder: Builder) -> dict[str, Measure]:
     return measures
 
 
-# Kinds of a spring's numbers between points, and between links.
-_SPRING_KINDS: Mapping[str, tuple[Physical | Quantity, Physical | Quantity]] = {
-    "stiffness": ("stiffness", "rotational_stiffness"),
-    "preload": ("force", "moment"),
-    "damping": ("damping", "rotational_damping"),
-    "force": ("force", "moment"),
-    "rise": ("stiffness", "rotational_stiffness"),
-    "free_length": ("length", "length"),
-    "free_angle": ("angle", "angle"),
-}
-
-
 def _springs(builder: Builder) -> dict[str, Spring]:
     """Springs without mistakes in their names; their numbers become places."""
     section, springs = builder.section, dict[str, Spring]()
     for name, spring in section.springs.items():
-        path: KeyPath = ("springs", name)
+        path = ("springs", name)
         one, other = spring.between
         turning = any(end in section.links for end in spring.between)
         turning &= not any(end in section.owners or end in section.ends for end in spring.between)
@@ -334,21 +306,14 @@ def _springs(builder: Builder) -> dict[str, Spring]:
             pair = f"{one!r} and itself" if one == other else f"{one!r} and {other!r}, which are one place,"
             builder.report((*path, "between"), f"a spring between {pair} does nothing")
             continue
-        wrong = ("free_length", "force", "rise") if turning else ("free_angle",)
-        for key in spring.given(*wrong):
+        for key in spring.given(*Spring.foreign(turning=turning)):
             kind, right = ("links", "free_angle") if turning else ("points", "free_length")
             builder.report((*path, key), f"between two {kind} there is no {key!r}; its stiffness counts from {right!r}",
                            at_key=True)  # fmt: skip
-        terms: dict[str, Term] = {}
-        for key in spring.given(*_SPRING_KINDS):
-            kind = _SPRING_KINDS[key][turning]
-            builder.reporter.kind((*ROOT, *path, key), kind)
-            terms[key] = builder.place(f"{name}.{key}", getattr(spring, key), kind)
-        springs[name] = Spring(
-            name, spring.between, turning, terms.get("stiffness", terms.get("rise", 0.0)),
-            terms.get("free_angle" if turning else "free_length", 0.0), terms.get("preload", 0.0),
-            terms.get("force", 0.0), terms.get("damping", 0.0),
-        )  # fmt: skip
+        numbers = builder.numbers(spring, *path, turning=turning)
+        for key in numbers:
+            builder.reporter.kind((*ROOT, *path, key), builder.places[f"{name}.{key}"].quantity)
+        springs[name] = Spring(name, spring.between, turning=turning, **numbers)
     return springs
 
 
@@ -357,7 +322,7 @@ def _friction(builder: Builder) -> dict[str, Friction]:
     section, friction = builder.section, dict[str, Friction]()
     names = [*section.owners, *section.slides, *section.legs]
     for name, given in section.friction.items():
-        path: KeyPath = ("friction", name)
+        path = ("friction", name)
         joint = section.joints.get(name)
         if joint is not None and joint.fixed is not None:
             builder.report(path, f"{name!r} is a clamp, in which nothing moves: leave it out", at_key=True)
@@ -381,40 +346,35 @@ def _friction(builder: Builder) -> dict[str, Friction]:
             if given.length is not None and joint is not None and joint.slot:
                 message = "the pin in a slot bears no moment: its friction has no 'length'"
                 builder.report((*path, "length"), message, at_key=True)
-        kinds: dict[str, Quantity] = {"coefficient": "none", "radius": "length", "length": "length"}
-        terms = {
-            key: builder.place(f"friction.{name}.{key}", getattr(given, key), kinds[key]) for key in given.given(*kinds)
-        }
-        friction[name] = Friction(name, terms["coefficient"], terms.get("radius"), terms.get("length"))
+        friction[name] = Friction(name, **builder.numbers(given, *path))
     return friction
 
 
 def _plates(builder: Builder) -> Plates | None:
     """Plates without mistakes in their names, where the study gives a width; their numbers become places."""
-    given, links = builder.section.plates or models.Plates(), builder.section.links
+    given, links = builder.section.plates, builder.section.links
     widths = {
-        name: builder.place(f"{name}.width", link.width) for name, link in links.items() if link.width is not None
+        name: builder.place(("links", name, "width"), link.width)
+        for name, link in links.items()
+        if link.width is not None
     }
     layers = {name: link.layer for name, link in links.items() if link.layer is not None}
-    lengths = {
-        key: builder.place(f"plates.{key}", getattr(given, key))
-        for key in given.given("width", "pin", "thickness", "kerf", "sheet")
-    }
+    lengths = builder.numbers(given, "plates") if given is not None else {}
     if "width" not in lengths and not widths:
-        if builder.section.plates is not None:
+        if given is not None:
             builder.report(("plates",), "plates need a 'width', of all or of a link", at_key=True)
         for name in layers:
             builder.report(("links", name), "a 'layer' belongs to plates; give mechanism.plates.width", at_key=True)
         return None
     lengths.setdefault("width", min(widths.values(), key=builder.nominal, default=0.0))
     pins = {
-        name: builder.place(f"plates.{name}.pin", diameter)
-        for name, diameter in given.pins.items()
+        name: builder.place(("plates", "pins", name), diameter)
+        for name, diameter in (given.pins if given is not None else {}).items()
         if builder.reporter.check_name(
             name, builder.section.owners, "point", (*ROOT, "plates", "pins", name), at_key=True
         )
     }
-    plates = Plates(**lengths, widths=widths, pins=pins, layers=layers)
+    plates = Plates("plates", **lengths, widths=widths, pins=pins, layers=layers)
     _check_holes(builder, plates)
     return plates
 
@@ -440,7 +400,7 @@ def _check_holes(builder: Builder, plates: Plates) -> None:
         builder.report(key, message, at_key=True)
 
 
-def _clamped_at(builder: Builder, clamp: models.Joint, point: str) -> bool:
+def _clamped_at(builder: Builder, clamp: Written[Joint], point: str) -> bool:
     assert clamp.fixed is not None
     one, other = (builder.section.points_of(link) for link in clamp.fixed)
     return point == (clamp.point or next((shared for shared in one if shared in other), None))
@@ -467,19 +427,21 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
             builder.report(path, f"{given.set_!r} cannot follow itself")
             continue
         angle = given.pressure_angle
-        pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
+        pressure = Coupling.pressure_angle if angle is None else angle * builder.units.angle_factor
         if not 0 <= pressure < np.pi / 2:
             builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
-        builder.place(play(name), 0.0, kind)
+        builder.place((play(name),), 0.0, kind)
         cam = None
         if given.cam is not None:
             with contextlib.suppress(_WrongJoint):
                 cam = _cam(builder, name, given, sets, function)
-        couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0, cam)
+        couplings[name] = Coupling(
+            name, sets, function, wheels=given.wheels, pressure_angle=pressure, radius=given.radius or 0.0, cam=cam
+        )
     return couplings
 
 
-def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, function: Expression) -> Cam:
+def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, function: Expression) -> Cam:
     """The cam of a coupling; `sets` is the coordinate that follows."""
     section, given, path = builder.section, coupling.cam, ("couplings", name, "cam")
     assert given is not None
@@ -495,10 +457,10 @@ def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, func
         _refuse(builder, key, f"point {through[0]!r} is on the cam {given.link!r} itself; give one of its follower")
     link = next((link for link in _moved(section, sets) if link in owners), owners[0])
     if given.flat is None:
-        face = Line(link, through[0])
-        radius = builder.place(f"{name}.radius", given.radius or 0.0)
+        face = LinkLine(link, through[0])
+        radius = builder.place((*path, "radius"), given.radius or 0.0)
     else:
-        face, radius = _line(builder, name, through, given.direction, link, key), None
+        face, radius = _line(builder, through, given.direction, link, key), None
     span, kind = given.range, section.coordinates[followed[0]]
     builder.reporter.kind((*ROOT, *path, "range"), kind)
     if span is None:
@@ -507,7 +469,8 @@ def _cam(builder: Builder, name: str, coupling: models.Coupling, sets: str, func
             _refuse(builder, path, f"the profile needs the 'range' of {followed[0]!r}, [first, last]")
         span = (0.0, 2 * np.pi / builder.units.angle_factor) if table is None else (table.rows[0][0], table.rows[-1][0])
     factor = builder.units.angle_factor if kind == "angle" else 1.0
-    return Cam(given.link, face, radius, given.side, (span[0] * factor, span[1] * factor), given.steps)
+    span = span[0] * factor, span[1] * factor
+    return Cam(name, given.link, radius=radius, side=given.side, range=span, steps=given.steps, face=face)
 
 
 def _moved(section: models.MechanismSection, name: str) -> tuple[str, ...]:
@@ -518,21 +481,22 @@ def _moved(section: models.MechanismSection, name: str) -> tuple[str, ...]:
 
 
 def _function(
-    builder: Builder, name: str, given: models.Coupling, path: KeyPath, kind: Quantity
+    builder: Builder, name: str, given: Written[Coupling], path: KeyPath, kind: Quantity
 ) -> Expression | None:  # fmt: skip
     """The function of a coupling; None where it has a mistake, which is reported."""
     section, unit = builder.section, builder.units.angle_factor
-    if given.to is not None:
+    to: Expression | None = given.to
+    if to is not None:
         parameters = builder.parameter_values
-        names = sorted(given.to.names)
+        names = sorted(to.names)
         listed = [*section.coordinates, *section.moving, *section.slides, *parameters]
         if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
             return None
-        for item in given.to.names & parameters.keys():
-            builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
+        for item in to.names & parameters.keys():
+            builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
         named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
-        return replace(given.to.substituted(named), angle_unit=unit)
+        return replace(to.substituted(named), angle_unit=unit)
     assert given.of is not None
     listed = [*section.coordinates, *section.moving, *section.slides]
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
@@ -542,7 +506,6 @@ def _function(
         table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
     assert given.ratio is not None
-    ratio, phase = f"{name}.ratio", f"{name}.phase"
     if float(given.ratio) == 0.0:
         message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
         builder.report((*path, "ratio"), message)
@@ -550,8 +513,8 @@ def _function(
     if section.coordinates[of] == kind or unit != 1.0:
         builder.reporter.kind((*ROOT, *path, "ratio"), "none")
     builder.reporter.kind((*ROOT, *path, "phase"), kind)
-    builder.place(ratio, given.ratio, "none", in_coupling=True)
-    builder.place(phase, 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
+    ratio = builder.place((*path, "ratio"), given.ratio, "none", in_coupling=True)
+    phase = builder.place((*path, "phase"), 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
     steps: tuple[Step, ...] = (("name", ratio), ("name", of), ("call", "*"), ("name", phase), ("call", "+"))
     return Expression(f"{ratio}*{of} + {phase}", steps, unit)
 
@@ -604,7 +567,7 @@ def _with_phases(builder: Builder, description: Description) -> Description:
         follower, followed = (0.0 if value is None else value / unit for value, unit in zip(drawn, units, strict=True))
         if drawn[0] is not None:
             phase = follower - description.places[f"{name}.ratio"].nominal * followed
-            builder.place(f"{name}.phase", phase, pair.follower.quantity, measured=True, in_coupling=True)
+            builder.place(("couplings", name, "phase"), phase, pair.follower.quantity, measured=True, in_coupling=True)
     return description
 
 
@@ -613,29 +576,29 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
     limits = []
     for index, section in enumerate(builder.section.limits):
         path: KeyPath = ("limits", index)
-        kind, named = section.kind, getattr(section, section.kind)
-        items: tuple[str, ...] = named if isinstance(named, tuple) else (named,)
+        kind, items = section.kind, section.items
         right = builder.check_named(kind, items, (*path, kind))
         quantity: Quantity = "angle" if kind == "angle" else "length"
         if kind in ("drive", "measure"):
             quantity = (builder.section.driven_kinds if kind == "drive" else builder.section.measured_kinds).get(
-                named, "none"
+                items[0], "none"
             )
-        bounds: list[Term | None] = []
+        bounds: dict[str, Any] = {}
         for end, value in (("min", section.min), ("max", section.max)):
             if quantity != "none":
                 builder.reporter.kind((*ROOT, *path, end), quantity)
-            bounds.append(None if value is None else builder.place(f"limits.{index}.{end}", value, quantity))
+            if value is not None:
+                bounds[end] = builder.place((*path, end), value, quantity)
         expression = (
-            kind == "measure" and named in builder.section.measures and builder.section.measures[named].expression
+            kind == "measure" and items[0] in builder.section.measures and builder.section.measures[items[0]].expression
         )
         _check_bounds(builder, section, "none" if expression else quantity, path)
         if right:
-            limits.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
+            limits.append(Limit(f"limits.{index}", **{kind: getattr(section, kind)}, **bounds))
     return tuple(limits)
 
 
-def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: KeyPath) -> None:
+def _check_bounds(builder: Builder, section: Written[Limit], quantity: Quantity, path: KeyPath) -> None:
     low, high = section.min, section.max
     if low is not None and high is not None and high < low:
         also = "; add a full turn to it" if quantity == "angle" else ""

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Expression, Number
-from mechdesign.mechanism.model import MEASURED, Place
+from mechdesign.mechanism.elements.couplings import MEASURED
+from mechdesign.mechanism.model import Place
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,27 @@ from contextlib import suppress
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
-from mechdesign.errors import cut, suggestion
+from mechdesign.errors import cut
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.elements.couplings import Coupling
+from mechdesign.mechanism.elements.declared import Quantity
+from mechdesign.mechanism.elements.drives import Drive
+from mechdesign.mechanism.elements.joints import Friction, Joint
+from mechdesign.mechanism.elements.links import Link
+from mechdesign.mechanism.elements.measures import Limit, Measure
+from mechdesign.mechanism.elements.plates import Plates
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, OF_LINKS
-from mechdesign.mechanism.model import Quantity
 from mechdesign.notation import ExpressionError
+from mechdesign.study.building import notations
+from mechdesign.study.building.elements import Written
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.inputs import file_of
-from mechdesign.study.text.units import Amount, QuantityError, check_unit
+from mechdesign.study.text.units import QuantityError, check_unit
 
-LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod", "width", "layer")
 _BRANCHES = {
     "side": "in every pose each joint lies on the side on which the sketch has it",
     "follow": "a sweep goes on smoothly through change points, where the sides meet",
@@ -31,460 +39,14 @@ _BRANCHES = {
 TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
 
 
-def names_to_mapping(raw: Any) -> Any:
-    """Bring ``[A, B]`` to ``{A: null, B: null}``; anything else passes."""
-    if not isinstance(raw, list):
-        return raw
-    for name in raw:
-        if not isinstance(name, str):
-            raise failure(f"expected a name, not {shown(name)}")
-        if raw.count(name) > 1:
-            raise failure(f"{name!r} is listed twice")
-    return dict.fromkeys(raw)
-
-
-Point = Annotated[tuple[fields.LengthPlace, fields.LengthPlace], fields.pair_of("[x, y]")]
-PointValues = tuple[Amount, Amount]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
-TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
-TwoEnds = Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two names")]
-
-
-class Rod(fields.Model):
-    """Mass of the second body of a telescopic link, whose frame has its origin at ``to`` and the link's direction."""
-
-    mass: fields.NonNegativeMassPlace
-    """Mass of this body. Example: 1.2 kg"""
-    center: Point | None = None
-    """Centre of mass, [x, y] from ``to``, x along the link. Left out: at ``to``. Example: [-100, 0]"""
-    inertia: fields.NonNegativeInertiaPlace | None = None
-    """Moment of inertia about the centre of mass. Left out: 0. Example: 0.004 kg*m^2"""
-
-
-class Link(fields.Model):
-    """A rigid body: [from, to, length], a telescopic leg, or its points in its own frame, {Q: [0, 0], S: [3, 1]}."""
-
-    short = (
-        {
-            "type": "array",
-            "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM],
-            "minItems": 2,
-            "maxItems": 3,
-        },
-        {
-            "type": "object",
-            "additionalProperties": {"anyOf": [fields.PAIR_FORM, {"type": "null"}]},
-            "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
-        },
-    )
-    from_: fields.PointName | None = Field(None, alias="from")
-    """First end of a binary link: origin of its frame, whose x axis leads to ``to``."""
-    to: fields.PointName | None = None
-    """Second end of a binary link."""
-    length: fields.PositiveLengthPlace | None = None
-    """Distance from ``from`` to ``to``. Left out: measured from the sketch. Example: 90 Example: 90 mm"""
-    telescopic: bool = False
-    """Whether the length is a coordinate, NAME.length: two bodies and a slide. Further points belong to the body at
-    ``from``; ``length`` is left out.
-    """
-    points: Annotated[
-        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
-    ] = Field(default_factory=dict)
-    """Points in the link's own frame, [x, y]; of a binary link those besides its ends. A list of names, or a point
-    without a place, is measured from the sketch. Example: {P: [60, 15]}
-    """
-
-    mass: fields.NonNegativeMassPlace | None = None
-    """Mass; of a telescopic link that of the body at ``from``. Left out: that of its beams where stiffness has a
-    ``density``, else massless. Example: 0.5 kg
-    """
-    center: Point | None = None
-    """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its joints; of a link
-    with a single joint, of its ends, or of all its points. Example: [45, 0]
-    """
-    inertia: fields.BarInertiaPlace | None = None
-    """Moment of inertia about the centre of mass; 'rod' is that of a slender bar between its two joints, m l^2/12. Left
-    out: 0, a point mass. Example: 0.002 kg*m^2 Example: rod
-    """
-    rod: Rod | None = None
-    """Mass of the second body of a telescopic link, the one with ``to``. Example: {mass: 1.2 kg, center: [-100, 0]}"""
-    width: fields.PositiveLengthPlace | None = None
-    """Width of the link as a plate: its ends are round with half of it. Left out: that of ``plates``. Example: 12 mm"""
-    layer: Annotated[int, fields.whole(1, 1000)] | None = None
-    """Layer in which the link lies as a plate, counted from the bottom. Left out: `mechdesign export --to layers.csv`
-    finds one. Example: 2
-    """
-
-    @model_validator(mode="before")
-    @classmethod
-    def _long_form(cls, raw: Any) -> Any:
-        if isinstance(raw, list):
-            if len(raw) not in (2, 3):
-                raise failure("expected [from, to, length], {from, to, length} or the link's points {A: [x, y], ...}")
-            return dict(zip(("from", "to", "length"), raw, strict=False))
-        if not isinstance(raw, dict):
-            expected = "[from, to, length], {from, to, length} or its points {A: [x, y], ...}"
-            raise failure(f"expected a link, {expected}, not {shown(raw)}")
-        # A point may be named `center`, or `rod`.
-        if any(key in raw and (key in LINK_KEYS[:6] or not isinstance(raw[key], list)) for key in LINK_KEYS):
-            for key, value in raw.items():
-                if key not in LINK_KEYS and isinstance(value, list):
-                    raise failure(f"beside 'from', 'to' and 'length' a point stands under 'points': {{{key}: [x, y]}}")
-            return raw
-        for key, value in raw.items():
-            if not isinstance(value, list) and value is not None:
-                hint = suggestion(key, LINK_KEYS)
-                raise failure(f"{key!r} is neither a key of a link nor a point [x, y]{hint}")
-        return {"points": raw}
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Link:
-        if (self.from_ is None) != (self.to is None):
-            raise failure("a binary link needs both 'from' and 'to'")
-        if self.from_ is None:
-            if self.length is not None or self.telescopic:
-                raise failure("a length belongs to a link with 'from' and 'to'")
-            if not self.points:
-                raise failure("a link needs at least one point, such as {A: [0, 0]}")
-        elif self.from_ == self.to:
-            raise failure(f"a link from {self.from_!r} to itself")
-        elif self.telescopic and self.length is not None:
-            raise failure("a telescopic leg has no fixed length; leave out 'length', or 'telescopic'")
-        if self.mass is None and (extra := self.given("center", "inertia")):
-            raise failure(f"{extra[0]!r} belongs to a mass; give 'mass'")
-        if self.rod is not None and not self.telescopic:
-            raise failure("'rod' is the second body of a telescopic link; give 'mass'")
-        for end in (self.from_, self.to):
-            if end in self.points:
-                raise failure(f"point {end!r} is an end of the link; its place in the frame is not given twice")
-        return self
-
-
-def _through(raw: Any) -> Any:
-    if isinstance(raw, str):
-        return [raw]
-    if not isinstance(raw, list) or len(raw) != 2:
-        raise failure(f"expected a point or two points [P, R], not {shown(raw)}")
-    return raw
-
-
-Line = Annotated[
-    tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort({**fields.NAME_FORM, "title": "point"})
-]
-
-
-class Joint(fields.Model):
-    """A joint that is not a pin: exactly one of ``prismatic``, ``slot`` and ``fixed``."""
-
-    one_of = ("a joint is one of prismatic: [a, b], slot: a, fixed: [a, b]", "prismatic", "slot", "fixed")
-    prismatic: TwoLinks | None = None
-    """Slide between links [a, b]: ``point`` of b moves along a line of a, and b does not turn against a. Example:
-    [ground, slider]
-    """
-    slot: fields.LinkName | None = None
-    """Link with a straight slot in which ``point`` of another link slides and turns. Example: yoke"""
-    fixed: TwoLinks | None = None
-    """Links [a, b] clamped to each other at a point that both have. Example: [leg_1, platform]"""
-    through: Line | None = None
-    """Point of the first link that the line goes through, where the slide is 0; two points [P, R] give the direction as
-    well. Left out: the origin of the link's frame. Example: G Example: [P, R]
-    """
-    direction: fields.AnglePlace | None = None
-    """Angle of the line from the first link's x axis, counter-clockwise: the way in which the slide counts. Left out:
-    0, unless ``through`` has two points. Example: 90
-    """
-    point: fields.PointName | None = None
-    """The point of the other link that moves along the line; of a clamp the shared point. Left out: the only one there
-    is; a slot needs it. Example: B
-    """
-    angle: fields.AnglePlace | None = None
-    """Of a slide, angle from the line's direction to b's x axis, which stays (left out: 0). Of a clamp, from a's x axis
-    to b's (left out: measured from the sketch). Example: 90
-    """
-
-    @model_validator(mode="after")
-    def _fitting(self) -> Joint:
-        foreign = {"prismatic": (), "slot": ("angle",), "fixed": ("through", "direction")}
-        for key in self.given(*foreign[self.kind]):
-            raise failure(f"a {self.kind} joint has no {key!r}")
-        if self.through is not None and len(self.through) == 2 and self.direction is not None:
-            raise failure("'through' two points gives the direction; leave 'direction' out")
-        return self
-
-
-class Drive(fields.Model):
-    """A driven coordinate: exactly one of ``angle``, ``length`` and ``slide``."""
-
-    one_of = ("a drive is one of angle: link, length: leg, slide: joint", "angle", "length", "slide")
-    angle: fields.LinkName | None = None
-    """Link whose angle is driven, from the world's x axis or from the link ``from``. Example: crank"""
-    from_: fields.LinkName | None = Field(None, alias="from")
-    """Link from whose x axis the angle counts. Left out: the ground, and so the world. Example: upper_arm"""
-    length: fields.LinkName | None = None
-    """Telescopic link whose length is driven. Example: leg_1"""
-    slide: fields.JointName | None = None
-    """Joint (slide or slot) whose displacement is driven: from ``through`` along the line. Example: guide"""
-
-    @model_validator(mode="after")
-    def _of_an_angle(self) -> Drive:
-        if self.from_ is not None and self.angle is None:
-            raise failure("'from' belongs to an angle")
-        return self
-
-
-class Measure(fields.Model):
-    """A named quantity: exactly one of ``angle``, ``distance`` and ``expression``; a text alone is an expression."""
-
-    bare, short = "expression", ({**fields.NAME_FORM, "title": "expression"},)
-    one_of = (
-        "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates and parameters",
-        "angle",
-        "distance",
-        "expression",
-    )
-    angle: TwoLinks | None = None
-    """Angle from the first link's x axis to the second's, [a, b]. Example: [rod, rocker]"""
-    distance: TwoEnds | None = None
-    """Distance between two points, [P, Q]; of a pin that gives or has a clearance rod.B is its end on link rod.
-    Example: [P, Q]
-    """
-    expression: str | None = None
-    """Expression over coordinates, also of a link's end of a pin (rod.B.x), parameters and the measures above it.
-    Example: B.x - A.x
-    """
-
-
-class Spring(fields.Model):
-    """A spring or damper between two points of any links, or between two links."""
-
-    between: Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two points or two links")]
-    """Two points, which it pulls together, or two links [a, b], of which it turns b back. Example: [S, B] Example:
-    [ground, rocker]
-    """
-    stiffness: fields.NonNegativePlace | None = None
-    """Force per length, or moment per radian. Example: 2 N/mm Example: 3 N*m/rad"""
-    free_length: fields.NonNegativeLengthPlace | None = None
-    """Distance of the points at which the stiffness pulls with no force; 0 is allowed. Example: 60"""
-    free_angle: fields.AnglePlace | None = None
-    """Angle from the first link's x axis to the second's at which it turns with no moment. Its whole turns count, and
-    those of the links from the sketch on. Example: 20 deg Example: -250 deg
-    """
-    preload: fields.AnyPlace | None = None
-    """Pull, or moment, at the free length or angle. Left out: 0. Example: 5 N"""
-    damping: fields.NonNegativePlace | None = None
-    """Force per velocity, or moment per radian in a unit of time. Left out: 0. Example: 0.01 N*s/mm"""
-    force: fields.AnyPlace | None = None
-    """Of a gas spring the force with which it pushes its points apart. Example: 400 N"""
-    rise: fields.NonNegativePlace | None = None
-    """Of a gas spring what this force grows by per length that it is shorter than ``free_length``. Left out: 0.
-    Example: 0.4 N/mm
-    """
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Spring:
-        if self.force is not None:
-            if other := self.given("stiffness", "preload", "free_angle"):
-                raise failure(f"a gas spring has 'force' and 'rise', no {other[0]!r}")
-            if (self.rise is None) != (self.free_length is None):
-                raise failure("the 'rise' of a gas spring counts from its 'free_length'; give both or none")
-        elif self.rise is not None:
-            raise failure("'rise' belongs to the 'force' of a gas spring")
-        elif not self.given("stiffness", "preload", "damping"):
-            raise failure("a spring needs a 'stiffness', a 'preload', a 'damping' or the 'force' of a gas spring")
-        elif self.stiffness is not None and len(self.given("free_length", "free_angle")) != 1:
-            raise failure("a stiffness counts from a 'free_length' between points, or a 'free_angle' between links")
-        return self
-
-
-_WHEELS = {
-    "gears": "wheels with teeth, whose force acts where the pitch circles touch; or a pinion and its rack",
-    "belt": "pulleys with a belt or chain, or with crossed ones for a negative ratio",
-    "none": "a controller or what is not drawn: moments alone act on the links",
-}
-_TABLE_FORM: fields.Form = {"type": ["string", "object", "array"], "title": "table"}
-
-
-def _table(raw: Any, context: Context) -> str | tuple[tuple[float, ...], ...]:
-    file = file_of(raw)
-    if file is not None:
-        return file
-    if not isinstance(raw, list):
-        raise failure(f"expected a file of two columns, lift.csv, or rows [[0, 0], [30, 2.5], ...], not {shown(raw)}")
-    return read_rows(raw, context, 2, "every row holds two numbers", "an empty table")
-
-
-_SIDES = {
-    "outer": "its follower runs around the outside of the cam",
-    "inner": "its follower runs inside of the cam, a ring",
-    "groove": "its roller runs in a groove, which has both sides and holds it",
-}
-
-
-class Cam(fields.Model):
-    """A cam, and how its follower touches it: ``roller`` or ``flat``."""
-
-    one_of = ("the follower of a cam has one of roller: point, flat: point", "roller", "flat")
-    link: fields.LinkName
-    """Link that is the cam; the ground may be one. Example: cam"""
-    roller: fields.PointName | None = None
-    """Point of the follower that is the centre of its roller. Example: F"""
-    radius: fields.NonNegativeLengthPlace | None = None
-    """Radius of the roller; 0 is a knife edge. Example: 8 mm"""
-    flat: Line | None = None
-    """Point of the follower on its flat face; two points [P, R] give the face's direction as well. Example: F"""
-    direction: fields.AnglePlace | None = None
-    """Angle of the flat face from the follower's x axis. Left out: 0, unless ``flat`` has two points. Example: 90"""
-    side: Annotated[str, fields.choice(_SIDES, "side of a cam")] = "outer"
-    """Side of the profile on which the follower runs; the origin of the cam's frame is inside."""
-    range: Annotated[tuple[fields.Number, fields.Number], fields.pair_of("[first, last]")] | None = None
-    """First and last value of the coordinate that is followed, of the profile. Left out: the range of the ``table``, of
-    an angle a turn from 0. Example: [0, 120]
-    """
-    steps: Annotated[int, fields.whole(8, 100_000)] = 360
-    """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Cam:
-        if self.roller is not None and self.radius is None:
-            raise failure("a roller has a 'radius', 0 of a knife edge")
-        if foreign := self.given("direction") if self.roller is not None else self.given("radius"):
-            raise failure(f"a {self.kind} follower has no {foreign[0]!r}")
-        if self.flat is not None and self.side == "groove":
-            raise failure("a flat face runs in no groove; give a 'roller'")
-        if self.flat is not None and len(self.flat) == 2 and self.direction is not None:
-            raise failure("'flat' with two points gives the direction; leave 'direction' out")
-        if self.range is not None and not self.range[0] < self.range[1]:
-            raise failure("a range rises from its first value to its last")
-        return self
-
-
-class Coupling(fields.Model):
-    """A coordinate that follows others, by gears, a rack, a belt, a cam or a controller: ``set`` and one of ``to``,
-    ``ratio`` and ``table``.
-    """
-
-    one_of = (
-        "a coupling gives what it sets by one of to: expression, ratio: number, table: file", "to", "ratio", "table",
-    )  # fmt: skip
-    set_: fields.CoordinateName = Field(alias="set")
-    """Coordinate that follows: an angle of a link, a slide or a length; the name of a link, joint or leg stands for it.
-    Example: planet.angle
-    """
-    to: fields.Bound | None = None
-    """Expression of coordinates and parameters, in the study's units; the name of a link, joint or leg stands for its
-    coordinate. Example: -2.5*sun + 3.5*arm
-    """
-    of: fields.CoordinateName | None = None
-    """Coordinate that is followed, of a ``ratio`` or a ``table``. Example: sun.angle"""
-    ratio: fields.AnyPlace | None = None
-    """What the coordinate that follows changes by for each unit of the other, in the study's units. Example: -2.5"""
-    phase: fields.AnyPlace | None = None
-    """Value of the coordinate that follows where the other is 0, with a ``ratio``. Left out: as the sketch shows.
-    Example: 30
-    """
-    table: Annotated[str | tuple[tuple[float, ...], ...], fields.Read(_table, _TABLE_FORM)] | None = None
-    """Rows of the coordinate that is followed and the one that follows, or a file of two such columns; between them a
-    cubic spline. It repeats if it spans a turn and ends as it begins. Example: lift.csv
-    """
-
-    wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
-    """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
-    radius: Annotated[float, fields.number("length", 0.0, exclusive=True, fixed=True)] | None = None
-    """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
-    pressure_angle: Annotated[float, fields.number("angle", fixed=True)] | None = None
-    """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
-    cam: Cam | None = None
-    """The cam that moves what follows, whose profile, pressure angle and contact force are then known. Example:
-    {link: cam, roller: F, radius: 8}
-    """
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Coupling:
-        if self.to is not None and self.of is not None:
-            raise failure("'of' belongs to a 'ratio' or a 'table'; an expression names its coordinates itself")
-        if self.to is None and self.of is None:
-            raise failure("a coupling by 'ratio' or 'table' needs 'of', the coordinate that is followed")
-        if self.radius is not None and self.wheels != "belt":
-            raise failure("the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out")
-        if self.phase is not None and self.ratio is None:
-            raise failure("'phase' belongs to a 'ratio'")
-        if self.cam is not None and (foreign := self.given("radius", "pressure_angle")):
-            raise failure(f"{foreign[0]!r} belongs to wheels; a cam has its own, in 'cam'")
-        return self
-
-
-class Friction(fields.Model):
-    """Coulomb friction of a pin, a slide, a slot or a telescopic link."""
-
-    coefficient: fields.NonNegativePurePlace
-    """Coefficient of friction. Example: 0.1"""
-    radius: fields.NonNegativeLengthPlace | None = None
-    """Radius of the pin: friction turns against coefficient times radius times joint force. Example: 5"""
-    length: fields.PositiveLengthPlace | None = None
-    """Of a slide whose slider does not turn, the distance of the ends of the guide that bear it, from one side of its
-    point to the other: the force across it and its moment press on both. Left out: the force across alone counts.
-    Example: 40
-    """
-
-
-class Plates(fields.Model):
-    """Links as flat plates that are cut to size, and the pins that join them."""
-
-    width: fields.PositiveLengthPlace | None = None
-    """Width of every link that has none of its own: the outline is as far from its points as half of it. Left out: the
-    least ``width`` of a link. Example: 20 mm
-    """
-    pin: fields.PositiveLengthPlace | None = None
-    """Diameter of every pin and its holes. Left out: 0.4 of ``width``. Example: 6 mm"""
-    thickness: fields.PositiveLengthPlace | None = None
-    """Thickness of a plate, and so the height of a layer. Left out: 0.25 of ``width``. Example: 5 mm"""
-    pins: dict[fields.PointName, fields.PositiveLengthPlace] = Field(default_factory=dict)
-    """Diameters of pins that differ, by their point. Example: {A: 8 mm}"""
-    kerf: fields.NonNegativeLengthPlace | None = None
-    """Width of the cut that laser, water or wire takes away: outlines are larger by half of it, holes smaller. Left
-    out: 0. Example: 0.2 mm
-    """
-    sheet: fields.PositiveLengthPlace | None = None
-    """Width of the sheet on which the parts lie in rows. Left out: 600 mm. Example: 300 mm"""
-
-
-class Limit(fields.Model):
-    """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
-
-    one_of = (
-        "a limit is one of distance: [P, Q], drive: name, angle: [a, b], measure: name",
-        "distance",
-        "drive",
-        "angle",
-        "measure",
-    )
-    distance: TwoPoints | None = None
-    """Two points whose distance is limited. Example: [P, Q]"""
-    drive: fields.DriveName | None = None
-    """Drive whose value is limited. Example: crank"""
-    angle: TwoLinks | None = None
-    """Links [a, b]: the angle from a's x axis to b's is limited, whole turns aside. It needs both ``min`` and ``max``.
-    Example: [rod, rocker]
-    """
-    measure: fields.MeasureName | None = None
-    """Measure whose value is limited. Example: gap"""
-    min: fields.AnyPlace | None = None
-    """Lowest value. Left out: none. Example: 10"""
-    max: fields.AnyPlace | None = None
-    """Highest value. Left out: none. Example: 2*r + 10"""
-
-    @model_validator(mode="after")
-    def _bounded(self) -> Limit:
-        if not self.given("min", "max"):
-            raise failure("a limit needs 'min', 'max' or both")
-        return self
 
 
 def _named_limits(raw: Any) -> Any:
     """What is given as {name: [low, high]} is told with the limits that it means."""
     for given in [raw] if isinstance(raw, dict) else raw if isinstance(raw, list) else []:
         name, bounds = next(iter(given.items()), ("gap", None)) if isinstance(given, dict) else ("", None)
-        if given is raw or (isinstance(bounds, list) and name not in Limit.fields_by_key()):
+        if given is raw or (isinstance(bounds, list) and name not in Limit.one_of):
             low, high = bounds if isinstance(bounds, list) and len(bounds) == 2 else (30, 150)
             written = cut(f"measure: {name}, min: {low}, max: {high}")
             raise failure(f"a limit says what it is of, a measure, drive, distance or angle: [{{{written}}}]")
@@ -529,45 +91,47 @@ class MechanismSection(fields.Model):
     parameters: dict[str, fields.AnyPlace] = Field(default_factory=dict)
     """Numbers with a name for expressions anywhere in the study; each may use those above it. Example: {r: 40, l: 3*r}
     """
-    links: Annotated[dict[fields.LinkName, Link], BeforeValidator(_not_too_many)]
+    links: Annotated[dict[fields.LinkName, Written[Link]], BeforeValidator(_not_too_many)]
     """Rigid bodies by name. ``ground`` is required; its frame is the world. A point that two links name is a pin
     between them. Example: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
     """
-    joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
+    joints: dict[fields.JointName, Written[Joint]] = Field(default_factory=dict)
     """What is not a pin, by a name of its own: slides, pins in slots, clamps. Example: {guide: {prismatic: [ground,
     slider], through: G}}
     """
     drives: Annotated[
-        dict[fields.DriveName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
+        dict[fields.DriveName, Written[Drive] | None],
+        BeforeValidator(notations.names_to_mapping),
+        fields.OrShort(fields.NAMES_FORM),
     ] = Field(default_factory=dict)
     """Driven coordinates by name, as many as the mobility. A list names links (their angle), telescopic links (their
     length) or joints (their slide). Example: [crank] Example: {theta: {angle: crank}}
     """
-    springs: dict[fields.SpringName, Spring] = Field(default_factory=dict)
+    springs: dict[fields.SpringName, Written[Spring]] = Field(default_factory=dict)
     """Springs and dampers by name. Example: {return: {between: [S, B], stiffness: 2, free_length: 60}}"""
-    couplings: dict[fields.CouplingName, Coupling] = Field(default_factory=dict)
+    couplings: dict[fields.CouplingName, Written[Coupling]] = Field(default_factory=dict)
     """Coordinates that follow others, by name; each takes one drive's place. Example: {mesh: {set: planet.angle, of:
     sun.angle, ratio: -2.5}} Example: {cam: {set: follower, to: 12 + 5*(1 - cos(2*crank))}}
     """
-    friction: dict[fields.JointName, Friction] = Field(default_factory=dict)
+    friction: dict[fields.JointName, Written[Friction]] = Field(default_factory=dict)
     """Friction of joints by the name of a point whose pin turns, a slide, a slot or a telescopic link. Example: {A:
     {coefficient: 0.1, radius: 5}, guide: {coefficient: 0.15, length: 40}}
     """
-    plates: Plates | None = None
+    plates: Written[Plates] | None = None
     """Links as plates: widths and pins, for `mechdesign export` and ``kinematics.collisions``. Example: {width: 20 mm,
     thickness: 5 mm, pin: 6 mm}
     """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
-    sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
+    sketch: dict[fields.PointName, notations.Point] = Field(default_factory=dict)
     """Rough places of the joints in the wanted assembly, [x, y]; any pose will do. In a dyad only the side on which
     each joint lies counts; what is left out elsewhere is measured here exactly. Example: {A: [0, 30], B: [75, 55]}
     """
-    measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
+    measures: dict[fields.MeasureName, Written[Measure]] = Field(default_factory=dict)
     """Named quantities, usable like coordinates: reported where ``outputs`` names them, limited, required, optimised.
     Example: {mu: {angle: [rod, rocker]}, lead: B.x - A.x}
     """
-    limits: Annotated[tuple[Limit, ...], BeforeValidator(_named_limits)] = ()
+    limits: Annotated[tuple[Written[Limit], ...], BeforeValidator(_named_limits)] = ()
     """What the motion keeps. A pose outside has valid 0 but keeps its positions; the nominal mechanism is judged.
     Example: [{distance: [P, Q], min: 10}, {drive: crank, max: 120}]
     """

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from typing import Any
 
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.model import Quantity
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath

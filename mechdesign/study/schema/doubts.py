@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
+from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description, Link
+from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.wheels import carrier_of
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection, PoseSection

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError, suggestion
+from mechdesign.study.building.builder import place_name
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.schema.variable import Variable
@@ -26,14 +27,8 @@ def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str
     section, *path = keys
     if section != "mechanism" or len(path) < 2:
         return ""
-    kind, owner, *rest = path
-    if kind == "parameters":
-        return str(owner) if owner in parameters else ""
-    if kind == "links" and rest:
-        rest = ["length"] if rest == [2] else [part for part in rest if part != "points"]
-        rest[-1] = "x" if rest[-1] == 0 else "y" if rest[-1] == 1 else rest[-1]
-    place = ".".join(map(str, ([kind] if kind in ("limits", "friction") else []) + [owner, *rest]))
-    return place if place in places else ""
+    name, among = (str(path[1]), parameters) if path[0] == "parameters" else (place_name(tuple(path)), places)
+    return name if name in among else ""
 
 
 class _Varied:

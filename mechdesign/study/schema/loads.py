@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
-from mechdesign.mechanism.model import Spring
 from mechdesign.motion.rows import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields

@@ -6,7 +6,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.report.figures.joints import MAX_JOINTS, Joint, joint_curves, joint_hodographs
+from mechdesign.report.figures.joints import MAX_JOINTS, JointLoad, joint_curves, joint_hodographs
 from mechdesign.report.figures.marks import Picture
 from mechdesign.report.figures.pictures import picture
 
@@ -31,7 +31,7 @@ def bearings_picture(view: DynamicsView) -> Picture | None:
         return None
     shown = view.drawn.shown
     both = [
-        Joint(joint.name, joint.words, np.stack([frame, frame * np.conj(_turns(view, joint))], axis=1))
+        JointLoad(joint.name, joint.words, np.stack([frame, frame * np.conj(_turns(view, joint))], axis=1))
         for joint in forces[:MAX_JOINTS]
         for frame in [joint.values[shown.rows, 0]]
     ]
@@ -39,7 +39,7 @@ def bearings_picture(view: DynamicsView) -> Picture | None:
     return joint_hodographs(view.study, both, titles, view.swept, cut=view.singular)
 
 
-def _turns(view: DynamicsView, joint: Joint) -> Complexes:
+def _turns(view: DynamicsView, joint: JointLoad) -> Complexes:
     """Unit vector of the x axis of the link on which a force acts; of a pin's that of the link that acts."""
     _, on, _, by = joint.words.split(" ")
     configuration = view.drawn.shown.configuration

@@ -13,7 +13,7 @@ from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import question_of
-from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
+from mechdesign.report.figures.joints import NOTHING, JointLoad, loaded, peak
 from mechdesign.report.figures.pictures import PosesView
 
 
@@ -65,15 +65,15 @@ class DynamicsView(PosesView):
         return np.asarray(self.column(f"{name}x") + 1j * self.column(f"{name}y"))
 
     @cached_property
-    def joints(self) -> tuple[list[Joint], list[Joint]]:
+    def joints(self) -> tuple[list[JointLoad], list[JointLoad]]:
         """Joints that bear a force, and joints that bear a moment, the most loaded first."""
         forces, moments = [], []
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             words = f"on {contact.on} by {contact.by}"
             called = name.replace("_force", "", 1).replace("_on_", " on ")
-            forces.append(Joint(called, words, self.force(f"{name}.f")[:, None]))
+            forces.append(JointLoad(called, words, self.force(f"{name}.f")[:, None]))
             if not contact.turns:
-                moments.append(Joint(called, words, self.column(f"{name}.moment")[:, None]))
+                moments.append(JointLoad(called, words, self.column(f"{name}.moment")[:, None]))
         largest = peak(forces)
         least = NOTHING * max(largest * self.study.mechanism.size, peak(moments))
         return loaded(forces, NOTHING * largest), loaded(moments, least)

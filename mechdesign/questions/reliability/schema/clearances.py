@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from mechdesign.mechanism.model import play
+from mechdesign.mechanism.elements.couplings import play
 from mechdesign.questions.reliability.laws import FITS, LAWS
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
 from mechdesign.questions.reliability.schema.methods import METHODS

@@ -12,7 +12,8 @@ from pydantic import model_validator
 
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
-from mechdesign.mechanism.model import MEASURED, Place
+from mechdesign.mechanism.elements.couplings import MEASURED
+from mechdesign.mechanism.model import Place
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.reliability.laws import LAWS, Distribution, Marginal
 from mechdesign.questions.reliability.schema.iso_tolerances import (

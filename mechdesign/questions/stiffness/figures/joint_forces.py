@@ -11,7 +11,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.joints import (
     MAX_JOINTS,
     NOTHING,
-    Joint,
+    JointLoad,
     joint_curves,
     joint_hodographs,
     loaded,
@@ -27,7 +27,7 @@ MAX_LOADS = 3  # each with a panel of forces and one of moments
 HEADING = "Static forces in the joints: the load alone, no inertia"
 
 
-def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joint]]:
+def borne(table: Table, poses: int, reach: float) -> tuple[list[JointLoad], list[JointLoad]]:
     """Joints that bear a force, and joints that bear a moment, the most loaded first.
 
     Parameters
@@ -49,8 +49,8 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
         massless = on[k] == "asked" or on[k].startswith(("pin:", "slot:"))
         words = f"on {'the pin' if massless else on[k]} by {by[k]}"
         called = f"{name} ({by[k]})" if names.count(name) > 1 else name
-        forces.append(Joint(called, words, x[..., k] + 1j * y[..., k]))
-        moments.append(Joint(called, words, turning[..., k]))
+        forces.append(JointLoad(called, words, x[..., k] + 1j * y[..., k]))
+        moments.append(JointLoad(called, words, turning[..., k]))
     largest = max((force.peak for force in forces), default=0.0)
     return loaded(forces, NOTHING * largest), loaded(moments, NOTHING * max(largest * reach, peak(moments)))
 
