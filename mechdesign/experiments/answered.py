@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.cautions import fails
 from mechdesign.errors import explain
 from mechdesign.experiments.case_numbers import CaseNumber, judged
-from mechdesign.motion.group import Group
+from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report import requirements
 from mechdesign.report.requirements import Verdict, command_of
@@ -119,7 +119,7 @@ class Sheet:
         why = "; ".join(message.splitlines())
         self._reasons[row][f"{command}: {why}" if command else why] = max(code, IMPOSSIBLE)
 
-    def note(self, rows: Ints, group: Group) -> None:
+    def note(self, rows: Ints, group: DesignGroup) -> None:
         """Add the answers of a group of designs, which are the cases `rows`."""
         command = group.result.command
         for row, end in zip(rows.tolist(), group.ends, strict=True):
@@ -137,7 +137,7 @@ class Sheet:
                     self._reasons[row].setdefault(message, NOT_MET)
         self._read(rows, group)
 
-    def _read(self, rows: Ints, group: Group) -> None:
+    def _read(self, rows: Ints, group: DesignGroup) -> None:
         """Read the numbers and verdicts of a group, design by design where they cannot be read together."""
         command, good = group.result.command, np.array([end.error is None for end in group.ends])
         try:
@@ -155,10 +155,10 @@ class Sheet:
                 return
             for k in range(len(rows)):
                 answer = group.of(k)
-                alone = Group.alone(answer) if isinstance(answer, Result) else Group.failed(command, answer)
+                alone = DesignGroup.alone(answer) if isinstance(answer, Result) else DesignGroup.failed(command, answer)
                 self._read(rows[k : k + 1], alone)
 
-    def _judge(self, k: int, rows: Ints, group: Group) -> None:
+    def _judge(self, k: int, rows: Ints, group: DesignGroup) -> None:
         """Judge cases by a requirement, each by its own."""
         good = np.array([end.error is None for end in group.ends])
         required = [self.judging[row].requirements[k] for row in rows.tolist()]

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.experiments.schema.matrix import Named
 from mechdesign.family.judge import Judgement, judge
-from mechdesign.motion.group import Group
+from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.rows import Chosen, UnknownColumnError
 from mechdesign.study.schema.conditions import Requirement
@@ -54,7 +54,7 @@ class CaseNumber:
         """The command that computes it."""
         return command_named(self.name) or "workspace"
 
-    def find(self, group: Group) -> tuple[Floats, str]:
+    def find(self, group: DesignGroup) -> tuple[Floats, str]:
         """The number of each design, shape (designs,), nan where a row that counts has none; and its unit.
 
         Raises
@@ -76,7 +76,7 @@ def numbers_in(section: str, results: Iterable[Named]) -> list[CaseNumber]:
     ]
 
 
-def judged(group: Group, required: Sequence[Requirement]) -> tuple[Judgement, Flags, str]:
+def judged(group: DesignGroup, required: Sequence[Requirement]) -> tuple[Judgement, Flags, str]:
     """Worst value and margin of each design by a requirement, which of them meet it, and the unit.
 
     Parameters
@@ -108,7 +108,7 @@ def judged(group: Group, required: Sequence[Requirement]) -> tuple[Judgement, Fl
     return judged, judged.met & ~partly, terms.unit
 
 
-def incomplete(group: Group, terms: Chosen | Sum) -> Flags:
+def incomplete(group: DesignGroup, terms: Chosen | Sum) -> Flags:
     """Designs of which poses, samples or a part of the motion are missing in what is judged."""
     if len(group.ends) == 1:
         return np.array([any(part.gaps for part in terms.parts)])
@@ -121,7 +121,7 @@ def _subject(requirement: Requirement) -> dict[str, Any]:
     return requirement.model_copy(update=limits).__dict__
 
 
-def _terms(group: Group, path: str, where: dict[str, Any]) -> Chosen | Sum:
+def _terms(group: DesignGroup, path: str, where: dict[str, Any]) -> Chosen | Sum:
     """The rows that a path names, of which each design has the same number, and at least one that counts."""
     terms, designs = terms_of(group.result, path, where), len(group.ends)
     if designs == 1 and terms.missing:

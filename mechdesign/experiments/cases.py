@@ -12,7 +12,7 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.family import forms, stacked
-from mechdesign.motion.group import Group
+from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look, with_fewer_rows
 from mechdesign.report import requirements
@@ -150,7 +150,7 @@ def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
         for number in results:
             if number.command == command:
                 try:
-                    number.find(Group.alone(result))
+                    number.find(DesignGroup.alone(result))
                 except UnknownColumnError as error:
                     problems.append(study.problem(str(error), *number.keys))
         try:

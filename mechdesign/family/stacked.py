@@ -17,7 +17,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.along import AlongMotion
 from mechdesign.motion.answer import MotionQuestion, answer
 from mechdesign.motion.followed import courses_of
-from mechdesign.motion.group import Answers, Group
+from mechdesign.motion.group import Answers, DesignGroup
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import evaluate
 from mechdesign.motion.rows import Poses
@@ -176,7 +176,7 @@ def at_poses(study: Study, command: str, poses: Poses) -> Answers:
 
 def answers(designs: Designs, command: str) -> Answers:
     """A command's answer for each design, or the error of a design that has none."""
-    answered: list[Group] = []
+    answered: list[DesignGroup] = []
     if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
         # Where a group has an error, its designs are answered one by one.
         for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
@@ -187,11 +187,11 @@ def answers(designs: Designs, command: str) -> Answers:
     return Answers([*answered, *(_alone(designs, k, command) for k in sorted(left))])
 
 
-def _alone(designs: Designs, k: int, command: str) -> Group:
+def _alone(designs: Designs, k: int, command: str) -> DesignGroup:
     try:
-        group = Group.alone(ask(designs.one(k), command))
+        group = DesignGroup.alone(ask(designs.one(k), command))
     except Exception as error:
-        group = Group.failed(command, error)
+        group = DesignGroup.failed(command, error)
     return replace(group, rows=np.array([k]))
 
 

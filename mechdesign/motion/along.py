@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.motion.curve import Curve
-from mechdesign.motion.ends import End, Ends
+from mechdesign.motion.ends import Ends, MotionEnd
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import GIVEN, Motion, SolvedPoses
 from mechdesign.motion.parts import within
@@ -245,7 +245,7 @@ class AlongMotion:
             self._within[part] = self.again(curve, requests)
         return self._within[part]
 
-    def at_ends(self, ends: Sequence[End], names: Sequence[str]) -> Floats:
+    def at_ends(self, ends: Sequence[MotionEnd], names: Sequence[str]) -> Floats:
         """Functions at ends of the motions, shape (names, ends); nan at infinity."""
         line, x = (np.array([getattr(end, name) for end in ends], dtype=np.intp) for name in ("line", "x"))
         values = self.functions.at_ends(names, line, np.array([end.place for end in ends]), x)

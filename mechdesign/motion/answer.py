@@ -13,7 +13,7 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.motion.along import AlongMotion
 from mechdesign.motion.followed import Courses
-from mechdesign.motion.group import End, Group
+from mechdesign.motion.group import DesignEnd, DesignGroup
 from mechdesign.motion.passage import Passage, pass_over
 from mechdesign.motion.question import PoseQuestion
 from mechdesign.numerics.arrays import Ints
@@ -73,7 +73,7 @@ class MotionQuestion(PoseQuestion, Generic[B]):
         return {}
 
 
-def answer(question: MotionQuestion[Any], progress: Progress = NULL, jobs: int | None = 1) -> list[Group]:
+def answer(question: MotionQuestion[Any], progress: Progress = NULL, jobs: int | None = 1) -> list[DesignGroup]:
     """The answers of all designs, in groups of those of one kind; an error where no pose is valid.
 
     Of a single design it holds what pictures show, and of a long motion tables that make their rows anew.
@@ -91,7 +91,7 @@ def alone(question: MotionQuestion[Any], progress: Progress = NULL, jobs: int | 
     return result
 
 
-def answer_of(passage: Passage, jobs: int | None = 1) -> list[Group]:
+def answer_of(passage: Passage, jobs: int | None = 1) -> list[DesignGroup]:
     """The answers after a pass over the poses; see `answer`."""
     question, designs = passage.question, passage.question.poses.designs
     between = question.between(passage)
@@ -121,10 +121,10 @@ def answer_of(passage: Passage, jobs: int | None = 1) -> list[Group]:
                 result, warnings=end.warnings, counts=end.counts, failed=end.failed,
                 drawn=question.drawn(passage, between),
             )  # fmt: skip
-    return [Group(np.arange(designs), result, ends, question.uneven(passage, between))]
+    return [DesignGroup(np.arange(designs), result, ends, question.uneven(passage, between))]
 
 
-def _end(passage: Passage, between: Between, design: int) -> End:
+def _end(passage: Passage, between: Between, design: int) -> DesignEnd:
     """How a design was answered."""
     question, along = passage.question, between.along
     motion, reason = question.motion, passage.reason.reshape(question.poses.designs, -1)[design]
@@ -132,7 +132,7 @@ def _end(passage: Passage, between: Between, design: int) -> End:
     try:
         warnings, failed = motion.failures(reason, design * len(reason), question.lead)
     except AssemblyError as error:
-        return End(counts=counts, error=error)
+        return DesignEnd(counts=counts, error=error)
     more, gaps = question.say(passage, between, design)
     gaps = [motion.invalid_in_words(reason), "" if along is None else along.missing(design), *gaps]
-    return End([*warnings, *more], failed, " and ".join(filter(None, gaps)), counts)
+    return DesignEnd([*warnings, *more], failed, " and ".join(filter(None, gaps)), counts)

@@ -22,7 +22,7 @@ PARALLEL, ZERO_LEG = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class End:
+class MotionEnd:
     """Place at which a motion ends, or goes to infinity and comes back.
 
     Parameters
@@ -72,9 +72,9 @@ class Ends:
         return np.where(sizes > 0, sizes, 1.0)
 
     @cached_property
-    def ends(self) -> tuple[End, ...]:
+    def ends(self) -> tuple[MotionEnd, ...]:
         """Places at which motions end or go to infinity, in order along the lines."""
-        pieces, ends = self._pieces, list[End]()
+        pieces, ends = self._pieces, list[MotionEnd]()
         joined = pieces.joined_to_next
         if not len(pieces.line):
             return ()
@@ -91,11 +91,11 @@ class Ends:
             piece, outside = piece[~held], outside[~held]
             causes = self._causes_at(pieces.line[piece], outside)
             ends += [
-                End(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
+                MotionEnd(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
                 for k, cause in zip(piece.tolist(), causes, strict=True)
             ]
         ends += [
-            End(int(pieces.line[k]), float(pieces.end[k]), self._causes[number], k, 1, endless=True)
+            MotionEnd(int(pieces.line[k]), float(pieces.end[k]), self._causes[number], k, 1, endless=True)
             for k, number in self._at_joints("across", PARALLEL)
         ]
         return tuple(sorted(ends, key=lambda end: (end.line, end.place, end.x)))

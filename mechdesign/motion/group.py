@@ -15,7 +15,7 @@ from mechdesign.statistics import Course, Follow, Request
 
 
 @dataclass(frozen=True, eq=False)
-class End:
+class DesignEnd:
     """How a design was answered: `missing` says which poses or parts of its motion are not valid."""
 
     warnings: Sequence[Caution] = ()
@@ -26,7 +26,7 @@ class End:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class DesignGroup:
     """Answers of some designs of one kind.
 
     Parameters
@@ -35,7 +35,7 @@ class Group:
         Which of all designs they are.
     result : Result
         Its tables have the rows of one design after those of another.
-    ends : sequence of End
+    ends : sequence of DesignEnd
         Of each design.
     uneven : mapping of str to ndarray of int
         Numbers of rows of each design in tables of which one may have more than another.
@@ -43,21 +43,23 @@ class Group:
 
     rows: Ints
     result: Result
-    ends: Sequence[End]
+    ends: Sequence[DesignEnd]
     uneven: Mapping[str, Sequence[int] | Ints] = field(default_factory=dict)
     _answers: dict[int, Result] = field(default_factory=dict, init=False)
 
     @classmethod
-    def alone(cls, result: Result) -> Group:
+    def alone(cls, result: Result) -> DesignGroup:
         """The answer of a single design."""
         scopes = (table.scope for table in result.tables.values())
         missing = next((scope.missing for scope in scopes if scope is not None and scope.missing), "")
-        return cls(np.zeros(1, dtype=np.intp), result, [End(result.warnings, result.failed, missing, result.counts)])
+        return cls(
+            np.zeros(1, dtype=np.intp), result, [DesignEnd(result.warnings, result.failed, missing, result.counts)]
+        )
 
     @classmethod
-    def failed(cls, command: str, error: Exception) -> Group:
+    def failed(cls, command: str, error: Exception) -> DesignGroup:
         """A single design that has no answer."""
-        return cls(np.zeros(1, dtype=np.intp), Result(command, {}), [End(error=error)])
+        return cls(np.zeros(1, dtype=np.intp), Result(command, {}), [DesignEnd(error=error)])
 
     @property
     def missing(self) -> Flags:
@@ -78,7 +80,7 @@ class Group:
             )  # fmt: skip
         return self._answers[k]
 
-    def _of(self, table: Table, k: int, end: End) -> Table:
+    def _of(self, table: Table, k: int, end: DesignEnd) -> Table:
         counts = self.uneven.get(table.name)
         size = len(table) // len(self.ends)
         begin, number = (k * size, size) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
@@ -102,7 +104,7 @@ def _follow_of(scope: Scope, design: int) -> Follow | None:
 class Answers(Sequence[Result | Exception]):
     """The answer of each design, or why it has none, in groups of those that are of one kind."""
 
-    def __init__(self, groups: Sequence[Group]) -> None:
+    def __init__(self, groups: Sequence[DesignGroup]) -> None:
         self.groups = groups
         self._places = {row: (group, k) for group in groups for k, row in enumerate(group.rows.tolist())}
 

@@ -16,11 +16,11 @@ from mechdesign.motion.solving import POSES_AT_ONCE, solve_rows
 from mechdesign.numerics.arrays import Ints
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.expansion import OWN, Numbers, default, expand, number_of_poses
+from mechdesign.study.expansion import OWN, DesignNumbers, default, expand, number_of_poses
 from mechdesign.study.schema.poses import PoseSection
 
 
-def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
+def study_poses(study: Study, section: str, numbers: DesignNumbers = OWN) -> Poses:
     """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked, of the study's own design or of some.
 
     A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.

@@ -15,7 +15,7 @@ from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import HELD, LENGTH, Field
 from mechdesign.study import Study
-from mechdesign.study.expansion import Numbers
+from mechdesign.study.expansion import DesignNumbers
 from mechdesign.study.text.units import Amount
 
 # Rays of the tables of local indices and of the boundary, unless the study says how many.
@@ -47,7 +47,7 @@ class Region:
     rays: int | None
     factors: Sequence[float]
 
-    def places(self, numbers: Numbers) -> dict[str, Floats]:
+    def places(self, numbers: DesignNumbers) -> dict[str, Floats]:
         """Dimensions and numbers of the field that differ between designs, each of shape (designs,).
 
         Held values and the characteristic length may follow parameters: by `HELD` and `LENGTH`, their names in a field.

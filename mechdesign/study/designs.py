@@ -15,7 +15,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study.expansion import Numbers
+from mechdesign.study.expansion import DesignNumbers
 from mechdesign.study.loaded import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.targets import Target
@@ -50,10 +50,10 @@ class Designs:
         return {name: self._by_design(value) for name, value in self.study.parameters.places(self.changed).items()}
 
     @cached_property
-    def numbers(self) -> Numbers:
+    def numbers(self) -> DesignNumbers:
         """What a study's poses are made of."""
         nominal = self.study.parameters.nominal
-        return Numbers(self.count, self.parameters, self.places, nominal, frozenset(self.changed))
+        return DesignNumbers(self.count, self.parameters, self.places, nominal, frozenset(self.changed))
 
     def one(self, k: int) -> Study:
         """The study of one design, as if its file had these numbers; the assembly stays the sketch's.

@@ -27,7 +27,7 @@ from mechdesign.study.timed import number_of_instants, program
 
 
 @dataclass(frozen=True, eq=False)
-class Numbers:
+class DesignNumbers:
     """The numbers of a study for some designs."""
 
     count: int = 1
@@ -50,11 +50,11 @@ class Numbers:
         return expression is not None and not expression.names.isdisjoint(self.parameters)
 
 
-OWN = Numbers()
+OWN = DesignNumbers()
 """Those of the study's own design."""
 
 
-def sweep_values(sweep: Sweep, numbers: Numbers = OWN) -> Floats:
+def sweep_values(sweep: Sweep, numbers: DesignNumbers = OWN) -> Floats:
     """Values of a sweep, both ends included: ``from + k step <= to + 1e-9 step``; shape (designs, poses).
 
     Raises
@@ -76,7 +76,7 @@ def sweep_values(sweep: Sweep, numbers: Numbers = OWN) -> Floats:
     return begin[:, None] + step[:, None] * np.arange(math.floor(steps.min()) + 1, dtype=np.float64)
 
 
-def number_of_poses(section: PoseSection, folder: Folder, numbers: Numbers) -> Ints:
+def number_of_poses(section: PoseSection, folder: Folder, numbers: DesignNumbers) -> Ints:
     """Numbers of poses that differ from design to design, shape (designs, n); -1 where there is none.
 
     They are those of each swept coordinate that has a step, or of a motion over time.
@@ -93,7 +93,7 @@ def number_of_poses(section: PoseSection, folder: Folder, numbers: Numbers) -> I
     return np.stack(counts, axis=1) if counts else np.zeros((numbers.count, 0), dtype=np.intp)
 
 
-def expand(section: PoseSection, folder: Folder, numbers: Numbers = OWN) -> Poses | None:
+def expand(section: PoseSection, folder: Folder, numbers: DesignNumbers = OWN) -> Poses | None:
     """Poses of a section for some designs, each as many; None where it gives none, or those of the workspace.
 
     Files of paths lie in `folder`.
@@ -116,7 +116,7 @@ def expand(section: PoseSection, folder: Folder, numbers: Numbers = OWN) -> Pose
     return of_designs(poses, numbers)
 
 
-def of_designs(poses: Poses, numbers: Numbers) -> Poses:
+def of_designs(poses: Poses, numbers: DesignNumbers) -> Poses:
     """The poses of some designs with the dimensions and parameters in which these differ."""
     per_design = poses.count // numbers.count
     places, parameters = (
@@ -129,7 +129,7 @@ def of_designs(poses: Poses, numbers: Numbers) -> Poses:
     )  # fmt: skip
 
 
-def _listed(poses: Sequence[Mapping[str, float]], numbers: Numbers) -> Poses:
+def _listed(poses: Sequence[Mapping[str, float]], numbers: DesignNumbers) -> Poses:
     rows: dict[frozenset[str], list[int]] = {}
     for index, pose in enumerate(poses):
         rows.setdefault(frozenset(pose), []).append(index)
@@ -158,7 +158,7 @@ def _grid(axes: Mapping[str, Floats]) -> Poses:
     return Poses.single(values, tuple(n for n in shape if n > 1) or (1,))
 
 
-def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> Poses:
+def _path(path: Mapping[str, PathSection], folder: Folder, numbers: DesignNumbers) -> Poses:
     if not path:
         raise StudyError("an empty path; give its points, [[x, y], ...]")
     columns: dict[str, Floats] = {}
@@ -234,7 +234,7 @@ def _course(name: str, given: PathSection, folder: Folder, value: Callable[[floa
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
-def _timed(motion: Mapping[str, Course], instants: int, folder: Folder, numbers: Numbers) -> Poses:
+def _timed(motion: Mapping[str, Course], instants: int, folder: Folder, numbers: DesignNumbers) -> Poses:
     """Poses of a motion over time."""
     timed = program(motion, instants, folder, numbers.of)
     count = timed.times.shape[1]
@@ -247,7 +247,7 @@ def _timed(motion: Mapping[str, Course], instants: int, folder: Folder, numbers:
     )  # fmt: skip
 
 
-def default(description: Description, numbers: Numbers = OWN) -> Poses:
+def default(description: Description, numbers: DesignNumbers = OWN) -> Poses:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
 
     Raises
@@ -276,7 +276,7 @@ def default(description: Description, numbers: Numbers = OWN) -> Poses:
     )
 
 
-def _place(description: Description, term: Term, numbers: Numbers) -> Floats:
+def _place(description: Description, term: Term, numbers: DesignNumbers) -> Floats:
     """A number of the geometry of each design, shape (designs,)."""
     value: Floats | float = term if not isinstance(term, str) else description.places[term].nominal
     given = numbers.places.get(term, value) if isinstance(term, str) else value

@@ -19,7 +19,7 @@ from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
-from mechdesign.motion.group import Group
+from mechdesign.motion.group import DesignGroup
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.results import Result
 
@@ -301,7 +301,7 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 first = next(warning for warning in result.warnings if warning.kind == kind)
                 assert tally.warned[kind].message.startswith(f"{command}: {first}"), seed
             for j, each in enumerate(wanted):
-                (expected,) = each.find(Group.alone(result))[0].tolist()
+                (expected,) = each.find(DesignGroup.alone(result))[0].tolist()
                 assert same(tally.result(j)[0][k], expected), (seed, each.name, tally.result(j)[0][k])
                 compared += 1
     assert compared

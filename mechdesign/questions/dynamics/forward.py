@@ -22,7 +22,7 @@ from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
-from mechdesign.questions.dynamics.motion_in_time import Course, Integration
+from mechdesign.questions.dynamics.motion_in_time import IntegratedMotion, Integration
 from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestion
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.state_in_time import STANDSTILL
@@ -72,7 +72,7 @@ def _at(study: Study, time: float) -> str:
     return f"{time:.6g} {study.units.label('time')}"
 
 
-def _scope(study: Study, course: Course) -> Scope:
+def _scope(study: Study, course: IntegratedMotion) -> Scope:
     """What tables say of the motion that was asked: a part of it is missing, or it has its own end before its time."""
     ending = course.ending
     if ending is None:
@@ -85,7 +85,7 @@ def _scope(study: Study, course: Course) -> Scope:
     return Scope(missing=f"no motion from {until} to {_at(study, float(section.duration))}: {words}")
 
 
-def _cautions(study: Study, integration: Integration, course: Course) -> Iterator[Caution]:
+def _cautions(study: Study, integration: Integration, course: IntegratedMotion) -> Iterator[Caution]:
     """Warnings of a motion that ended before its time, jumps, or has energies that are not those of the work done."""
     if (ending := course.ending) is not None:
         kind = {"limit": "incomplete", "rest": "incomplete", "jams": "jammed"}.get(ending.kind, "unconverged")
@@ -141,7 +141,7 @@ def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iter
             yield Caution("cam", message, "joint_forces")
 
 
-def _forces(study: Study, course: Course) -> tuple[PoseValues, Shown]:
+def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
     """Forces along the motion: those of any motion over time, at the poses that were integrated."""
     mechanism, count = study.mechanism, len(course.times)
     drives = [mechanism.coordinate(name) for name in mechanism.drives]
@@ -175,7 +175,7 @@ def _forces(study: Study, course: Course) -> tuple[PoseValues, Shown]:
 
 
 @quiet
-def _forward_table(motion: PoseValues, course: Course, outputs: list[Coordinate]) -> Table:
+def _forward_table(motion: PoseValues, course: IntegratedMotion, outputs: list[Coordinate]) -> Table:
     study, poses, label = motion.question.study, motion.question.poses, motion.question.study.units.label
     columns: list[Column] = [TIMED.column(course.times, label("time"))]
     for k, drive in enumerate(motion.question.drives):
@@ -202,7 +202,7 @@ def _forward_table(motion: PoseValues, course: Course, outputs: list[Coordinate]
     return FORWARD.table([*columns, VALID.column(motion.valid)])
 
 
-def _events_table(study: Study, course: Course) -> Table:
+def _events_table(study: Study, course: IntegratedMotion) -> Table:
     """A row each event; those that are asked and do not happen have one without a time."""
     section = DynamicsSection.of(study).forward
     assert section is not None

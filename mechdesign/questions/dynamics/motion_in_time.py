@@ -69,7 +69,7 @@ class Stretch(NamedTuple):
 
 
 @dataclass
-class Course:
+class IntegratedMotion:
     """The motion at the instants asked for, shape (..., instants).
 
     Attributes
@@ -140,7 +140,7 @@ class Integration(MotionInTime):
         rates = self.equations.rates(np.array([at]), x, velocity)
         return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
 
-    def run(self, progress: Progress = NULL) -> Course:
+    def run(self, progress: Progress = NULL) -> IntegratedMotion:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
         progress.start(PARTS, "parts of the motion's time")
         seconds = MAX_SECONDS * max(1.0, self.count / MANY)
@@ -294,7 +294,7 @@ class Integration(MotionInTime):
         if moves.any():
             self.equations.branch = branch._replace(signs=np.where(moves, np.sign(speeds), branch.signs))
 
-    def course(self, times: Floats) -> Course:
+    def course(self, times: Floats) -> IntegratedMotion:
         """The motion at some times."""
         equations = self.equations
         numbers = np.searchsorted([stretch.end for stretch in self.stretches], times)
@@ -312,7 +312,7 @@ class Integration(MotionInTime):
         near = self.positions.near(x)
         whole = replace(whole, near=near, counted=frozenset(near))
         events = sorted(self.events, key=lambda event: event.time)
-        return Course(
+        return IntegratedMotion(
             self.positions, times, x, rates, work, whole, events, self.ending, self._pole or self.time, self.steps
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.margins import Cause
-from mechdesign.motion.ends import Change, End
+from mechdesign.motion.ends import Change, MotionEnd
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.columns import LIMITS
@@ -29,7 +29,7 @@ class LimitPlace:
     line: int
     place: float
     cause: Cause
-    end: End | None = None
+    end: MotionEnd | None = None
 
 
 def limits_of(along: KinematicAlong) -> list[LimitPlace]:
