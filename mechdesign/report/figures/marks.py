@@ -182,7 +182,7 @@ class Contours(PanelMark):
         if self.norm is None:
             return
         levels = np.asarray(self.norm.boundaries)
-        style.filled(axes, self.patches, self.norm, levels)
+        style.filled(axes, self.patches, self.norm, style.contour_lines(self.patches, levels))
         for curve in self.outline:
             axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
         if not self.everywhere:

@@ -37,6 +37,7 @@ _RANKS = ("position", *_ORDERS, "clearance", "det_J", "inverse_condition")
 _OF_ONE_COLOR = ("position", "velocity", "acceleration", "error")
 _STILL = 1e-9  # part of its size by which a column changes that does not change
 _FLAT = 0.05  # part of the range of a panel below which a curve that moves has another panel
+_AROUND = 0.05  # part of the range beyond it
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
@@ -269,6 +270,10 @@ def _panel(
         shown.append(values)
     ends = _ends(group, np.concatenate([values[np.isfinite(values)] for values in shown]))
     if before is not None:
+        if first.order != "position" and ends == (None, None):
+            # Of the study before rates may grow without bound: their axis stays that of the study now.
+            low, high = (float(end(np.concatenate(shown))) for end in (np.nanmin, np.nanmax))
+            ends = low - _AROUND * (high - low), high + _AROUND * (high - low)
         earlier, was = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
         places = abscissa(before.study, was, _speed(before.study)).values
         for curve, color in zip(group.curves, used, strict=True):

@@ -83,23 +83,32 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         title = f"{title}; {quantity(low, index.unit).strip()} everywhere"
     norm, panels = _norm(every), list[tuple[str, list[PanelMark]]]()
     for words, patches, region in zip(titles, shown, regions, strict=True):
-        drawn = Own(partial(fill, local=region.local)) if same else Coloured(partial(_field, patches, norm), bar=label)
+        within = _within(patches, norm)
+        lines = [] if same else style.contour_lines(within, norm.boundaries[1:])
+        drawn = (
+            Own(partial(fill, local=region.local))
+            if same
+            else Coloured(partial(_field, within, norm, lines), bar=label)
+        )
         marks = [drawn, *region_marks(region)]
         if len(regions) == 1 and not same:
-            marks.append(Own(partial(label_levels, patches=patches, norm=norm), late=True))
+            marks.append(Own(partial(label_levels, patches=patches, norm=norm, drawn=lines), late=True))
         panels.append((words, marks))
     return region_picture(study, everywhere, panels, title)
 
 
-def _field(patches: Sequence[Grid], norm: BoundaryNorm, axes: Axes) -> tuple[ScalarMappable, dict[str, Any]]:
+def _field(
+    patches: Sequence[Grid], norm: BoundaryNorm, lines: Sequence[Sequence[Complexes]], axes: Axes
+) -> tuple[ScalarMappable, dict[str, Any]]:  # fmt: skip
     """Filled contours, and what a bar of colours shows of them."""
-    contours(axes, patches, norm)
+    style.filled(axes, patches, norm, lines)
     return ScalarMappable(norm, style.COLORMAP), {"ticks": norm.boundaries}
 
 
 def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
     """Filled contours over the patches of a region."""
-    style.filled(axes, _within(patches, norm), norm, norm.boundaries[1:])
+    within = _within(patches, norm)
+    style.filled(axes, within, norm, style.contour_lines(within, norm.boundaries[1:]))
 
 
 def _within(patches: Sequence[Grid], norm: BoundaryNorm) -> list[Grid]:
@@ -110,10 +119,11 @@ def _within(patches: Sequence[Grid], norm: BoundaryNorm) -> list[Grid]:
             for x, y, z in patches]  # fmt: skip
 
 
-def label_levels(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
+def label_levels(
+    axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, drawn: Sequence[Sequence[Complexes]]
+) -> None:  # fmt: skip
     """Name each level of a norm but the first on one of its lines, far from other lines and names; or not at all."""
     levels, edge = norm.boundaries[1:], np.zeros(0, dtype=complex)
-    drawn = style.contour_lines(_within(patches, norm), levels)
     for x, y, _ in patches:
         z = x + 1j * y
         edge = np.concatenate([edge, z[0], z[-1], z[:, 0], z[:, -1]])
