@@ -10,9 +10,6 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.family.evaluator import Evaluator
-from mechdesign.family.goals import goal
-from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.curves import workspace_nodes
@@ -220,12 +217,10 @@ def test_one_piece_makes_no_table() -> None:
 
 
 def values(names: Sequence[str], changes: dict[str, np.ndarray], text: str) -> dict[str, np.ndarray]:
-    ranges = ", ".join(f"{name}: {{from: 0, to: 400, number: 2}}" for name in changes)
-    study = study_of(text, f"optimize={{variables: {{{ranges}}}, maximize: [{', '.join(names)}]}}")
-    goals = [goal(name, smallest=False) for name in names]
-    found = Evaluator(designs_question(study, goals))(changes)
-    assert not any(found.reasons)
-    return dict(zip(names, found.table.T, strict=False))
+    entries = {f"mechanism.parameters.{name}": column for name, column in changes.items()}
+    table = mechdesign.evaluate(study_of(text), entries, names)
+    assert table["valid"].all()
+    return {name: table[name] for name in names}
 
 
 @pytest.mark.nightly

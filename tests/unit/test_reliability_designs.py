@@ -5,9 +5,6 @@ import pytest
 
 import mechdesign
 from mechdesign.family import stacked
-from mechdesign.family.evaluator import Evaluator
-from mechdesign.family.goals import goal
-from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
 from mechdesign.study.designs import Designs
 
@@ -164,11 +161,9 @@ def test_a_design_whose_tolerances_are_none_does_not_spoil_the_others():
     text = CRANK.format(
         section="dimensions: {r: {tolerance: j8}, rocker.length: [-t, 0.05]}, limits: {Q.x: 0.1}", more=""
     ).replace("r: 30", "r: 2.5").replace("P: [20, 25]", "P: [2, 1.5]").replace("10*sqrt(r) + 40", "80")  # fmt: skip
-    study = mechdesign.load(text=text + "optimize: {method: search, variables: {r: {from: 2, to: 4}, t: {from: -0.1, "
-                            "to: 0.1}}, minimize: [reliability.moments.sigma]}")  # fmt: skip
-    evaluator = Evaluator(designs_question(study, [goal("reliability.moments.sigma", smallest=True)]))
-    found = evaluator({"r": np.array([2.5, 2.6, 3.2, 2.9]), "t": np.array([0.02, 0.03, 0.02, -0.07])})
-    assert [bool(reason) for reason in found.reasons] == [False, False, True, True]
-    assert "gives no j8 of ... mm here" in found.reasons[2]
-    assert "the lowest deviation is above the highest" in found.reasons[3]
-    assert np.isfinite(found.table[:2, 0]).all()
+    values = {"mechanism.parameters.r": [2.5, 2.6, 3.2, 2.9], "mechanism.parameters.t": [0.02, 0.03, 0.02, -0.07]}
+    table = mechdesign.evaluate(mechdesign.load(text=text), values, ["reliability.moments.sigma.max"])
+    assert table["valid"].tolist() == [True, True, False, False]
+    assert "gives no j8 of ... mm here" in table["reason"][2]
+    assert "the lowest deviation is above the highest" in table["reason"][3]
+    assert np.isfinite(table["reliability.moments.sigma.max"][:2]).all()
