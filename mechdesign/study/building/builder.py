@@ -128,24 +128,13 @@ class Builder:
             cure = f"rename the link that does not move (is it {fixed[0]!r}?)" if fixed else "add 'ground: {O: [0, 0]}'"
             self.report(("links",), f"there is no 'ground', the fixed link whose frame is the world; {cure}")
         kinds: dict[str, str] = {}
-        groups: list[tuple[str, str, Iterable[str]]] = [
-            ("parameter", "parameters", self.parameter_values),
-            ("link", "links", section.links),
-            ("point", "", self.section.owners),
-            ("joint", "joints", section.joints),
-            ("measure", "measures", section.measures),
-            ("spring", "springs", section.springs),
-            ("coupling", "couplings", section.couplings),
-        ]
-        for kind, key, names in groups:
-            for name in names:
-                if name in kinds:
-                    path = (key, name) if key else self._where(name)
-                    self.report(
-                        path, f"{name!r} is the name of a {kinds[name]} already; names are distinct", at_key=True
-                    )
-                else:
-                    kinds[name] = kind
+        own: dict[str, Iterable[str]] = {"parameter": self.parameter_values, "point": section.owners}
+        for kind in ("parameter", "link", "point", "joint", "measure", "spring", "coupling"):
+            for name in own[kind] if kind in own else getattr(section, f"{kind}s"):
+                path = self._where(name) if kind == "point" else (f"{kind}s", name)
+                if kinds.setdefault(name, kind) != kind:
+                    message = f"{name!r} is the name of a {kinds[name]} already; names are distinct"
+                    self.report(path, message, at_key=True)
         for name, drive in section.drives.items():
             target = name if drive is None else drive.angle or drive.length or drive.slide
             if name in kinds and name != target:
