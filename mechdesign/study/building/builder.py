@@ -89,9 +89,12 @@ class Builder:
         """
         name = place_name(path)
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        self.places[name] = Place(name, value * factor, quantity, path if len(path) > 1 else (), in_coupling)
-        if isinstance(value, Amount) and value.expression is not None:
-            self.formulas[name] = value.expression
+        number = Amount.of(value)
+        self.places[name] = Place(
+            name, value * factor, quantity, path if len(path) > 1 else (), number.least, number.exclusive, in_coupling
+        )
+        if number.expression is not None:
+            self.formulas[name] = number.expression
         if measured:
             self.measured.add(name)
         return name
@@ -242,7 +245,9 @@ class Builder:
                     f"{start!r} and {end!r} are at one place in the sketch: no length to measure; give the length",
                 )
                 length = 1.0
-        points[end] = (self.place(("links", name, "length"), length, measured=section.length is None), 0.0)
+        number = Amount.of(length)
+        number.least, number.exclusive = 0.0, True
+        points[end] = (self.place(("links", name, "length"), number, measured=section.length is None), 0.0)
         return points
 
     def _measured(
