@@ -28,13 +28,16 @@ WOUND = "wound:"
 class Place:
     """One number of the mechanism: its name, nominal value (angles in radians, else the study's unit) and kind.
 
-    `path` is where a study's mechanism says it; empty of what is no dimension of a part.
+    `path` is where a study's mechanism says it; empty of what is no dimension of a part. `least` is its least value,
+    which is excluded with `exclusive`.
     """
 
     name: str
     nominal: float
     quantity: Quantity | Physical = "length"
     path: tuple[str | int, ...] = ()
+    least: float | None = None
+    exclusive: bool = False
     in_coupling: bool = False  # whether the function of a coupling names it
 
 

@@ -159,9 +159,10 @@ class Designs:
         for name, value in (*self.parameters.items(), *places.items()):
             note(~np.isfinite(value), f"{name} has no finite value")
         for name, value in places.items():
-            owner, _, last = name.rpartition(".")
-            if owner in self.study.mechanism.description.links and last == "length":
-                note(~(value > 0), f"{name} is not positive")
+            place = self.study.mechanism.description.places[name]
+            if place.least is not None:
+                wrong = value <= place.least if place.exclusive else value < place.least
+                note(wrong, f"{name} is {'not positive' if place.exclusive else 'negative'}")
         for a, b, gap in self.study.mechanism.contradictions(places):
             note(gap > 0, f"the angles of the slides and clamps between '{a}' and '{b}' contradict each other")
         for index, limit in enumerate(self.study.mechanism.description.limits):

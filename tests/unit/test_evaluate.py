@@ -179,6 +179,33 @@ def test_designs_that_cannot_be_built_have_their_reasons() -> None:
     assert "mechanism.parameters.a: unknown name 'long'" in words["reason"][1]
 
 
+@pytest.mark.parametrize(
+    ("entry", "reason"),
+    [
+        ("mechanism.springs.back.stiffness", "back.stiffness is negative"),
+        ("mechanism.springs.back.free_length", "back.free_length is negative"),
+        ("mechanism.links.arm.mass", "arm.mass is negative"),
+        ("mechanism.friction.O.radius", "friction.O.radius is negative"),
+    ],
+)
+def test_a_design_has_no_number_that_a_study_may_not_have(entry: str, reason: str) -> None:
+    study = mechdesign.load(
+        text="""
+mechanism:
+  links:
+    ground: {O: [0, 0], S: [0, 100]}
+    arm: {points: {O: [0, 0], P: [100, 0]}, mass: 2 kg, center: [30, 5]}
+  drives: [arm]
+  springs: {back: {between: [S, P], stiffness: 2, free_length: 60}}
+  friction: {O: {coefficient: 0.1, radius: 5}}
+dynamics: {gravity: [0, -9810], poses: [{arm: 10}, {arm: 60}]}
+"""
+    )
+    table = mechdesign.evaluate(study, {entry: [-1, 0, 3]}, ["dynamics.arm_effort.max"])
+    assert table["valid"].tolist() == [False, True, True]
+    assert table["reason"].tolist() == [reason, "", ""]
+
+
 def test_no_design_is_an_empty_table() -> None:
     table = mechdesign.evaluate(mechdesign.load(text=FOUR_BAR), {"mechanism.parameters.a": []}, [SWING])
     assert (len(table), table.names[0]) == (0, SWING)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 Term = str | float
 Quantity = Literal["length", "angle", "none"]
@@ -42,24 +42,21 @@ class Size:
         return BETWEEN_LINKS.get(self.kind or "", self.kind) if turning else self.kind
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """Mark of a word out of a list, each with its meaning."""
 
     words: Mapping[str, str]
     title: str
 
 
-@dataclass(frozen=True)
-class Whole:
+class Whole(NamedTuple):
     """Mark of a whole number with its bounds."""
 
     least: int
     most: int
 
 
-@dataclass(frozen=True)
-class Notation:
+class Notation(NamedTuple):
     """Mark of a name, or of what is written in a way of its own: `mechdesign.study.building.elements` reads it.
 
     A ``part`` is an element inside of another.
@@ -68,8 +65,7 @@ class Notation:
     word: str
 
 
-@dataclass(frozen=True)
-class Two:
+class Two(NamedTuple):
     """Mark of a list of two, described for a message."""
 
     text: str

@@ -89,9 +89,12 @@ class Builder:
         """
         name = place_name(path)
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        self.places[name] = Place(name, value * factor, quantity, path if len(path) > 1 else (), in_coupling)
-        if isinstance(value, Amount) and value.expression is not None:
-            self.formulas[name] = value.expression
+        number = Amount.of(value)
+        self.places[name] = Place(
+            name, value * factor, quantity, path if len(path) > 1 else (), number.least, number.exclusive, in_coupling
+        )
+        if number.expression is not None:
+            self.formulas[name] = number.expression
         if measured:
             self.measured.add(name)
         return name
@@ -128,24 +131,13 @@ class Builder:
             cure = f"rename the link that does not move (is it {fixed[0]!r}?)" if fixed else "add 'ground: {O: [0, 0]}'"
             self.report(("links",), f"there is no 'ground', the fixed link whose frame is the world; {cure}")
         kinds: dict[str, str] = {}
-        groups: list[tuple[str, str, Iterable[str]]] = [
-            ("parameter", "parameters", self.parameter_values),
-            ("link", "links", section.links),
-            ("point", "", self.section.owners),
-            ("joint", "joints", section.joints),
-            ("measure", "measures", section.measures),
-            ("spring", "springs", section.springs),
-            ("coupling", "couplings", section.couplings),
-        ]
-        for kind, key, names in groups:
-            for name in names:
-                if name in kinds:
-                    path = (key, name) if key else self._where(name)
-                    self.report(
-                        path, f"{name!r} is the name of a {kinds[name]} already; names are distinct", at_key=True
-                    )
-                else:
-                    kinds[name] = kind
+        own: dict[str, Iterable[str]] = {"parameter": self.parameter_values, "point": section.owners}
+        for kind in ("parameter", "link", "point", "joint", "measure", "spring", "coupling"):
+            for name in own[kind] if kind in own else getattr(section, f"{kind}s"):
+                path = self._where(name) if kind == "point" else (f"{kind}s", name)
+                if kinds.setdefault(name, kind) != kind:
+                    message = f"{name!r} is the name of a {kinds[name]} already; names are distinct"
+                    self.report(path, message, at_key=True)
         for name, drive in section.drives.items():
             target = name if drive is None else drive.angle or drive.length or drive.slide
             if name in kinds and name != target:
@@ -253,7 +245,9 @@ class Builder:
                     f"{start!r} and {end!r} are at one place in the sketch: no length to measure; give the length",
                 )
                 length = 1.0
-        points[end] = (self.place(("links", name, "length"), length, measured=section.length is None), 0.0)
+        number = Amount.of(length)
+        number.least, number.exclusive = 0.0, True
+        points[end] = (self.place(("links", name, "length"), number, measured=section.length is None), 0.0)
         return points
 
     def _measured(

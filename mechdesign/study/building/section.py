@@ -189,7 +189,7 @@ class MechanismSection(fields.Model):
     @cached_property
     def slides(self) -> list[str]:
         """Joints whose displacement is a coordinate."""
-        return [name for name, joint in self.joints.items() if joint.fixed is None]
+        return [name for name, joint in self.joints.items() if joint.kind in ("prismatic", "slot")]
 
     def driven(self, drive: str) -> tuple[Literal["angle", "length", "slide"], str]:
         """What a drive changes, and of which link, leg or joint."""
