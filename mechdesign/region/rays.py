@@ -28,6 +28,8 @@ ROUNDING = 1e-14
 QUADRATIC = 1e-13
 # Intervals no wider than this fraction of the reach are due to rounding.
 NARROWEST = 1e-10
+# A leg shorter than this fraction of the mechanism's size, as the root of a margin, is rounding.
+SHORTEST = 1e-7
 # Least number of samples of an interval where expressions are limited, which may oscillate along a ray.
 OF_EXPRESSIONS = 48
 # Samples of an interval are even steps of an angle, and radii go with its cosine: margins that are square roots of the
@@ -214,9 +216,11 @@ class Designs:
         margin, lane, turn, part, negative, (doubtful, ends) = sign_changes(
             look, len(sampled), max(self.effort.samples, OF_EXPRESSIONS if expressions else 0),
             ROUNDING * outer / width, SAME_ROOT * reach[owner] / width,
-            np.append(self.field.rounding[rows], np.zeros(len(legs))), np.arange(len(rows) + len(legs)) >= len(rows),
+            np.append(self.field.rounding[rows], np.full(len(legs), SHORTEST * self.field.mechanism.size)), np.arange(len(rows) + len(legs)) >= len(rows),
         )  # fmt: skip
         less = np.flatnonzero((negative > 0) | (np.bincount(lane, minlength=len(sampled)) > 0))
+        if not (less.size or doubtful.size):
+            return intervals
         remaining = intervals_between(
             rows[margin], np.searchsorted(less, lane), turn, radius_at(lane, part), negative[less], outer[less], slack
         )
