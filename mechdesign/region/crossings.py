@@ -173,7 +173,9 @@ def _open(
             second[:, at] = second[:, one] + share * (second[:, one] - second[:, two])
         bend = np.abs(second)
         bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
-        doubtful = same & (2 * np.abs(change) <= bend)
+        # A margin that touches zero changes no sign.
+        doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
+        doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
         most = np.maximum(size[legs, 1:], size[legs, :-1])
         doubtful[legs] = same & (4 * most <= bend[legs]) & (most > noise[legs, None])
         row, cell = np.nonzero(doubtful)
@@ -209,8 +211,7 @@ def _curved(
     varies = np.fmax.reduce(np.abs(np.diff(around, axis=0)), axis=0)
     bend = np.fmin(bend, (np.fmax(*np.abs(around[1:3])) + safety * varies) * width**2)
     change, least = np.abs(high - low), np.minimum(np.abs(low), np.abs(high))
-    # A margin that touches zero changes no sign.
-    may = (2 * change <= bend) & (bend > safety * noise[row]) & (least > noise[row])
+    may = (2 * change < bend) & (bend > safety * noise[row]) & (least > noise[row])
     may &= ((low > 0) != (high > 0)) | ((bend - 2 * change) ** 2 >= 8 * least * bend)
     # From the end of a lane margins may go as the square of the distance, as they do from where they only touch zero.
     begins, some = ~of_lane[0], np.flatnonzero(may & ~(of_lane[0] & of_lane[3]))

@@ -266,9 +266,11 @@ def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
 
 def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
     """Margin, ray, direction (1 rising) and x of all roots in (0, 1); and how many margins of a ray begin negative."""
+    roots = np.empty((2, *a.shape))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
-        roots = np.stack([half / c, a / half])
+        np.divide(half, c, out=roots[0])
+        np.divide(a, half, out=roots[1])
         margin_of = (roots > SAME_ROOT) & (roots < 1)
     which, margin, ray = np.nonzero(margin_of)
     # The slope at the first of the two roots has the sign of -b, at the other that of b, even where they coincide.
