@@ -216,7 +216,8 @@ class Designs:
         margin, lane, turn, part, negative, (doubtful, ends) = sign_changes(
             look, len(sampled), max(self.effort.samples, OF_EXPRESSIONS if expressions else 0),
             ROUNDING * outer / width, SAME_ROOT * reach[owner] / width,
-            np.append(self.field.rounding[rows], np.full(len(legs), SHORTEST * self.field.mechanism.size)), np.arange(len(rows) + len(legs)) >= len(rows),
+            np.append(self.field.rounding[rows], np.full(len(legs), SHORTEST * self.field.mechanism.size)),
+            np.arange(len(rows) + len(legs)) >= len(rows),
         )  # fmt: skip
         less = np.flatnonzero((negative > 0) | (np.bincount(lane, minlength=len(sampled)) > 0))
         if not (less.size or doubtful.size):
