@@ -63,7 +63,8 @@ def sign_changes(
     values, rotations = look(np.arange(lanes), even[:, None])
     some = np.flatnonzero(~_plain(values, rotations, noise, legs))
     lane, place = np.repeat(some, count), np.tile(even, len(some))
-    values, rotations = (table[..., some].swapaxes(1, 2).reshape(len(table), -1) for table in (values, rotations))
+    values = values[..., some].swapaxes(1, 2).reshape(len(values), -1)
+    rotations = rotations[..., some].swapaxes(1, 2).reshape(len(rotations), -1)
     lane, place, values, left = resolved(look, (lane, place, values, rotations), nearest, noise, legs)
     positive = _without_rounding(values, lane, noise) > 0
     negative = np.zeros(lanes, dtype=np.intp)
@@ -149,7 +150,7 @@ def _plain(values: Floats, rotations: Complexes, noise: Floats, legs: Flags) -> 
         far = 8 * values.min(axis=1) > bend
         far[legs] = 4 * np.maximum(values[legs, 1:], values[legs, :-1]).min(axis=1) > bend[legs]
         far[legs] |= values[legs].max(axis=1) <= noise[legs, None]
-        near = norm2(np.diff(rotations, axis=1)) <= FARTHEST_TURN**2
+        near = np.asarray(norm2(np.diff(rotations, axis=1)) <= FARTHEST_TURN**2)
     return np.asarray(far.all(axis=0) & near.all(axis=(0, 1)))
 
 
