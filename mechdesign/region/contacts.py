@@ -182,7 +182,7 @@ class Contacts:
     def _radii(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
         if not lane.size:
             return np.zeros(0)
-        inside, reach, begin = self._inside[lane], self._reach[lane], 0.0
+        inside, reach, begin = self._inside[lane], self._reach[lane], np.zeros(len(lane))
         if not is_turn(self._designs.scan):
             begin, end = within_scan(self._designs, self._centre[lane], theta)
             reach = np.minimum(reach, end)
