@@ -32,6 +32,8 @@ DIVIDED = np.array([0.25, 0.5, 0.75])
 # Where a margin may dip below zero, or rise above it, samples are so far on either side of its parabola's vertex (part
 # of the cell); the third is in the middle of what is left.
 BESIDE = 0.02
+# A margin at the end of a lane has gone to zero as the square of the distance if it is this part of what it is beside.
+TOUCHING = 1e-6
 # Cells of one lane that are divided at once; where more are in doubt, they are rounding's.
 MOST_CELLS = 96
 
@@ -167,11 +169,12 @@ def _open(
         change = np.diff(values)
         second = np.zeros(values.shape)
         second[:, 1:-1] = np.diff(change / width) / (0.5 * (width[1:] + width[:-1]))
-        # At the ends of lanes second differences go on as they do beside them.
+        # At the ends of lanes second differences go on as they do beside them, and away from zero.
         for at, step in ((np.flatnonzero(np.append(True, ~same)), 1), (np.flatnonzero(np.append(~same, True)), -1)):
             one, two = at + step, at + 2 * step
             share = (place[one] - place[at]) / (place[two] - place[one])
-            second[:, at] = second[:, one] + share * (second[:, one] - second[:, two])
+            more = share * np.abs(second[:, one] - second[:, two])
+            second[:, at] = second[:, one] + np.copysign(more, second[:, one])
         bend = np.abs(second)
         bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
         # A margin that touches zero changes no sign.
@@ -182,6 +185,9 @@ def _open(
         row, cell = np.nonzero(doubtful)
         sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, bend[row, cell], noise, safety)
         doubtful[row[sure], cell[sure]] = False
+        # A leg that closes at one of two samples, by rounding, hides what lies between them.
+        closes = ~np.isnan(values)
+        doubtful |= same & legs.any() & (closes[:, 1:] != closes[:, :-1])
         turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
         outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
         undecided = np.flatnonzero((doubtful.any(axis=0) & ~outside) | (turned & same))
@@ -214,8 +220,10 @@ def _curved(
     change, least = np.abs(high - low), np.minimum(np.abs(low), np.abs(high))
     may = (2 * change < bend) & (bend > safety * noise[row]) & (least > noise[row])
     may &= ((low > 0) != (high > 0)) | ((bend - 2 * change) ** 2 >= 8 * least * bend)
-    # From the end of a lane margins may go as the square of the distance, as they do from where they only touch zero.
-    begins, some = ~of_lane[0], np.flatnonzero(may & ~(of_lane[0] & of_lane[3]))
+    # A margin that touches zero at the end of a lane goes from there as the square of the distance; others may go
+    # linearly, where a leg is stretched or folded.
+    begins, touches = ~of_lane[0], least <= TOUCHING * np.maximum(np.abs(low), np.abs(high))
+    some = np.flatnonzero(may & touches & ~(of_lane[0] & of_lane[3]))
     if some.size:
         at = np.where(begins[some], cell[some] + np.arange(4)[:, None], cell[some] + 1 - np.arange(4)[:, None])
         square, f = (place[at] - place[at[0]]) ** 2, values[row[some], at]
