@@ -176,14 +176,19 @@ def _open(
             more = share * np.abs(second[:, one] - second[:, two])
             second[:, at] = second[:, one] + np.copysign(more, second[:, one])
         bend = np.abs(second)
-        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
+        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * safety
+        # Bends may change from sample to sample by more than they are: `_curved` says how far those beside count.
+        beside = bend.copy()
+        beside[:, 1:] = np.where(same[:-1], np.fmax(beside[:, 1:], bend[:, :-1]), bend[:, 1:])
+        beside[:, :-1] = np.where(same[1:], np.fmax(beside[:, :-1], bend[:, 1:]), beside[:, :-1])
+        bend = np.where(legs[:, None], bend, beside * max(1.0, 3.0 / safety)) * width**2
         # A margin that touches zero changes no sign.
         doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
         doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
         most = np.maximum(size[legs, 1:], size[legs, :-1])
         doubtful[legs] = same & (4 * most <= bend[legs]) & (most > noise[legs, None])
         row, cell = np.nonzero(doubtful)
-        sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, bend[row, cell], noise, safety)
+        sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, noise, safety)
         doubtful[row[sure], cell[sure]] = False
         # A leg that closes at one of two samples, by rounding, hides what lies between them.
         closes = ~np.isnan(values)
@@ -202,13 +207,9 @@ def _open(
 
 
 def _curved(
-    row: Ints, cell: Ints, lane: Ints, place: Floats, values: Floats, second: Floats, bend: Floats, noise: Floats,
-    safety: float,
+    row: Ints, cell: Ints, lane: Ints, place: Floats, values: Floats, second: Floats, noise: Floats, safety: float
 ) -> Flags:  # fmt: skip
-    """Which margins may curve so far between two samples that they change their sign once more.
-
-    `bend` is the most that second differences allow.
-    """
+    """Which margins may curve so far between two samples that they change their sign once more."""
     width, last = place[cell + 1] - place[cell], len(lane) - 1
     low, high = values[row, cell], values[row, cell + 1]
     # Where bends hardly change from sample to sample they are known the better.
@@ -216,7 +217,9 @@ def _curved(
     of_lane = (at >= 0) & (at <= last) & (lane[np.clip(at, 0, last)] == lane[cell])
     around = second[row, np.where(of_lane, at, cell + (at > cell))]
     varies = np.fmax.reduce(np.abs(np.diff(around, axis=0)), axis=0)
-    bend = np.fmin(bend, (np.fmax(*np.abs(around[1:3])) + safety * varies) * width**2)
+    # Where they change by more than they are, samples do not resolve the margin: by so much it may bend, too.
+    bend = np.fmax(*np.abs(around[1:3]))
+    bend = np.fmin(np.fmax(safety * bend, bend + varies), bend + safety * varies) * width**2
     change, least = np.abs(high - low), np.minimum(np.abs(low), np.abs(high))
     may = (2 * change < bend) & (bend > safety * noise[row]) & (least > noise[row])
     may &= ((low > 0) != (high > 0)) | ((bend - 2 * change) ** 2 >= 8 * least * bend)
