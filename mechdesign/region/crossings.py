@@ -234,7 +234,7 @@ def _curved(
         bent = 2 * np.diff(slope, axis=0) / (square[2:] - square[:-2])
         bent = (np.abs(bent[0]) + np.abs(np.diff(bent, axis=0)[0])) * safety * square[1] ** 2
         may[some] = 2 * change[some] <= bent
-    return may
+    return np.asarray(may)
 
 
 def _without_rounding(values: Floats, lane: Ints, noise: Floats) -> Floats:
