@@ -91,8 +91,9 @@ class Contacts:
         lowest = self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, LOOKS)
         self.theta[contact, lane], self.scales[contact, lane] = lowest
         least = self.scales.min(axis=0)
-        # Where no ray meets the region it is farther than it is wide.
-        least = np.where(np.isfinite(least), least, 2 * self._reach / np.minimum(shape.width, shape.height))
+        # Where no ray meets the region it is farther than it is wide, or all find outside what another found inside.
+        farther = np.where(self._inside, 0.0, 2 * self._reach / np.minimum(shape.width, shape.height))
+        least = np.where(np.isfinite(least), least, farther)
         self.scale = np.where(self._inside, least, -least)
 
     def _spread(self, number: int) -> tuple[Floats, Floats]:

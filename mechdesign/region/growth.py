@@ -135,8 +135,9 @@ def _largest(
     scale, theta, heights, slopes = look(every, centre, stretch)
     size, slopes[..., :2] = size * scale, slopes[..., :2] * scale[:, None, None]
     curvature, damping = np.zeros((len(lane), 3, 3)), np.full(len(lane), DAMPING)
-    left = every
-    for _ in range(STEPS):
+    # Rays of another centre may leave undecided, or find outside, what those of the scan find inside.
+    left = np.flatnonzero(scale > 0)
+    for _ in range(STEPS if left.size else 0):
         step, hoped, shares = _step(heights[left], slopes[left], curvature[left], damping[left])
         best = np.zeros(len(panels.closes))
         np.maximum.at(best, lane, scale)
