@@ -28,6 +28,8 @@ MINIMA = 6
 CONTACTS = MINIMA + 1
 # Scales over the lowest one are equal if they agree in so many decimals.
 EVEN = 10
+# Between directions scales count up to this factor above those of the two.
+BEYOND = 1.3
 # Contacts up to this factor above the lowest are refined, in so many looks, and in more for the final check.
 LOW = 1.3
 LOOKS = 3
@@ -48,6 +50,11 @@ FARTHEST = 5.0
 POINT = 1e-7
 # Margins below this part of the largest one are rounding.
 ROUNDING = 1e-12
+# Where rays meet many intervals, one that begins inside is traced over so many of them, and farther by this factor as
+# long as it does not end.
+FIRST = 2.0
+MANY = 8
+FARTHER = 4.0
 # Angle between the rays on either side of a hole (radians).
 ABOUT_HOLE = 1e-3
 # A contact is at a corner of the shape if its direction is this near to the corner's (radians).
@@ -72,6 +79,9 @@ class Contacts:
             every, places=every.of(design), count=len(design), centres=centre, effort=BATCH
         )  # fmt: skip
         self._reach = np.abs(centre - every.about) + panels.reach[design]
+        intervals = np.zeros(len(panels.closes), dtype=np.intp)
+        np.maximum.at(intervals, panels.design, panels.intervals)
+        self._near = np.where(intervals > MANY, FIRST / np.maximum(intervals, 1), 1.0)[design] * self._reach
         _, traced, inside = panels.through(design, centre)
         self._inside = np.bincount(traced.ray[inside], minlength=len(design)) > 0
         around, beside = _valleys(*self._spread(RAYS))
@@ -81,8 +91,9 @@ class Contacts:
         lowest = self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, LOOKS)
         self.theta[contact, lane], self.scales[contact, lane] = lowest
         least = self.scales.min(axis=0)
-        # Where no ray meets the region it is farther than it is wide.
-        least = np.where(np.isfinite(least), least, 2 * self._reach / np.minimum(shape.width, shape.height))
+        # Where no ray meets the region it is farther than it is wide, or all find outside what another found inside.
+        farther = np.where(self._inside, 0.0, 2 * self._reach / np.minimum(shape.width, shape.height))
+        least = np.where(np.isfinite(least), least, farther)
         self.scale = np.where(self._inside, least, -least)
 
     def _spread(self, number: int) -> tuple[Floats, Floats]:
@@ -136,7 +147,8 @@ class Contacts:
             vertex = np.where((vertex > low) & (vertex < high), vertex, middle)
             even = middle + EVENLY * np.where(EVENLY > 0, high - middle, middle - low)
             places = np.concatenate([even, vertex + NEARER * np.minimum(high - vertex, vertex - low)])
-            values = self.at(np.tile(lane, len(places)), places.ravel()).reshape(places.shape)
+            most = np.tile(BEYOND * scales.max(axis=0), len(places))
+            values = self.at(np.tile(lane, len(places)), places.ravel(), most).reshape(places.shape)
             places, values = np.concatenate([theta, places]), np.concatenate([scales, values])
             order = places.argsort(axis=0, kind="stable")
             places, values = np.take_along_axis(places, order, axis=0), np.take_along_axis(values, order, axis=0)
@@ -158,7 +170,7 @@ class Contacts:
             place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
             if not lane.size:
                 break
-            lowest_scale = self.at(lane, theta[place, lane])
+            lowest_scale = self.at(lane, theta[place, lane], scale[lane])
             # Where a ray leaves the region and comes back between two of its samples, places along it tell.
             passed = np.flatnonzero(lowest_scale >= scale[lane])
             along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
@@ -168,22 +180,39 @@ class Contacts:
             np.minimum.at(scale, lane, lowest_scale)
         return scale
 
-    def at(self, lane: Ints, theta: Floats) -> Floats:
-        """Scales at which the outline passes through the ends of rays; from outside, where they enter the region."""
-        return self._radii(lane, theta) / self._shape.of(lane).radius(theta)
+    def at(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
+        """Scales at which the outline passes through the ends of rays; from outside, where they enter the region.
 
-    def _radii(self, lane: Ints, theta: Floats) -> Floats:
+        Seen from inside, scales above `most` are that.
+        """
+        radius = self._shape.of(lane).radius(theta)
+        return self._radii(lane, theta, most * radius) / radius
+
+    def _radii(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
         if not lane.size:
             return np.zeros(0)
-        reach = self._reach[lane]
+        inside, reach, begin = self._inside[lane], self._reach[lane], np.zeros(len(lane))
+        if not is_turn(self._designs.scan):
+            begin, end = within_scan(self._designs, self._centre[lane], theta)
+            reach = np.minimum(reach, end)
+        # Nothing counts that lies beyond the scan, or farther away than asked for.
+        reach = np.where(inside, np.minimum(reach, most), reach)
+        ends, left, far = np.zeros(len(lane)), np.arange(len(lane)), np.where(inside, self._near[lane], reach)
+        while left.size:
+            far = np.minimum(far, reach)
+            ends[left] = self._ends(lane[left], theta[left], far[left], begin[left], POINT * reach[left])
+            left = left[inside[left] & (far[left] <= ends[left]) & (far[left] < reach[left])]
+            far = FARTHER * far
+        return ends
+
+    def _ends(self, lane: Ints, theta: Floats, reach: Floats, begin: Floats, near: Floats) -> Floats:
+        """Where rays of a given reach leave or enter the region for the first time; gaps up to `near` do not count."""
         traced = trace(self._designs, lane, theta, reach)
-        ray, inner, outer, _, _ = traced.whole(POINT * reach[traced.ray[1:]])
+        ray, inner, outer, _, _ = traced.whole(near[traced.ray[1:]])
         first = np.searchsorted(ray, np.arange(len(lane)))
         meets = np.append(ray, -1)[first] == np.arange(len(lane))
         inner, outer = (np.append(ends, np.inf)[np.where(meets, first, -1)] for ends in (inner, outer))
-        if not is_turn(self._designs.scan):
-            begin, end = within_scan(self._designs, self._centre[lane], theta)
-            inner, outer = np.maximum(inner, begin), np.minimum(outer, end)
+        inner = np.maximum(inner, begin)
         # A ray that begins in a piece that does not count has to leave that piece.
         enters = np.where(inner > 0, np.where(inner < outer, inner, np.inf), outer)
         return np.where(self._inside[lane], np.where(inner > 0, 0.0, outer), enters)

@@ -32,6 +32,8 @@ DIVIDED = np.array([0.25, 0.5, 0.75])
 # Where a margin may dip below zero, or rise above it, samples are so far on either side of its parabola's vertex (part
 # of the cell); the third is in the middle of what is left.
 BESIDE = 0.02
+# A margin at the end of a lane has gone to zero as the square of the distance if it is this part of what it is beside.
+TOUCHING = 1e-6
 # Cells of one lane that are divided at once; where more are in doubt, they are rounding's.
 MOST_CELLS = 96
 
@@ -50,7 +52,8 @@ def sign_changes(
     noise : ndarray, shape (margins,)
         Size below which a margin has no sign of its own.
     legs : ndarray of bool, shape (margins,)
-        Rows that are no margins but positive functions with which links turn, and which samples are to resolve.
+        Rows that are no margins but positive functions with which links turn, and which samples are to resolve where
+        they are above their `noise`.
 
     Returns
     -------
@@ -58,8 +61,13 @@ def sign_changes(
         Of each root its margin, lane, direction (1 rising, -1 falling) and place; of each lane the number of margins
         that are negative at its begin; and what is in doubt still.
     """
-    lane, place = np.repeat(np.arange(lanes), count), np.tile(np.linspace(0.0, 1.0, count), lanes)
-    lane, place, values, left = resolved(look, (lane, place, *look(lane, place)), nearest, noise, legs)
+    even = np.linspace(0.0, 1.0, count)
+    values, rotations = look(np.arange(lanes), even[:, None])
+    some = np.flatnonzero(~_plain(values, rotations, noise, legs))
+    lane, place = np.repeat(some, count), np.tile(even, len(some))
+    values = values[..., some].swapaxes(1, 2).reshape(len(values), -1)
+    rotations = rotations[..., some].swapaxes(1, 2).reshape(len(rotations), -1)
+    lane, place, values, left = resolved(look, (lane, place, values, rotations), nearest, noise, legs)
     positive = _without_rounding(values, lane, noise) > 0
     negative = np.zeros(lanes, dtype=np.intp)
     first = np.flatnonzero(np.diff(lane, prepend=-1))
@@ -107,19 +115,18 @@ def resolved(
     done: list[tuple[Ints, Floats, Floats]] = []
     lanes, left = len(nearest), [(lane[:0], np.zeros((2, 0)))]
     while True:
-        undecided, parts = _open(lane, place, values, rotations, noise, legs, safety)
-        cell = np.flatnonzero(undecided)
+        cell, parts = _open(lane, place, values, rotations, noise, legs, safety)
         number = np.bincount(lane[cell], minlength=lanes)
         wide = (place[cell + 1] - place[cell] > nearest[lane[cell]]) & (number[lane[cell]] <= MOST_CELLS)
         left.append((lane[cell[~wide]], np.stack([place[cell], place[cell + 1]])[:, ~wide]))
-        cell = cell[wide]
+        cell, parts = cell[wide], parts[:, wide]
         again = np.zeros(lanes, dtype=bool)
         again[lane[cell]] = True
         ready = ~again[lane]
         done.append((lane[ready], place[ready], values[:, ready]))
         if not cell.size:
             break
-        between = place[cell] + parts[:, cell] * (place[cell + 1] - place[cell])
+        between = place[cell] + parts * (place[cell + 1] - place[cell])
         more = np.tile(lane[cell], len(DIVIDED)), between.ravel()
         at_more = look(*more)
         lane, place, values, rotations = (
@@ -134,45 +141,100 @@ def resolved(
     return lane[order], place[order], values[:, order], (doubt_lane, doubt)
 
 
+def _plain(values: Floats, rotations: Complexes, noise: Floats, legs: Flags) -> Flags:
+    """Lanes of even samples, shape (rows, samples, lanes), along which margins are too large for their bends to reach
+    zero and links turn little.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        second = np.diff(values, 2, axis=1)
+        ends = np.abs(2 * second[:, [0, -1]] - second[:, [1, -2]])
+        bend = SAFETY * np.maximum(np.abs(second).max(axis=1), ends.max(axis=1))
+        far = 8 * values.min(axis=1) > bend
+        far[legs] = 4 * np.maximum(values[legs, 1:], values[legs, :-1]).min(axis=1) > bend[legs]
+        far[legs] |= values[legs].max(axis=1) <= noise[legs, None]
+        near = np.asarray(norm2(np.diff(rotations, axis=1)) <= FARTHEST_TURN**2)
+    return np.asarray(far.all(axis=0) & near.all(axis=(0, 1)))
+
+
 def _open(
     lane: Ints, place: Floats, values: Floats, rotations: Complexes, noise: Floats, legs: Flags, safety: float
-) -> tuple[Flags, Floats]:
-    """Which cells between neighbouring samples may hide sign changes inside the region; and where to divide each."""
+) -> tuple[Ints, Floats]:
+    """Cells between neighbouring samples that may hide sign changes inside the region; and where to divide each."""
     same = lane[1:] == lane[:-1]
-    parts = np.tile(DIVIDED[:, None], len(same))
-    if not same.size:
-        return same, parts
+    if not same.any():
+        return np.flatnonzero(same), np.zeros((len(DIVIDED), 0))
     width = np.where(same, np.diff(place), 1.0)
-    positive, size, noise = values > 0, np.abs(values), noise[:, None]
+    positive, size = values > 0, np.abs(values)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         change = np.diff(values)
         second = np.zeros(values.shape)
         second[:, 1:-1] = np.diff(change / width) / (0.5 * (width[1:] + width[:-1]))
-        # At the ends of lanes second differences go on as they do beside them.
+        # At the ends of lanes second differences go on as they do beside them, and away from zero.
         for at, step in ((np.flatnonzero(np.append(True, ~same)), 1), (np.flatnonzero(np.append(~same, True)), -1)):
             one, two = at + step, at + 2 * step
             share = (place[one] - place[at]) / (place[two] - place[one])
-            second[:, at] = second[:, one] + share * (second[:, one] - second[:, two])
-        bend = np.fmax(np.abs(second[:, 1:]), np.abs(second[:, :-1]))
-        # Where bends hardly change from sample to sample they are known the better.
-        varies = np.abs(np.diff(second))
-        beside = varies.copy()
-        beside[:, 1:] = np.where(same[:-1], np.fmax(beside[:, 1:], varies[:, :-1]), beside[:, 1:])
-        beside[:, :-1] = np.where(same[1:], np.fmax(beside[:, :-1], varies[:, 1:]), beside[:, :-1])
-        bend = np.fmin(safety * bend, bend + safety * beside) * width**2
-        least = np.minimum(size[:, 1:], size[:, :-1])
-        doubtful = (2 * np.abs(change) <= bend) & ((positive[:, 1:] != positive[:, :-1]) | (8 * least <= bend))
+            more = share * np.abs(second[:, one] - second[:, two])
+            second[:, at] = second[:, one] + np.copysign(more, second[:, one])
+        bend = np.abs(second)
+        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * safety
+        # Bends may change from sample to sample by more than they are: `_curved` says how far those beside count.
+        beside = bend.copy()
+        beside[:, 1:] = np.where(same[:-1], np.fmax(beside[:, 1:], bend[:, :-1]), bend[:, 1:])
+        beside[:, :-1] = np.where(same[1:], np.fmax(beside[:, :-1], bend[:, 1:]), beside[:, :-1])
+        bend = np.where(legs[:, None], bend, beside * max(1.0, 3.0 / safety)) * width**2
         # A margin that touches zero changes no sign.
-        doubtful &= (bend > safety * noise) & (least > noise)
-        doubtful[legs] = 4 * np.maximum(size[legs, 1:], size[legs, :-1]) <= bend[legs]
-        row, cell = np.nonzero(doubtful & (positive[:, 1:] == positive[:, :-1]) & same)
+        doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
+        doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
+        most = np.maximum(size[legs, 1:], size[legs, :-1])
+        doubtful[legs] = same & (4 * most <= bend[legs]) & (most > noise[legs, None])
+        row, cell = np.nonzero(doubtful)
+        sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, noise, safety)
+        doubtful[row[sure], cell[sure]] = False
+        # A leg that closes at one of two samples, by rounding, hides what lies between them.
+        closes = ~np.isnan(values)
+        doubtful |= same & legs.any() & (closes[:, 1:] != closes[:, :-1])
+        turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
+        outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
+        undecided = np.flatnonzero((doubtful.any(axis=0) & ~outside) | (turned & same))
+        parts = np.tile(DIVIDED[:, None], len(undecided))
+        row, which = np.nonzero((doubtful & (positive[:, 1:] == positive[:, :-1]))[:, undecided])
+        cell = undecided[which]
         curved = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
         vertex = np.clip(np.nan_to_num(0.5 - change[row, cell] / curved, nan=0.5), 2 * BESIDE, 1 - 2 * BESIDE)
         middle = np.where(vertex < 0.5, 1 + vertex, vertex) / 2
-        parts[:, cell] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
-        turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
-    outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
-    return np.asarray(((doubtful.any(axis=0) & ~outside) | turned) & same), parts
+        parts[:, which] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
+    return undecided, parts
+
+
+def _curved(
+    row: Ints, cell: Ints, lane: Ints, place: Floats, values: Floats, second: Floats, noise: Floats, safety: float
+) -> Flags:  # fmt: skip
+    """Which margins may curve so far between two samples that they change their sign once more."""
+    width, last = place[cell + 1] - place[cell], len(lane) - 1
+    low, high = values[row, cell], values[row, cell + 1]
+    # Where bends hardly change from sample to sample they are known the better.
+    at = cell + np.arange(-1, 3)[:, None]
+    of_lane = (at >= 0) & (at <= last) & (lane[np.clip(at, 0, last)] == lane[cell])
+    around = second[row, np.where(of_lane, at, cell + (at > cell))]
+    varies = np.fmax.reduce(np.abs(np.diff(around, axis=0)), axis=0)
+    # Where they change by more than they are, samples do not resolve the margin: by so much it may bend, too.
+    bend = np.fmax(*np.abs(around[1:3]))
+    bend = np.fmin(np.fmax(safety * bend, bend + varies), bend + safety * varies) * width**2
+    change, least = np.abs(high - low), np.minimum(np.abs(low), np.abs(high))
+    may = (2 * change < bend) & (bend > safety * noise[row]) & (least > noise[row])
+    may &= ((low > 0) != (high > 0)) | ((bend - 2 * change) ** 2 >= 8 * least * bend)
+    # A margin that touches zero at the end of a lane goes from there as the square of the distance; others may go
+    # linearly, where a leg is stretched or folded.
+    begins, touches = ~of_lane[0], least <= TOUCHING * np.maximum(np.abs(low), np.abs(high))
+    some = np.flatnonzero(may & touches & ~(of_lane[0] & of_lane[3]))
+    if some.size:
+        at = np.where(begins[some], cell[some] + np.arange(4)[:, None], cell[some] + 1 - np.arange(4)[:, None])
+        square, f = (place[at] - place[at[0]]) ** 2, values[row[some], at]
+        slope = np.diff(f, axis=0) / np.diff(square, axis=0)
+        bent = 2 * np.diff(slope, axis=0) / (square[2:] - square[:-2])
+        bent = (np.abs(bent[0]) + np.abs(np.diff(bent, axis=0)[0])) * safety * square[1] ** 2
+        may[some] = 2 * change[some] <= bent
+    return np.asarray(may)
 
 
 def _without_rounding(values: Floats, lane: Ints, noise: Floats) -> Floats:

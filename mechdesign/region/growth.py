@@ -25,6 +25,9 @@ PANEL_RAYS = 7
 # Places on each interval of these rays, as parts of it; and the number of places that centres start from.
 FRACTIONS = np.array([0.08, 0.25, 0.5, 0.75, 0.92])
 TRIALS = 2
+# Distances from places to ends of intervals that are compared for one design. Where there are more, the places with the
+# most room on their own interval are.
+MOST_DISTANCES = 2_000_000
 # First stretches (see `Shape.placed`) of a rectangle of free proportions.
 STRETCHES = (-0.7, 0.0, 0.7)
 # Most steps of a shape.
@@ -92,6 +95,10 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
         own = shape.of(k).placed(0j, stretch)
         mine = slice(*np.searchsorted(owner, [k, k + 1]))
         z = within[:, mine].ravel()
+        most = MOST_DISTANCES // max(ends[:, mine].size, 1)
+        if z.size > most:
+            least = own.scale_at(ends[:, None, mine] - within[:, mine]).min(axis=0).ravel()
+            z = z[np.sort(np.argsort(-least, kind="stable")[:most])]
         room = own.scale_at(ends[:, mine].ravel() - z[:, None]).min(axis=1, initial=np.inf)
         if not is_turn(designs.scan):
             around = own.directions()[:, 0]
@@ -128,8 +135,9 @@ def _largest(
     scale, theta, heights, slopes = look(every, centre, stretch)
     size, slopes[..., :2] = size * scale, slopes[..., :2] * scale[:, None, None]
     curvature, damping = np.zeros((len(lane), 3, 3)), np.full(len(lane), DAMPING)
-    left = every
-    for _ in range(STEPS):
+    # Rays of another centre may leave undecided, or find outside, what those of the scan find inside.
+    left = np.flatnonzero(scale > 0)
+    for _ in range(STEPS if left.size else 0):
         step, hoped, shares = _step(heights[left], slopes[left], curvature[left], damping[left])
         best = np.zeros(len(panels.closes))
         np.maximum.at(best, lane, scale)

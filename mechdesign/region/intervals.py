@@ -138,7 +138,7 @@ def intervals_between(
         How many margins are negative at the centre.
     """
     rays = len(reach)
-    key = radius + np.where(turn < 0, slack * reach[ray], 0.0)
+    key = radius + np.where(turn < 0, slack * reach[ray], 0.0) if slack else radius
     order = _ascending(margin + np.where(turn < 0, margin.max(initial=0) + 1, 0))
     order = order[_ascending(ray[order])]
     margin, ray, turn = (values[order] for values in (margin, ray, turn))
@@ -172,8 +172,9 @@ def intervals_between(
     beyond = np.zeros(rays, dtype=bool)
     beyond[owner[leaves < 0]] = True
     tie = SAME_ROOT * reach
-    enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
-    leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
+    rising, falling = np.flatnonzero(turn > 0), np.flatnonzero(turn < 0)
+    enters = _first_named(owner, inner, enters, margin[rising], ray[rising], radius[rising], tie)
+    leaves = _first_named(owner, outer, leaves, margin[falling], ray[falling], radius[falling], tie)
     return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, np.ones(rays, dtype=bool),
                      np.zeros(rays))  # fmt: skip
 
@@ -185,12 +186,13 @@ def _ascending(values: Ints) -> Ints:
 
 def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, radius: Floats, tie: Floats) -> Ints:
     """First of the margins with a root within `tie` of an end of an interval: rounding does not choose the label."""
-    best = label.copy()
-    begin = np.searchsorted(ray, owner)
-    end = np.searchsorted(ray, owner, side="right")
-    for k in range(int(np.max(end - begin, initial=0))):
-        at_k = np.minimum(begin + k, max(len(ray) - 1, 0))
-        match = (begin + k < end) & (label >= 0)
-        match[match] = np.abs(radius[at_k[match]] - at[match]) <= tie[owner[match]]
-        best[match] = np.minimum(best[match], margin[at_k[match]])
+    best, number = label.copy(), np.bincount(ray, minlength=len(tie))
+    begin, tie = (np.cumsum(number) - number)[owner], tie[owner]
+    number = np.where(label >= 0, number[owner], 0)
+    for k in range(int(number.max(initial=0))):
+        some = np.flatnonzero(number > k)
+        root = begin[some] + k
+        match = np.abs(radius[root] - at[some]) <= tie[some]
+        some = some[match]
+        best[some] = np.minimum(best[some], margin[root[match]])
     return best

@@ -124,7 +124,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         codes = signatures(traced, len(designs.field.labels)).reshape(rays.shape)
         differ = (codes != codes[0]).any(axis=0) & wide
         # What closes within a hair of a break is no interval of the panel. Names may be rounding's there.
-        ends, each = np.stack([begin + TOGETHER, end - TOGETHER]), np.tile(owner[tested], 2)
+        ends, each = np.stack([begin + together, end - together]), np.tile(owner[tested], 2)
         near = np.flatnonzero(~np.isin([begin, end], fixed[1]) & wide)
         counts = traced.counts.reshape(rays.shape)[[0, -1]].ravel()
         if near.size:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -192,6 +193,19 @@ class Pieces:
             place[k] = complex(float(pose.value(x)), float(pose.value(y)))
         return place
 
+    @cached_property
+    def _last(self) -> list[tuple[tuple[bytes, bytes, float], tuple[Intervals, Ints]]]:
+        """The rays that were traced last."""
+        return []
+
+    def met(self, design: Ints, theta: Floats, slack: float) -> tuple[Intervals, Ints]:
+        """Intervals of rays and the piece of each; the same rays are asked for by piece after piece."""
+        rays = design.tobytes(), theta.tobytes(), slack
+        if not (self._last and self._last[0][0] == rays):
+            traced = self.panels.trace(design, theta, slack)
+            self._last[:] = [(rays, (traced, self.of_intervals(design, theta, traced)))]
+        return self._last[0][1]
+
     def of_intervals(self, design: Ints, theta: Floats, traced: Intervals) -> Ints:
         """The piece of each interval of traced rays; -1 where it has no area, 0 in a design of one piece."""
         piece = np.where(self.number[design[traced.ray]] > 1, self._of_counted(design, theta, traced), 0)
@@ -239,8 +253,7 @@ class _OnePiece(Panels):
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
         """As `Panels.trace`, with the intervals of the piece only."""
-        traced = super().trace(design, theta, slack)
-        piece = self.pieces.of_intervals(design, theta, traced)
+        traced, piece = self.pieces.met(design, theta, slack)
         return traced.kept((piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0)))
 
 

@@ -28,6 +28,8 @@ ROUNDING = 1e-14
 QUADRATIC = 1e-13
 # Intervals no wider than this fraction of the reach are due to rounding.
 NARROWEST = 1e-10
+# A leg shorter than this fraction of the mechanism's size, as the root of a margin, is rounding.
+SHORTEST = 1e-7
 # Least number of samples of an interval where expressions are limited, which may oscillate along a ray.
 OF_EXPRESSIONS = 48
 # Samples of an interval are even steps of an angle, and radii go with its cosine: margins that are square roots of the
@@ -214,9 +216,12 @@ class Designs:
         margin, lane, turn, part, negative, (doubtful, ends) = sign_changes(
             look, len(sampled), max(self.effort.samples, OF_EXPRESSIONS if expressions else 0),
             ROUNDING * outer / width, SAME_ROOT * reach[owner] / width,
-            np.append(self.field.rounding[rows], np.zeros(len(legs))), np.arange(len(rows) + len(legs)) >= len(rows),
+            np.append(self.field.rounding[rows], np.full(len(legs), SHORTEST * self.field.mechanism.size)),
+            np.arange(len(rows) + len(legs)) >= len(rows),
         )  # fmt: skip
         less = np.flatnonzero((negative > 0) | (np.bincount(lane, minlength=len(sampled)) > 0))
+        if not (less.size or doubtful.size):
+            return intervals
         remaining = intervals_between(
             rows[margin], np.searchsorted(less, lane), turn, radius_at(lane, part), negative[less], outer[less], slack
         )
@@ -262,9 +267,11 @@ def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
 
 def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
     """Margin, ray, direction (1 rising) and x of all roots in (0, 1); and how many margins of a ray begin negative."""
+    roots = np.empty((2, *a.shape))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
-        roots = np.stack([half / c, a / half])
+        np.divide(half, c, out=roots[0])
+        np.divide(a, half, out=roots[1])
         margin_of = (roots > SAME_ROOT) & (roots < 1)
     which, margin, ray = np.nonzero(margin_of)
     # The slope at the first of the two roots has the sign of -b, at the other that of b, even where they coincide.

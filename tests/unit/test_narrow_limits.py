@@ -7,11 +7,15 @@ import pytest
 from helpers.joint_plane import elbow, told
 from helpers.legs import KINDS, FiveBar
 from helpers.regions import EFFORTS, asked, compare
+from helpers.studies import study_of
+
+import mechdesign
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "assembly", "seed"), [("five_bar", "same", 15), ("five_bar", "same", 25),
-                         ("3-RRR", "same", 19), ("arm", "any", 11), ("arm", "any", 27)])  # fmt: skip
+                         ("five_bar", "same", 87), ("five_bar", "same", 89), ("3-RRR", "same", 19),
+                         (("arm", "any", 11)), ("arm", "any", 27)])  # fmt: skip
 def test_spikes_bumps_between_samples_and_other_elbows_are_part_of_regions(kind: str, assembly: str, seed: int) -> None:
     compare(KINDS[kind].of(seed), assembly, "of many")
 
@@ -51,3 +55,37 @@ workspace: {{point: P, indices: [resistivity]}}
     true = 2 * np.radians(width) * 7000
     assert abs(area - true) <= 2 * error
     assert abs(mean - np.radians(width) * np.pi / true) <= 2 * doubt
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("rate", [6000, 12000, pytest.param(24000, marks=pytest.mark.nightly)])
+def test_rings_too_many_for_the_samples_of_a_ray_are_part_of_the_error(rate: int, effort: str) -> None:
+    """Where sin(rate r^2) is at least 0.3, in degrees: of every turn of the angle the part (180 - 2 asin 0.3)/360."""
+    (area,), (error,) = asked(rings(rate), effort, ("area",))
+    first = np.degrees(np.arcsin(0.3)) + 360 * np.arange(rate // 100)
+    ends = np.clip([first, first + 180 - 2 * first[0]], 0.25 * rate, 2.25 * rate)
+    true = np.pi * np.ptp(ends, axis=0).sum() / rate
+    assert abs(area - true) <= 2 * error + 1e-9 * true
+    assert error <= 2 * np.pi
+
+
+@pytest.mark.nightly
+def test_a_workspace_of_too_many_rings_is_answered_with_its_error() -> None:
+    """Rays of different accuracy, of the region and of the inscribed circle, need not agree there."""
+    region = mechdesign.workspace(study_of(rings(12000))).main
+    assert 0 < region["area"][0] < 2 * np.pi
+    assert 0.1 < region["area_error"][0] <= 2 * np.pi
+
+
+def rings(rate: int) -> str:
+    return f"""
+units: {{length: m}}
+mechanism:
+  measures: {{wave: "sin({rate}*(P.x*P.x + P.y*P.y))"}}
+  links: {{ground: {{A: [0, 0]}}, upper: [A, B, 1], fore: [B, P, 0.5]}}
+  drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
+  limits: [{{measure: wave, min: 0.3}}]
+  sketch: {{B: [1, 0], P: [1.3, 0.4]}}
+workspace: {{point: P, assembly: any, scan: {{about: [0, 0]}}}}
+"""

@@ -21,6 +21,8 @@ BORDER = 1e-6
 
 def inscribed(panels: Panels, names: Collection[str] = INSCRIBED) -> dict[str, Floats]:
     """The largest circle and rectangle inside the region of each design, those of which there are `names`."""
+    if not names:
+        return {}
     traced, sizes = panels.trace(panels.design, 0.5 * (panels.low + panels.high)), dict[str, Floats]()
     unit = np.where(panels.closes, 0.0, 1.0)
     np.maximum.at(unit, panels.design[traced.ray], traced.outer)

@@ -133,7 +133,12 @@ def integrate(
     for _ in range(MOST_PASSES):
         owner = done.cells["design"]
         total, doubt = done.of_designs(count)
+        # Narrower cells leave as much undecided along their rays, and no error need be smaller than that.
+        undecided = done.undecided(count)
         most, number = allowance(total), np.bincount(owner, minlength=count)
+        most[:2] = np.maximum(most[:2], undecided)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            most[2:] = np.fmax(most[2:], undecided[1] * np.abs(total[2:]) / total[1])
         late = (doubt > most).any(axis=0) & (number < MOST_CELLS)
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
         allowed = np.where(late, LESS, 1.0) * allowed
@@ -150,6 +155,7 @@ def integrate(
         fresh = divided(rough_cells, 0.5 * (rough_cells["start"] + rough_cells["stop"]))
         done = done.kept(~split).joined(Fan.of(panels, integrands, fresh).integrals(integrands, allowed))
     total, doubt = done.of_designs(count)
+    doubt[:2] += done.undecided(count)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = total[2:] / total[1]
         mean_error = (doubt[2:] + np.abs(mean) * doubt[1]) / total[1]
@@ -159,21 +165,31 @@ def integrate(
 
 @dataclass(frozen=True, eq=False)
 class Integrals:
-    """Integrals over cells: of 1, of 1 within the margins of the scan, of the integrands; (rows, cells), and errors."""
+    """Integrals over cells: of 1, of 1 within the margins of the scan, of the integrands; (rows, cells), and errors.
+
+    `open` is the area, shape (cells,), of what stays undecided along rays: it adds to the errors.
+    """
 
     cells: Parts
     value: Floats
     error: Floats
+    open: Floats
 
     def kept(self, keep: Flags) -> Integrals:
         """Those of some cells."""
-        return Integrals(self.cells[keep], self.value[:, keep], self.error[:, keep])
+        return Integrals(self.cells[keep], self.value[:, keep], self.error[:, keep], self.open[keep])
 
     def joined(self, other: Integrals) -> Integrals:
         """Those of all cells of both."""
         values = np.concatenate([self.value, other.value], axis=1)
         errors = np.concatenate([self.error, other.error], axis=1)
-        return Integrals(np.concatenate([self.cells, other.cells]), values, errors)
+        cells, areas = (np.concatenate(both) for both in ((self.cells, other.cells), (self.open, other.open)))
+        return Integrals(cells, values, errors, areas)
+
+    def undecided(self, count: int) -> Floats:
+        """Area of what stays undecided of each design, and of that within the margins of the scan; (2, designs)."""
+        weights = self.open, self.open * self.cells["counted"]
+        return np.array([np.bincount(self.cells["design"], weight, count) for weight in weights])
 
     def of_designs(self, count: int) -> tuple[Floats, Floats]:
         """Sums over the cells of each design, and of their errors; (rows, designs)."""
@@ -242,9 +258,8 @@ class Fan:
         rows = self.area, self.area * cells["counted"], *value
         values, errors = np.stack([ANGLES.apply(row * self.weight) for row in rows], axis=1)
         doubt = ANGLES.weights @ (self.boundary[2].doubt.reshape(self.area.shape) * self.weight)
-        errors[:2] += doubt * np.stack([np.ones(count), cells["counted"]])
         errors[2:] += error + self._lost(value)
-        return Integrals(cells, values, errors).kept(keep)
+        return Integrals(cells, values, errors, doubt).kept(keep)
 
     def _lost(self, value: Floats) -> Floats:
         """What integrands may have on rays whose interval rounding closes, at a cusp: as much as on the next ray."""
