@@ -148,7 +148,22 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     full = (counts > 0) | (high - low < NARROW)
     area, error = raster.area
     return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
-                  raster.undecided)  # fmt: skip
+                  _undecided(designs, raster, reach, owner[full], low[full], high[full], counts[full]))  # fmt: skip
+
+
+def _undecided(
+    designs: Designs, raster: Raster, reach: Floats, owner: Ints, low: Floats, high: Floats, counts: Ints
+) -> Floats:
+    """Area of the cells that the raster leaves open and whose ray, through the centre, is unlike those of its panel."""
+    design, place, cell = (np.concatenate(part) for part in zip(*raster.undecided, strict=True))
+    if not design.size:
+        return np.zeros(designs.count)
+    theta = ray_through(place - designs.about, designs.scan[0])
+    met = trace(designs, design, theta, reach[design]).counts
+    panel = np.searchsorted(owner + 1j * low, design + 1j * theta, side="right") - 1
+    within = (panel >= 0) & (np.append(owner, -1)[panel] == design) & (theta <= np.append(high, 0.0)[panel])
+    unlike = met != np.where(within, np.append(counts, 0)[panel], 0)
+    return np.bincount(design[unlike], (cell.real * cell.imag)[unlike], designs.count).astype(float)
 
 
 def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:

@@ -54,8 +54,8 @@ class Raster:
         Whether the centre of each cell lies in the region.
     holes, slivers : (ndarray of int, complex ndarray)
         Designs and places in holes, and in slivers of the region, that hold no centre.
-    undecided : ndarray, shape (designs,)
-        Area that may hold slivers thinner still.
+    undecided : list of (ndarray of int, complex ndarray, complex ndarray)
+        Designs, centres and sizes of cells that may hold slivers thinner still.
     cut : ndarray of bool, shape (designs,)
         Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
     """
@@ -66,7 +66,7 @@ class Raster:
     inside: Flags
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
-    undecided: Floats
+    undecided: list[tuple[Ints, Complexes, Complexes]]
     cut: Flags
 
     @staticmethod
@@ -79,7 +79,7 @@ class Raster:
             empty = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank, cut = np.zeros((designs.count, cells, cells), dtype=bool), np.zeros(designs.count, dtype=bool)
             raster, holes = (
-                Raster(designs, low, (high - low) / cells, blank, empty, empty, np.zeros(designs.count), cut),
+                Raster(designs, low, (high - low) / cells, blank, empty, empty, [], cut),
                 [empty],
             )
             slivers = [empty]
@@ -134,7 +134,8 @@ class Raster:
             design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
             rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         hit = ~np.isnan(witness)
-        np.add.at(self.undecided, design, cell.real * cell.imag * (rises & ~hit[cell_of_part]))
+        open_ = rises & ~hit[cell_of_part]
+        self.undecided.append((design[open_], place[open_], cell[open_]))
         return cell_design[hit], witness[hit]
 
     def _between_centres(

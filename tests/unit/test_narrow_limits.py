@@ -58,6 +58,16 @@ workspace: {{point: P, indices: [resistivity]}}
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, 5, 24])
+def test_the_error_of_a_design_of_many_is_near_its_true_one(seed: int) -> None:
+    """Narrow limits leave cells of the raster open that rays decide."""
+    text = KINDS["arm"].of(seed).text("same")
+    (alone,), _ = asked(text, "alone", ("area",))
+    (area,), (error,) = asked(text, "of many", ("area",))
+    assert abs(area - alone) <= 2 * error <= 1e-3 * area
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("rate", [6000, 12000, pytest.param(24000, marks=pytest.mark.nightly)])
 def test_rings_too_many_for_the_samples_of_a_ray_are_part_of_the_error(rate: int, effort: str) -> None:
