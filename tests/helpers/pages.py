@@ -65,7 +65,11 @@ def faults(figure: Figure) -> Iterator[str]:
         yield from _lost_digits(axes)
     for axes in figure.axes:
         labels = axes.get_xlabel(), axes.get_ylabel()
-        if _place(labels) and axes.get_aspect() != 1.0 and not any("times larger" in words for words, _, _ in found):
+        if (
+            _place(labels)
+            and axes.get_aspect() != 1.0
+            and not any("times larger" in " ".join(words.split()) for words, _, _ in found)
+        ):
             yield f"unequal axes of a place: {' and '.join(labels)}"
 
 

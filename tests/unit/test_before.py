@@ -47,11 +47,11 @@ def overlaid(command, now, then):
 
 
 @pytest.mark.slow
-def test_names_are_drawn_letter_by_letter():
+def test_names_are_drawn_letter_by_letter(tmp_path):
     """No formula of TeX, and no mark that turns the letters round, which no font has."""
-    now, then = (
-        study_of(FOUR_BAR.format(rocker=60, motion=SWEEP), f"name={name}") for name in ("a", "$\\frac$ \u202e")
-    )
+    file = tmp_path / "study.yaml"
+    file.write_text(FOUR_BAR.format(rocker=60, motion=SWEEP))
+    now, then = (mechdesign.load(file, overrides=[f"name={name}"]) for name in ("a", "$\\frac$ \u202e"))
     result, before = overlaid("kinematics", now, then)
     with style.context():
         figure = figure_of(now, result, "paths", before)

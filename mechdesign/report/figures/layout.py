@@ -332,10 +332,22 @@ def _place(cell: _Cell, left: float) -> None:
         if outer and not (declared.words or len(declared.ticks)):
             tick(axis, declared, width if axis is axes.xaxis else height)
         axis.label.set_visible(True)
+    _keep_on_page(axes)
     axes.yaxis.set_label_coords((PAD - left) / width, 0.5)
     axes.yaxis.label.set_verticalalignment("top")
     axes.xaxis.set_label_coords(0.5, -cell.below / height)
     axes.xaxis.label.set_verticalalignment("bottom")
+
+
+def _keep_on_page(axes: Axes) -> None:
+    """A number below the right end of a panel ends where the page does."""
+    axis, page = axes.xaxis, style.width() * style.dots()
+    places = axis.get_majorticklocs()
+    ends = axes.transData.transform([(place, axes.get_ylim()[0]) for place in places])[:, 0] if len(places) else []
+    numbers = axis.get_major_formatter().format_ticks(places)
+    for tick_there, end, number in zip(axis.get_major_ticks(), ends, numbers, strict=False):
+        if end + 0.5 * DIGIT * len(number) * style.dots() > page >= end:
+            tick_there.label1.set_horizontalalignment("right")
 
 
 def _lines(text: str, size: float) -> float:
