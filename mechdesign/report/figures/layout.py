@@ -342,10 +342,10 @@ def _place(cell: _Cell, left: float) -> None:
 def _keep_on_page(axes: Axes) -> None:
     """A number below the right end of a panel ends where the page does."""
     axis, page = axes.xaxis, style.width() * style.dots()
-    places = axis.get_majorticklocs()
-    ends = axes.transData.transform([(place, axes.get_ylim()[0]) for place in places])[:, 0] if len(places) else []
+    places: list[float] = axis.get_majorticklocs().tolist()
     numbers = axis.get_major_formatter().format_ticks(places)
-    for tick_there, end, number in zip(axis.get_major_ticks(), ends, numbers, strict=False):
+    for tick_there, place, number in zip(axis.get_major_ticks(), places, numbers, strict=False):
+        end = axes.transData.transform((place, axes.get_ylim()[0]))[0]
         if end + 0.5 * DIGIT * len(number) * style.dots() > page >= end:
             tick_there.label1.set_horizontalalignment("right")
 
