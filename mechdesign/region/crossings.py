@@ -176,12 +176,7 @@ def _open(
             more = share * np.abs(second[:, one] - second[:, two])
             second[:, at] = second[:, one] + np.copysign(more, second[:, one])
         bend = np.abs(second)
-        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * safety
-        # Bends may change from sample to sample by more than they are: `_curved` says how far those beside count.
-        beside = bend.copy()
-        beside[:, 1:] = np.where(same[:-1], np.fmax(beside[:, 1:], bend[:, :-1]), bend[:, 1:])
-        beside[:, :-1] = np.where(same[1:], np.fmax(beside[:, :-1], bend[:, 1:]), beside[:, :-1])
-        bend = np.where(legs[:, None], bend, beside * max(1.0, 3.0 / safety)) * width**2
+        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
         # A margin that touches zero changes no sign.
         doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
         doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
