@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from mechdesign.api.questions import workspace as workspace
     from mechdesign.api.shown import Answer as Answer
     from mechdesign.cautions import Caution as Caution
+    from mechdesign.columns import Column as Column
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechanismError as MechanismError
     from mechdesign.errors import MechdesignError as MechdesignError
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
     from mechdesign.importing.conversion import convert as convert
     from mechdesign.report.requirements import Verdict as Verdict
     from mechdesign.report.requirements import requirements as requirements
-    from mechdesign.results import Column as Column
     from mechdesign.results import Table as Table
     from mechdesign.study import Study as Study
 
@@ -63,7 +63,8 @@ _HOMES = {
     ),
     "convert": "mechdesign.importing.conversion",
     **dict.fromkeys(("Verdict", "requirements"), "mechdesign.report.requirements"),
-    **dict.fromkeys(("Column", "Table"), "mechdesign.results"),
+    "Column": "mechdesign.columns",
+    "Table": "mechdesign.results",
     "Study": "mechdesign.study",
     "load": "mechdesign.api.loading",
     **dict.fromkeys(
@@ -80,12 +81,12 @@ def __getattr__(name: str) -> Any:
         from mechdesign.versions import installed
 
         return installed("mechdesign")
-    from importlib import import_module
+    if name in _HOMES:
+        from importlib import import_module
 
+        return getattr(import_module(_HOMES[name]), name)
     from mechdesign.commands import QUESTIONS
 
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
     if name in QUESTIONS:
         from mechdesign.api.questions import question
 

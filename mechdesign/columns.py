@@ -21,7 +21,7 @@ class Column:
     """One column of a table.
 
     >>> import numpy as np
-    >>> from mechdesign.results import Column
+    >>> from mechdesign.columns import Column
     >>> Column("P.x", np.array([1.5, 2.5]), "mm", "coordinate of a point")
     <Column P.x in mm: 2 values>
     """
@@ -58,7 +58,7 @@ class ColumnKind:
     ``<places>`` in its name and its meaning stand for names of a study.
 
     >>> import numpy as np
-    >>> from mechdesign.results import ColumnKind
+    >>> from mechdesign.columns import ColumnKind
     >>> VELOCITY = ColumnKind("<output>_velocity", "velocity of <output>", "as the output, per time")
     >>> VELOCITY.column(np.array([1.5, 2.5]), "mm/s", output="P.x")
     <Column P.x_velocity in mm/s: 2 values>

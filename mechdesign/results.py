@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.columns import Column as Column
-from mechdesign.columns import ColumnKind as ColumnKind
-from mechdesign.columns import filled
+from mechdesign.columns import Column, ColumnKind, filled
 from mechdesign.statistics import Follow
 
 if TYPE_CHECKING:

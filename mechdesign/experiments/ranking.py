@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.schema.matrix import Best
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
 from mechdesign.report.cases import FRONT, RANK
-from mechdesign.results import Column
 
 # Differences up to this part of the largest number count as none, the precision of tables.
 _RESOLUTION = 1e-12

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column
 from mechdesign.errors import Interrupted, StudyError, counted
 from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
@@ -25,7 +26,7 @@ from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
 from mechdesign.report.requirements import DrawnCases, in_words
-from mechdesign.results import Column, Result
+from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units

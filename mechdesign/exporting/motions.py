@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy
@@ -24,7 +25,7 @@ from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import pose_in_words, study_poses
 from mechdesign.report.figures.scene import ranks
 from mechdesign.report.tables import to_csv
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text.units import QuantityError, Units

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from mechdesign.columns import Column
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.family import stacked
 from mechdesign.family.batch import Layout
@@ -16,7 +17,7 @@ from mechdesign.questions.look import look
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared
 from mechdesign.questions.workspace.tables import index_columns
-from mechdesign.results import Column, Result
+from mechdesign.results import Result
 from mechdesign.rows import Chosen, UnknownColumnError
 from mechdesign.statistics import Request
 from mechdesign.study import Study

@@ -7,6 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.motion.curve import Curve
@@ -17,7 +18,7 @@ from mechdesign.motion.parts import within
 from mechdesign.motion.series import Evaluate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.rounding import STILL, cleared, larger
-from mechdesign.results import Column, TableKind
+from mechdesign.results import TableKind
 from mechdesign.statistics import Part, Request
 
 # Prefix of the quotient of a function with poles, from which its mean is taken; how fast a motion passes its places.

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column, ColumnKind
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.rows import TIME, Poses
 from mechdesign.numerics.arrays import Ints
-from mechdesign.results import Column, ColumnKind, Scope, Table
+from mechdesign.results import Scope, Table
 from mechdesign.study.text.units import Units
 
 TIMED = ColumnKind("time", "time from the begin of the motion", "time")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 
-from mechdesign.columns import PLACE
+from mechdesign.columns import PLACE, ColumnKind
 from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.experiments import columns
 from mechdesign.indices import REGIONAL, STATISTICS
 from mechdesign.questions.columns import tables_of
 from mechdesign.reference.entries import Entry
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import TableKind
 
 
 @cache

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.columns import Column
 from mechdesign.errors import printable, printable_lines
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.table_text import texts
 
 _DIGITS = 12

@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 
 from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
+from mechdesign.columns import Column
 from mechdesign.report.figures import pictures
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 
 SLIDER = """\
 name: Offset slider-crank

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from junitparser import JUnitXml
 
+from mechdesign.columns import Column
 from mechdesign.report import manifest
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 from .conftest import SLIDER, answer
 

@@ -23,11 +23,12 @@ import pytest
 
 import mechdesign
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column
 from mechdesign.errors import OutputError, StudyError, explain
 from mechdesign.files import Transaction, owned
 from mechdesign.records import remove_recorded
 from mechdesign.report.writer import write_file
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 
 from .conftest import SLIDER, answer
 from .test_optimize_resume import METHODS, STUDY

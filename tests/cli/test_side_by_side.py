@@ -119,7 +119,8 @@ from types import ModuleType
 import numpy as np
 from mechdesign.cli import process
 from mechdesign.errors import Interrupted
-from mechdesign.results import Column, Result, Table
+from mechdesign.columns import Column
+from mechdesign.results import Result, Table
 
 def kinematics(study, *, seed, jobs, progress):
     result = Result("kinematics", {"motion": Table("motion", (Column("theta", np.arange(3.0), "deg"),))})

@@ -28,7 +28,8 @@ import sys, time
 from types import ModuleType
 import numpy as np
 from mechdesign.cli.app import main
-from mechdesign.results import Column, Result, Table
+from mechdesign.columns import Column
+from mechdesign.results import Result, Table
 
 def kinematics(study, *, seed, jobs, progress):
     progress.start(10, "poses")

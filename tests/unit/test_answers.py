@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
+from mechdesign.columns import Column
 from mechdesign.errors import AssemblyError
 from mechdesign.family.stacked import at_poses
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.poses import study_poses
-from mechdesign.results import Column, Result
+from mechdesign.results import Result
 from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs, variant

@@ -5,7 +5,8 @@ import pickle
 import numpy as np
 import pytest
 
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.columns import ColumnKind
+from mechdesign.results import TableKind
 
 SPEED = ColumnKind("<output>_velocity", "velocity of <output>", "as the output, per time")
 SPRINGS = TableKind.of("springs", "springs <of what>", SPEED, ("x, y", "place of <link>", "length"), ("leg", "its leg"))

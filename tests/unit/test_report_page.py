@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from mechdesign.columns import Column
 from mechdesign.questions.columns import GIVEN, VALID
 from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.reliability.columns import RELIABILITY
@@ -17,7 +18,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
 from mechdesign.report.requirements import verdict_on
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study.schema.conditions import Requirement
 
 X = np.linspace(0, 10, 400)

@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.columns import Column
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.boundary import inscribed_picture
 from mechdesign.questions.workspace.figures.index_maps import index_columns
@@ -21,7 +22,7 @@ from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 
 FIVE_BAR = """
 units: {length: m}

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
@@ -30,7 +31,7 @@ from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table,
 from mechdesign.questions.kinematics.moved import full
 from mechdesign.questions.outputs import expand_outputs
 from mechdesign.questions.poses import Shown
-from mechdesign.results import Column, Result, Scope, Table
+from mechdesign.results import Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
 

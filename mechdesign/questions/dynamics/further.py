@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.columns import Column
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
@@ -23,7 +24,7 @@ from mechdesign.questions.dynamics.flywheel import flywheel_table
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.along import KinematicAlong
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 # Steps of the differences that give a stiffness (radians, or sizes of the mechanism), with their weights: their error
 # is about 1e-12 of the stiffness.

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.question import PoseValues
@@ -15,7 +16,7 @@ from mechdesign.questions.kinematics.columns import INSTANT_CENTRES, JACOBIAN, M
 from mechdesign.questions.kinematics.instant_centres import MOTIONS
 from mechdesign.questions.kinematics.targets import Error, of_values
 from mechdesign.questions.kinematics.values import entry
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 

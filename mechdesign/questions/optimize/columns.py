@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mechdesign.results import ColumnKind, KeyNumber, TableKind
+from mechdesign.columns import ColumnKind
+from mechdesign.results import KeyNumber, TableKind
 
 VARIABLE = ColumnKind("<variable>", "design variable", "as the variable")
 WORST_ROW = ColumnKind("<result>", "worst value of <result>", "as the result")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.columns import Column, ColumnKind
 from mechdesign.errors import MechanismError
 from mechdesign.family.batch import Evaluated
 from mechdesign.family.family import DESIGNS_AT_ONCE
@@ -23,7 +24,6 @@ from mechdesign.questions.optimize.explorer import ASSEMBLY, Part, Points
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
 from mechdesign.questions.optimize.variables import unit_of as variable_unit
 from mechdesign.questions.reliability.schema.limits import SUFFIXES
-from mechdesign.results import Column, ColumnKind
 from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from mechdesign.columns import ColumnKind
 from mechdesign.questions.columns import GIVEN, TIMED, VALID
-from mechdesign.results import ColumnKind, KeyNumber, TableKind
+from mechdesign.results import KeyNumber, TableKind
 
 METHOD = ColumnKind("method", "how it was computed")
 OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability import methods
@@ -26,7 +27,7 @@ from mechdesign.questions.reliability.question import ReliabilityQuestion, holde
 from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
-from mechdesign.results import Column, Drawn, Table
+from mechdesign.results import Drawn, Table
 
 # Bins of a histogram.
 _BINS = 60

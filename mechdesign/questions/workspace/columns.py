@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from mechdesign.columns import ColumnKind
 from mechdesign.indices import REGIONAL, STATISTICS
 from mechdesign.questions.columns import DRIVE
-from mechdesign.results import ColumnKind, KeyNumber, TableKind
+from mechdesign.results import KeyNumber, TableKind
 
 HELD = ColumnKind("<held>", "held coordinate", "as the coordinate")
 PLACE = ColumnKind("x, y", "place of the point", "length")

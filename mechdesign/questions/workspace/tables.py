@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.columns import Column
 from mechdesign.indices import index
 from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Ints
@@ -27,7 +28,7 @@ from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.nodes import Nodes
 from mechdesign.questions.workspace.question import COLUMNS, Question, split
 from mechdesign.questions.workspace.reached import Reached
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 

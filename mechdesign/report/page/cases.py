@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.report.cases import RANK, best_of, short, telling_columns, text_of
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.requirements import DrawnCases, Limits
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study.text.units import Amount
 
 # Cells of the table of a sweep that a page has, at most.

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mechdesign.columns import Column
 from mechdesign.errors import MechdesignError
 from mechdesign.family.stacked import grouped
 from mechdesign.motion.corners import curve_of
@@ -31,7 +32,7 @@ from mechdesign.report.page.moving import gaps
 from mechdesign.report.page.tracks import TIMES, Cell, MovingPicture, ShownNumbers, deltas, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.report.tables import json_text
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study import designs as study_designs
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.columns import VARIED
+from mechdesign.columns import VARIED, Column
 from mechdesign.errors import counted
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
@@ -18,7 +18,7 @@ from mechdesign.questions.workspace.columns import HELD
 from mechdesign.report.cases import RANK, best_of, short, text_of
 from mechdesign.report.figures.style import printed, raised
 from mechdesign.report.requirements import DrawnCases
-from mechdesign.results import Column, KeyNumber, Result, Table
+from mechdesign.results import KeyNumber, Result, Table
 from mechdesign.rows import choose, unit_of
 
 # Largest number of headlines of a question.

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from mechdesign.columns import Column
 from mechdesign.mechanism import Reason
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
@@ -41,7 +42,7 @@ from mechdesign.report.page.tracks import (
     places,
 )
 from mechdesign.report.page.vector import described, inline
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.poses import MotionSection
 

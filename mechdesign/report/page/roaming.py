@@ -15,6 +15,7 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
+from mechdesign.columns import Column
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, Ints, evenly
@@ -27,7 +28,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
 from mechdesign.report.page.linkage import Canvas, Sketcher, add, dashed
 from mechdesign.report.page.tracks import Map, MovingPicture, ShownNumbers, meanings, places
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # Cells along the larger side of a region, each with at most one pose: for a single region, and for each of several.

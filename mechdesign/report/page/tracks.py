@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.page.linkage import Canvas
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 # Integers in a unit of a drawing, and in a degree.
 PLACES = 20

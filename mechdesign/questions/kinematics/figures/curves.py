@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.columns import Column
 from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
@@ -21,7 +22,7 @@ from mechdesign.report.figures.overlay import DASHES, both_named
 from mechdesign.report.figures.panels import Along, abscissa, moving_names, times
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import ranks
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
