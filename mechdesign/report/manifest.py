@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from mechdesign.errors import StudyError
 from mechdesign.files import check_own, check_writable, digest, file_names, proper, unsettled
 from mechdesign.report.names import names
@@ -52,7 +54,7 @@ def whole(directory: Path) -> dict[str, Any]:
         If what stands there is none, as it has other fields than mechdesign writes.
     """
     # Its models are built where one is read, not by every command.
-    from mechdesign.report.written_manifest import ValidationError, WrittenManifest
+    from mechdesign.report.written_manifest import WrittenManifest
 
     content = read(directory)
     try:

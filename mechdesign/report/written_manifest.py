@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, Field, model_validator
-from pydantic import ValidationError as ValidationError
 
 from mechdesign.files import proper
 

@@ -33,7 +33,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.schema.study_file import keys_at, model_of, override
+from mechdesign.study.schema.study_file import annotation_of, keys_at, model_of, override
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder
@@ -365,7 +365,7 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
 @cache
 def adapter(key: str) -> TypeAdapter[Any]:
     """Validator of one top-level key."""
-    return TypeAdapter(model_of((key,)).model_fields[key].rebuild_annotation())
+    return TypeAdapter(annotation_of(key))
 
 
 def _compiled(description: Description, reporter: Reporter, original: Mechanism | None) -> Mechanism | None:

@@ -54,9 +54,14 @@ def model_of(keys: Collection[object]) -> type[StudyFile]:
 
 @cache
 def _model_of(sections: tuple[str, ...]) -> type[StudyFile]:
-    keys: dict[str, Any] = {key: (SECTIONS[key].model | None, None) for key in sections}
-    asked = create_model(StudyFile.__name__, __base__=StudyFile, **keys)
-    return create_model(StudyFile.__name__, __base__=(_Gate, asked), __doc__=StudyFile.__doc__)
+    keys: dict[str, Any] = {key: (annotation_of(key), None) for key in sections}
+    questions = create_model(StudyFile.__name__, __base__=StudyFile, **keys)
+    return create_model(StudyFile.__name__, __base__=(_Gate, questions), __doc__=StudyFile.__doc__)
+
+
+def annotation_of(key: str) -> Any:
+    """What a top-level key of a study takes."""
+    return SECTIONS[key].model | None if key in SECTIONS else _Gate.model_fields[key].rebuild_annotation()
 
 
 def keys_at(path: Sequence[str | int]) -> Mapping[str, FieldInfo | None]:

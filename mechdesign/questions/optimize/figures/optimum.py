@@ -46,7 +46,6 @@ _PANEL_GAP = 0.42
 _BELOW = 0.55
 _LEGEND = 0.35
 _BESIDE = 0.12
-_MAX_BESIDE = 4.0
 _SMALL_SYMBOLS = 0.7
 _ROOM = 0.07  # of its size, about what is shown
 _LETTERS_AN_INCH = 13.5

@@ -27,7 +27,6 @@ from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-MAX_OUTPUTS = 7
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
 MAX_MAPS = 4
 # A limit this many times beyond all errors is named, not drawn.
