@@ -57,8 +57,8 @@ def compare(
         raise StudyError("--rtol and --atol take numbers from 0 on")
     if junit is not None:
         check_replaceable(junit)
-    found = comparison.compare(old, new, Allowance(rtol, atol))
-    return _tell(found, "compare", junit, as_json=json, quiet=quiet)
+    total = comparison.compare(old, new, Allowance(rtol, atol))
+    return _tell(total, "compare", junit, as_json=json, quiet=quiet)
 
 
 @one_thread()
@@ -152,39 +152,39 @@ def _verify(total: Comparison, folder: str, kept: Path, content: dict[str, Any],
             )
 
 
-def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
+def _tell(total: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
     """Show a comparison and return the exit code."""
-    for note in found.notes:
+    for note in total.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
-    for difference in found.differences:
+    for difference in total.differences:
         if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
-    tables, columns = found.compared["tables"], found.compared["columns"]
+    tables, columns = total.compared["tables"], total.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
-    terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
+    terminal.say(f"{command}: {counted(len(total.differences), 'difference')} in {compared}", quiet=quiet)
     if as_json or not sys.stdout.isatty():
-        terminal.show(found.table, as_json=as_json)
+        terminal.show(total.table, as_json=as_json)
     else:
-        terminal.show_lines([str(line) for line in found.differences if line.change not in _SAID])
+        terminal.show_lines([str(line) for line in total.differences if line.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(found, command).encode())
-    return 1 if found.differences else 0
+        writer.write_file(junit, _junit(total, command).encode())
+    return 1 if total.differences else 0
 
 
-def _junit(found: Comparison, command: str) -> str:
+def _junit(total: Comparison, command: str) -> str:
     """JUnit XML: a suite for each folder, with a case for each table and one for all other differences."""
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    moved = [(difference.folder, difference.table) for difference in found.differences]
-    cases = dict.fromkeys([*found.cases, *moved])
+    moved = [(difference.folder, difference.table) for difference in total.differences]
+    cases = dict.fromkeys([*total.cases, *moved])
     for folder in dict.fromkeys(folder for folder, _ in cases):
         suite = TestSuite(folder)
         for table in [name for where, name in cases if where == folder]:
             case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
             wrong = [
                 difference
-                for difference in found.differences
+                for difference in total.differences
                 if (difference.folder, difference.table) == (folder, table)
             ]
             if wrong:

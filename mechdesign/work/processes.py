@@ -76,7 +76,7 @@ def _without_script() -> Iterator[None]:
 
 
 def _begin(settle_in: Callable[..., None], *given: Any) -> None:
-    threading.Thread(target=_watch, args=[each for each in given if isinstance(each, Connection)], daemon=True).start()
+    threading.Thread(target=_watch, args=[end for end in given if isinstance(end, Connection)], daemon=True).start()
     if not sys.warnoptions:
         # What libraries warn of is nothing to users.
         warnings.simplefilter("ignore")

@@ -51,6 +51,18 @@ reliability:
     C: {radial: 0.4, tolerance: 0.3, pin: contact, link: rocker}
   methods: [second_order]
 """
+# A slider-crank whose block is dragged along a level guide.
+SLIDER_CRANK = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, 30]
+    rod: [A, B, 90]
+    block: {points: [B]}
+  joints: {guide: {prismatic: [ground, block], direction: 0}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [20, 22], B: [105, 0]}
+"""
 
 
 def study_of(text: str, *overrides: str) -> mechdesign.Study:

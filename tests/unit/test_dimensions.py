@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from helpers.pages import faults
-from helpers.studies import study_of
+from helpers.studies import SLIDER_CRANK, study_of
 from matplotlib.text import Text
 
 import mechdesign
@@ -32,17 +32,6 @@ reliability:
   outputs: [C]
   poses: [{theta: 90}]
 stiffness: {at: C, sections: {bar: {E: 70 GPa, diameter: 8}}, elastic: {rocker: bar}, actuators: {theta: 1e6 N*mm/rad}}
-"""
-SHEET = """
-mechanism:
-  links:
-    ground: {O: [0, 0]}
-    crank: [O, A, 30]
-    rod: [A, B, 90]
-    block: {points: [B]}
-  joints: {guide: {prismatic: [ground, block], direction: 0}}
-  drives: {theta: {angle: crank}}
-  sketch: {A: [20, 22], B: [105, 0]}
 """
 
 
@@ -124,10 +113,10 @@ mechanism:
 @pytest.mark.slow
 def test_a_sheet_is_at_a_standard_scale():
     for text, paper, scale, words in (
-        (SHEET, None, 1.0, "1 : 1"),
-        (SHEET, "A3", 1.0, "1 : 1"),
-        ("units: {length: m}\n" + SHEET, None, 1 / 1000, "1 : 1000"),
-        ("units: {length: cm}\n" + SHEET, None, 0.1, "1 : 10"),
+        (SLIDER_CRANK, None, 1.0, "1 : 1"),
+        (SLIDER_CRANK, "A3", 1.0, "1 : 1"),
+        ("units: {length: m}\n" + SLIDER_CRANK, None, 1 / 1000, "1 : 1000"),
+        ("units: {length: cm}\n" + SLIDER_CRANK, None, 0.1, "1 : 10"),
     ):
         view = PosedStudy(mechdesign.load(text=text), paper=paper)
         scene = pose(view.mechanism, view.pose)

@@ -10,24 +10,19 @@ import math
 import numpy as np
 import pytest
 from helpers.command_line import ask, exported
+from helpers.studies import SLIDER_CRANK
 
 import mechdesign
 
-SLIDER = """
-mechanism:
-  links:
-    ground: {O: [0, 0]}
-    crank: [O, A, 30]
-    rod: [A, B, 90]
-    block: {points: [B]}
-  joints: {guide: {prismatic: [ground, block], direction: 0}}
-  drives: {theta: {angle: crank}}
-  sketch: {A: [20, 22], B: [105, 0]}
+SLIDER = (
+    SLIDER_CRANK
+    + """\
 kinematics:
   sweep: {theta: {from: 0, to: 360, step: 30}}
   rates: {theta: 60 rpm}
   outputs: [B.x]
 """
+)
 ARM = """
 mechanism:
   links: {ground: {O: [0, 0]}, upper: [O, E, 100], lower: [E, T, 80]}

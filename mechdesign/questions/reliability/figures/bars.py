@@ -128,8 +128,8 @@ def allocation_picture(view: ErrorsView) -> Picture | None:
 
 def allocation(study: Study, tables: Mapping[str, Table]) -> Picture:
     """Bars for each source, its tolerance, given and allocated, and its cost; below, how often either fails."""
-    asked, table = ReliabilitySection.of(study).allocate, tables["allocation"]
-    assert asked is not None
+    section, table = ReliabilitySection.of(study).allocate, tables["allocation"]
+    assert section is not None
     total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
     note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"
     table = table.take(np.arange(len(table))[:MAX_TOLERANCES])
@@ -140,22 +140,22 @@ def allocation(study: Study, tables: Mapping[str, Table]) -> Picture:
     scale = np.ones(len(table)) if alike else given
     written = [f"{value:.3g}" if alike else f"{value:.3g} {unit}" for value, unit in zip(allocated, units, strict=True)]
     tolerance = Axis("tolerance", units[0], margin=0.2) if alike else Axis("tolerance over the given one", margin=0.3)
-    goal, sides = (asked.reliability or 0.0), _failures(tables)
+    goal, sides = (section.reliability or 0.0), _failures(tables)
     asks, axis = (
         f"allowed: {number(1.0 - goal)}",
         Axis("probability that an error leaves its limits, at the pose that fails most", scale="log", margin=0.1),
     )
-    if asked.cpk is not None:
-        goal, sides = asked.cpk, _capabilities(tables)
+    if section.cpk is not None:
+        goal, sides = section.cpk, _capabilities(tables)
         asks, axis = f"asked: {number(goal)}", Axis("least Cpk of any limit at any pose", margin=0.1)
-    line = Lines([goal if asked.cpk is not None else 1.0 - goal], "x", label=asks,
+    line = Lines([goal if section.cpk is not None else 1.0 - goal], "x", label=asks,
                  look={"color": style.VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.6})  # fmt: skip
     panels = [
         Panel(_pair(given / scale, allocated / scale, written), tolerance, sources),
         Panel(_pair(table["cost_given"], table["cost_allocated"]), Axis("cost", margin=0.16), sources),
         Panel([*_sides(sides), line], axis, Axis(words=("as given", "allocated"), ends=(1.6, -0.9)), size=0.45),
     ]
-    noun = "reliability" if asked.cpk is None else "Cpk"
+    noun = "reliability" if section.cpk is None else "Cpk"
     return Picture(f"Cheapest tolerances for a {noun} of {goal:.10g}", panels, (note,), across=2)
 
 
