@@ -70,6 +70,19 @@ def test_the_error_of_a_design_of_many_is_near_its_true_one(seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effort", EFFORTS)
+def test_a_neck_beside_a_panel_narrower_than_breaks_are_known_divides_no_piece(effort: str) -> None:
+    """The mean is taken over a range of angle of 4e-7 rad that begins 9e-8 rad before a gap opens in the ray."""
+    robot, low, high = KINDS["arm"].of(55), 3.583557423, 3.583557813
+    begin, end, margin = np.degrees([low - 0.3, high + 0.3, 0.3])
+    scan = f"workspace.scan.from={begin:.17g}", f"workspace.scan.to={end:.17g}"
+    text = robot.text("same")
+    (whole,), (error,) = asked(text, effort, ("area",), *scan)
+    (area,), (doubt,) = asked(text, effort, ("area",), *scan, f"workspace.margin={margin:.17g}")
+    assert abs(area - whole) <= error + doubt
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("rate", [6000, 12000, pytest.param(24000, marks=pytest.mark.nightly)])
 def test_rings_too_many_for_the_samples_of_a_ray_are_part_of_the_error(rate: int, effort: str) -> None:
     """Where sin(rate r^2) is at least 0.3, in degrees: of every turn of the angle the part (180 - 2 asin 0.3)/360."""
