@@ -222,7 +222,7 @@ def _along_ends(
     end = np.arange(len(owner)) - np.repeat(np.cumsum(2 * counts) - 2 * counts, 2 * counts)
     panels, angles = [owner[:0]], [theta[0, :0]]
 
-    def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Complexes]:
+    def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Floats, Complexes]:
         """Margins but that of the end itself, and rotations, at ends of rays; nan where a ray is unlike its panel."""
         like = signatures(traced, labels)[ray] == codes[owner[lane]]
         slot = np.where(like, np.searchsorted(traced.ray, ray) + end[lane] // 2, -1)
@@ -230,16 +230,16 @@ def _along_ends(
         radius = np.where(last, np.append(traced.outer, np.nan)[slot], np.append(traced.inner, np.nan)[slot])
         name = np.where(last, np.append(traced.leaves, -1)[slot], np.append(traced.enters, -1)[slot])
         z = designs.about + radius * np.exp(1j * angle)
-        margins, rotations = field.sampled(z, designs.of(design[owner[lane]]))
+        margins, away, rotations = field.sampled(z, designs.of(design[owner[lane]]))
         own = np.flatnonzero(name >= 0)
         margins[name[own], own] = 1.0
         # Of several assembly modes that of the end counts.
         margins[name // size != np.arange(labels)[:, None] // size] = 1.0
         # Where a link jumps while a ray's only interval goes on, another margin bounds it.
         rotations[:, counts[owner[lane]] == 1] = 1.0
-        return margins, rotations
+        return margins, away, rotations
 
-    def look(lane: Ints, angle: Floats) -> tuple[Floats, Complexes]:
+    def look(lane: Ints, angle: Floats) -> tuple[Floats, Floats, Complexes]:
         rays, ray = np.unique(owner[lane] + 1j * angle, return_inverse=True)
         panel, directions = rays.real.astype(np.intp), rays.imag
         traced = trace(designs, design[panel], directions, reach[design[panel]])
