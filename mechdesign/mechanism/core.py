@@ -62,13 +62,10 @@ class Bound:
             slide = configuration.slides[self.coordinate.slide]
             value, low, high = slide * np.abs(slide), _squared(low), _squared(high)
         else:
-            value = configuration.value(self.coordinate)
-            if self.of_angle and low is not None and high is not None:
+            away = self.away(configuration, places)
+            if away is not None and low is not None and high is not None:
                 half, counted = (high - low) / 2, self.coordinate.name in configuration.counted
-                away = value - (low + half)
                 whole = half >= np.pi
-                # A drive's angle is given, or already in the turn of its limits.
-                away = away if self.drive else np.where(whole, away, wrap(away))
                 margin = half - np.abs(away)
                 if smooth:
                     turns = counted & np.asarray(self.drive | whole)
@@ -77,12 +74,23 @@ class Bound:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
                 return [(self.label, margin)]
+            value = configuration.value(self.coordinate)
         margins = []
         if low is not None:
             margins.append((f"{self.label} min", value - low))
         if high is not None:
             margins.append((f"{self.label} max", high - value))
         return margins
+
+    def away(self, configuration: Configuration, places: Mapping[str, Value]) -> Value | None:
+        """How far an angle between two bounds is from their middle (radians); None of other limits."""
+        low, high = self.ends(places)
+        if not self.of_angle or low is None or high is None:
+            return None
+        half = (high - low) / 2
+        away = configuration.value(self.coordinate) - (low + half)
+        # A drive's angle is given, or already in the turn of its limits.
+        return away if self.drive else np.where(half >= np.pi, away, wrap(away))
 
     @property
     def of_angle(self) -> bool:

@@ -77,10 +77,11 @@ class AnyMode(Field):
         """As `Field.margins`, of all modes."""
         return np.concatenate([mode.margins(z, places, assembly=assembly) for mode in self.modes])
 
-    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
+    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Floats, Complexes]:
         """As `Field.sampled`, of all modes."""
-        margins, rotations = zip(*(mode.sampled(z, places, assembly=assembly) for mode in self.modes), strict=True)
-        return np.concatenate(margins), np.concatenate(rotations)
+        modes = zip(*(mode.sampled(z, places, assembly=assembly) for mode in self.modes), strict=True)
+        margins, away, rotations = (np.concatenate(tables) for tables in modes)
+        return margins, away, rotations
 
     def poses(self, z: Complexes) -> Configuration:
         """As `Field.poses`, each place in the mode of `configuration`."""
@@ -125,10 +126,9 @@ class AnyModeDesigns(Designs):
         """The same designs: no margin of the assembly is among theirs."""
         return self
 
-    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
-        """As `Designs.look`, with the margins of all modes."""
-        inside, margins = zip(*(mode.look(z, design, assembly=assembly) for mode in self.members), strict=True)
-        return np.logical_or.reduce(inside), np.concatenate(margins)
+    def inside(self, z: Complexes, design: Ints) -> Flags:
+        """As `Designs.inside`, in any of the modes."""
+        return np.asarray(np.logical_or.reduce([mode.inside(z, design) for mode in self.members]))
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """As `Designs.traced`: the intervals of each mode, less those of the modes before it."""

@@ -16,10 +16,11 @@ from mechdesign.mechanism.algebra import norm2
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
-# Margins, shape (margins, ...), and rotations of links, shape (links, ...), on some lanes at places between 0 and 1.
-Look = Callable[[Ints, Floats], tuple[Floats, Complexes]]
-# Lane, place, margins and rotations of samples, in order.
-Samples = tuple[Ints, Floats, Floats, Complexes]
+# Margins, shape (margins, ...), how far angles are from the middle of their limits, of that shape too, and rotations of
+# links, shape (links, ...), on some lanes at places between 0 and 1.
+Look = Callable[[Ints, Floats], tuple[Floats, Floats, Complexes]]
+# Lane, place, and what `Look` tells of samples, in order.
+Samples = tuple[Ints, Floats, Floats, Floats, Complexes]
 # Lane of cells, and places of both ends, shape (2, cells).
 Cells = tuple[Ints, Floats]
 # Bends are taken so many times as large along rays as second differences tell: cells with a kink are then divided until
@@ -62,12 +63,12 @@ def sign_changes(
         that are negative at its begin; and what is in doubt still.
     """
     even = np.linspace(0.0, 1.0, count)
-    values, rotations = look(np.arange(lanes), even[:, None])
+    values, away, rotations = look(np.arange(lanes), even[:, None])
     some = np.flatnonzero(~_plain(values, rotations, noise, legs))
     lane, place = np.repeat(some, count), np.tile(even, len(some))
-    values = values[..., some].swapaxes(1, 2).reshape(len(values), -1)
+    values, away = (table[..., some].swapaxes(1, 2).reshape(len(table), -1) for table in (values, away))
     rotations = rotations[..., some].swapaxes(1, 2).reshape(len(rotations), -1)
-    lane, place, values, left = resolved(look, (lane, place, values, rotations), nearest, noise, legs)
+    lane, place, values, left = resolved(look, (lane, place, values, away, rotations), nearest, noise, legs)
     positive = _without_rounding(values, lane, noise) > 0
     negative = np.zeros(lanes, dtype=np.intp)
     first = np.flatnonzero(np.diff(lane, prepend=-1))
@@ -99,8 +100,8 @@ def resolved(
 
     Parameters
     ----------
-    first : (lane, place, margins, rotations)
-        Samples to begin with, in order.
+    first : Samples
+        Those to begin with.
     nearest, noise, legs
         As in `sign_changes`.
     safety : float
@@ -111,11 +112,11 @@ def resolved(
     (lane, place, margins, open)
         Of all samples; and the cells in doubt still, as nothing is divided further.
     """
-    lane, place, values, rotations = first
+    lane, place, values, away, rotations = first
     done: list[tuple[Ints, Floats, Floats]] = []
     lanes, left = len(nearest), [(lane[:0], np.zeros((2, 0)))]
     while True:
-        cell, parts = _open(lane, place, values, rotations, noise, legs, safety)
+        cell, parts = _open(lane, place, values, away, rotations, noise, legs, safety)
         number = np.bincount(lane[cell], minlength=lanes)
         wide = (place[cell + 1] - place[cell] > nearest[lane[cell]]) & (number[lane[cell]] <= MOST_CELLS)
         left.append((lane[cell[~wide]], np.stack([place[cell], place[cell + 1]])[:, ~wide]))
@@ -129,12 +130,13 @@ def resolved(
         between = place[cell] + parts * (place[cell + 1] - place[cell])
         more = np.tile(lane[cell], len(DIVIDED)), between.ravel()
         at_more = look(*more)
-        lane, place, values, rotations = (
+        lane, place, values, away, rotations = (
             np.concatenate([table[..., ~ready], new], axis=-1)
-            for table, new in zip((lane, place, values, rotations), (*more, *at_more), strict=True)
+            for table, new in zip((lane, place, values, away, rotations), (*more, *at_more), strict=True)
         )
         order = np.lexsort((place, lane))
-        lane, place, values, rotations = lane[order], place[order], values[:, order], rotations[:, order]
+        lane, place, values, away = lane[order], place[order], values[:, order], away[:, order]
+        rotations = rotations[:, order]
     lane, place, values = (np.concatenate(part, axis=-1) for part in zip(*done, strict=True))
     order = np.argsort(lane, kind="stable")
     doubt_lane, doubt = (np.concatenate(part, axis=-1) for part in zip(*left, strict=True))
@@ -156,9 +158,15 @@ def _plain(values: Floats, rotations: Complexes, noise: Floats, legs: Flags) -> 
     return np.asarray(far.all(axis=0) & near.all(axis=(0, 1)))
 
 
+def passed(before: Floats, after: Floats) -> Flags:
+    """Whether angles lie on different sides of the middle of their limits, so that they pass these on the way."""
+    return np.asarray((before * after < 0) & (np.abs(after - before) < np.pi))
+
+
 def _open(
-    lane: Ints, place: Floats, values: Floats, rotations: Complexes, noise: Floats, legs: Flags, safety: float
-) -> tuple[Ints, Floats]:
+    lane: Ints, place: Floats, values: Floats, away: Floats, rotations: Complexes, noise: Floats, legs: Flags,
+    safety: float,
+) -> tuple[Ints, Floats]:  # fmt: skip
     """Cells between neighbouring samples that may hide sign changes inside the region; and where to divide each."""
     same = lane[1:] == lane[:-1]
     if not same.any():
@@ -185,6 +193,9 @@ def _open(
         row, cell = np.nonzero(doubtful)
         sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, noise, safety)
         doubtful[row[sure], cell[sure]] = False
+        # An angle outside its limits at both samples is within them on the way from one side to the other.
+        between = same & passed(away[:, :-1], away[:, 1:]) & ~(positive[:, 1:] | positive[:, :-1])
+        doubtful |= between
         # A leg that closes at one of two samples, by rounding, hides what lies between them.
         closes = ~np.isnan(values)
         doubtful |= same & legs.any() & (closes[:, 1:] != closes[:, :-1])
@@ -195,7 +206,10 @@ def _open(
         row, which = np.nonzero((doubtful & (positive[:, 1:] == positive[:, :-1]))[:, undecided])
         cell = undecided[which]
         curved = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
-        vertex = np.clip(np.nan_to_num(0.5 - change[row, cell] / curved, nan=0.5), 2 * BESIDE, 1 - 2 * BESIDE)
+        vertex = 0.5 - change[row, cell] / curved
+        middle = away[row, cell] / (away[row, cell] - away[row, cell + 1])
+        vertex = np.nan_to_num(np.where(between[row, cell], middle, vertex), nan=0.5)
+        vertex = np.clip(vertex, 2 * BESIDE, 1 - 2 * BESIDE)
         middle = np.where(vertex < 0.5, 1 + vertex, vertex) / 2
         parts[:, which] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
     return undecided, parts

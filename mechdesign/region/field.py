@@ -14,6 +14,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.mechanism import Variant, drawn
@@ -148,12 +149,29 @@ class Field:
         """
         return self.look(z, places, assembly)[0]
 
-    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Complexes]:
-        """Margins at points `z`, as `margins`, and the rotations of the links, shape (links, *z.shape)."""
+    def sampled(self, z: Complexes, places: Places, *, assembly: bool = True) -> tuple[Floats, Floats, Complexes]:
+        """Margins at points `z`, as `margins`, with `away`, and the rotations of the links, shape (links, *z.shape)."""
         margins, configuration = self.look(z, places, assembly)
         # Those that do not turn too: Newton's method has them at each point on some calls and once on others.
         rotations = [np.broadcast_to(rotation, z.shape) for rotation in configuration.rotations]
-        return margins, np.array(rotations, dtype=complex).reshape(len(rotations), *z.shape)
+        turned = np.array(rotations, dtype=complex).reshape(len(rotations), *z.shape)
+        return margins, self.away(configuration, margins), turned
+
+    def away(self, configuration: Configuration, margins: Floats) -> Floats:
+        """Of margins of angles between two limits how far these are from their middle (radians), else 0."""
+        away, places = np.zeros(margins.shape), {**self.mechanism.nominal, **configuration.places}
+        for row, bound in self._two_sided:
+            away[row] = bound.away(configuration, places)
+        return away
+
+    @cached_property
+    def _two_sided(self) -> list[tuple[int, Bound]]:
+        """Margins of angles between two limits, and these."""
+        bounds, causes = self.mechanism.bounds, [cause.role for cause in self._causes]
+        number = [1 if bound.of_angle else sum(end is not None for end in (bound.minimum, bound.maximum))
+                  for bound in bounds]  # fmt: skip
+        rows = np.cumsum([causes.index("limit"), *number]).tolist() if bounds else []
+        return [(row, bound) for row, bound in zip(rows, bounds, strict=False) if bound.of_angle]
 
     def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
         """Margins at points `z`, as `margins`, and the configuration to which they belong."""

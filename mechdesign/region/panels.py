@@ -52,7 +52,8 @@ class Panels:
     raster_area : ndarray, shape (designs,)
         Lower bound of the area by the raster: its inside cells, less the error of that sum.
     undecided : ndarray, shape (designs,)
-        Area of the cells of which the raster neither found a point inside nor excludes one.
+        Area of the cells of which the raster neither found a point inside nor excludes one, and of the cells between
+        rays that were given up.
     """
 
     designs: Designs
@@ -105,7 +106,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     fixed = np.repeat(np.arange(count), 2 + len(cuts)), np.tile([*designs.scan, *cuts], count)
     # Breaks are one, and rays tell nothing beside them, where they are no farther apart than their accuracy.
     together = max(TOGETHER, 2 * designs.field.accuracy)
-    broken, breaks, jumped, jumps = design[:0], angle[:0], design[:0], angle[:0]
+    broken, breaks, jumped, jumps, undecided = design[:0], angle[:0], design[:0], angle[:0], np.zeros(count)
     for rounds in range(ROUNDS + 1):
         split, angles = all_breaks(designs, reach, intervals, design, angle)
         split, angles = np.concatenate([split, jumped]), np.concatenate([angles, jumps])
@@ -130,7 +131,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         if near.size:
             at_ends = trace(designs, each[near], ends.ravel()[near], reach[each[near]]).counts
             differ[near[at_ends != counts[near]] % len(wide)] = True
-        panel, between, jump = _along_ends(designs, probed[0], rays, traced, reach, wide & ~differ)
+        panel, between, jump, undecided = _along_ends(designs, probed[0], rays, traced, reach, wide & ~differ)
         differ[panel] = True
         if not differ.any():
             break
@@ -147,8 +148,9 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     counts = trace(designs, owner, middle, reach[owner]).counts
     full = (counts > 0) | (high - low < NARROW)
     area, error = raster.area
+    undecided += _undecided(designs, raster, reach, owner[full], low[full], high[full], counts[full])
     return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
-                  _undecided(designs, raster, reach, owner[full], low[full], high[full], counts[full]))  # fmt: skip
+                  undecided)  # fmt: skip
 
 
 def _undecided(
@@ -195,7 +197,7 @@ def _with_rays(design: Ints, angle: Floats, owner: Ints, place: Floats) -> tuple
 
 def _along_ends(
     designs: Designs, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
-) -> tuple[Ints, Floats, Flags]:
+) -> tuple[Ints, Floats, Flags, Floats]:
     """Further rays of panels whose rays are `alike`, where the ends of their intervals may not go on between them.
 
     Along an end every other margin is positive and links turn little from ray to ray. Where a margin may dip below
@@ -211,8 +213,9 @@ def _along_ends(
 
     Returns
     -------
-    (panel, angle, jumps)
-        Of each ray that is unlike those of its panel, and of those (`jumps`) at which a link jumps.
+    (panel, angle, jumps, undecided)
+        Of each ray that is unlike those of its panel, and of those (`jumps`) at which a link jumps; the area of each
+        design between rays in doubt that are no farther divided.
     """
     field = designs.field
     labels, size = len(field.labels), len(field.members[0].labels)
@@ -222,7 +225,7 @@ def _along_ends(
     end = np.arange(len(owner)) - np.repeat(np.cumsum(2 * counts) - 2 * counts, 2 * counts)
     panels, angles = [owner[:0]], [theta[0, :0]]
 
-    def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Complexes]:
+    def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Floats, Complexes]:
         """Margins but that of the end itself, and rotations, at ends of rays; nan where a ray is unlike its panel."""
         like = signatures(traced, labels)[ray] == codes[owner[lane]]
         slot = np.where(like, np.searchsorted(traced.ray, ray) + end[lane] // 2, -1)
@@ -230,16 +233,16 @@ def _along_ends(
         radius = np.where(last, np.append(traced.outer, np.nan)[slot], np.append(traced.inner, np.nan)[slot])
         name = np.where(last, np.append(traced.leaves, -1)[slot], np.append(traced.enters, -1)[slot])
         z = designs.about + radius * np.exp(1j * angle)
-        margins, rotations = field.sampled(z, designs.of(design[owner[lane]]))
+        margins, away, rotations = field.sampled(z, designs.of(design[owner[lane]]))
         own = np.flatnonzero(name >= 0)
         margins[name[own], own] = 1.0
         # Of several assembly modes that of the end counts.
         margins[name // size != np.arange(labels)[:, None] // size] = 1.0
         # Where a link jumps while a ray's only interval goes on, another margin bounds it.
         rotations[:, counts[owner[lane]] == 1] = 1.0
-        return margins, rotations
+        return margins, away, rotations
 
-    def look(lane: Ints, angle: Floats) -> tuple[Floats, Complexes]:
+    def look(lane: Ints, angle: Floats) -> tuple[Floats, Floats, Complexes]:
         rays, ray = np.unique(owner[lane] + 1j * angle, return_inverse=True)
         panel, directions = rays.real.astype(np.intp), rays.imag
         traced = trace(designs, design[panel], directions, reach[design[panel]])
@@ -256,7 +259,10 @@ def _along_ends(
     nearest, noise = np.full(len(owner), TOGETHER), ROUNDING * sizes
     _, _, _, (lane, ends) = resolved(look, first, nearest, noise, np.zeros(labels, dtype=bool), designs.effort.bends)
     jumps = np.arange(sum(map(len, panels)) + len(lane)) >= sum(map(len, panels))
-    return np.concatenate([*panels, owner[lane]]), np.concatenate([*angles, ends.mean(axis=0)]), jumps
+    panel, width, at = owner[lane], ends[1] - ends[0], np.searchsorted(traced.ray, owner[lane]) + end[lane] // 2
+    area = 0.5 * width * (traced.outer[at] ** 2 - traced.inner[at] ** 2) * (width > TOGETHER)
+    undecided = np.bincount(design[panel], area, designs.count).astype(float)
+    return np.concatenate([*panels, panel]), np.concatenate([*angles, ends.mean(axis=0)]), jumps, undecided
 
 
 def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats, together: float) -> tuple[Ints, Floats, Floats]:

@@ -17,12 +17,13 @@ from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.intervals import SAME_ROOT, Intervals
-from mechdesign.region.panels import Panels, find_panels
+from mechdesign.region.panels import MIDDLE, Panels, find_panels
 from mechdesign.region.rays import Designs, is_turn
 from mechdesign.region.rules import cubic, spread
 
 # Distances of rays from the end of a panel (radians), tried one after the other until a ray meets as many intervals as
-# the panel's other rays. Breaks nearer to each other than the first distance have been made one.
+# the panel's other rays; then the ray that stands for the panel does, as all of it may be no wider than a break is
+# known. Breaks nearer to each other than the first distance have been made one.
 BESIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 # The largest such distance, as a fraction of the panel.
 PART = 0.125
@@ -131,10 +132,10 @@ class Pieces:
         width = panels.high - panels.low
         radii = np.full((2, 2, len(width), self.counts.max()), np.nan)
         panel = np.flatnonzero(self.counts)
-        for step in BESIDE:
-            distance = np.minimum(step / width[panel], PART)
-            distances, tested = np.concatenate([distance, 2 * distance]), np.tile(panel, 2)
-            theta = panels.low[tested] + (distances if side < 0 else 1 - distances) * width[tested]
+        for step in (*BESIDE, np.inf):
+            distance, tested = np.minimum(step / width[panel], PART) * np.array([[1], [2]]), np.tile(panel, 2)
+            place = MIDDLE if np.isinf(step) else (distance if side < 0 else 1 - distance).ravel()
+            theta = panels.low[tested] + place * width[tested]
             traced = panels.trace(panels.design[tested], theta)
             complete = (traced.counts.reshape(2, -1) == self.counts[panel]).all(axis=0)
             farther, panel_of = np.divmod(traced.ray, len(panel))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.region.crossings import passed
 from mechdesign.region.intervals import Intervals
 from mechdesign.region.rays import Designs, ray_through
 
@@ -86,11 +87,12 @@ class Raster:
             for chunk, part, z in raster._centres(np.arange(designs.count)):
                 scanned, inside = ray_through(z - designs.about, begin) <= end, np.zeros(z.shape, dtype=bool)
                 for mode in designs.members:
-                    is_inside, margins = mode.look(z.reshape(-1, len(chunk)), chunk)
+                    is_inside, margins, away = mode.look(z.reshape(-1, len(chunk)), chunk)
                     own, margins = is_inside.reshape(z.shape), margins.reshape(-1, *z.shape)
+                    away = away.reshape(margins.shape)
                     cut[chunk] |= (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
                     holes.append(raster._between_centres(mode, chunk, z, margins, own))
-                    slivers.append(raster._thin(mode, chunk, z, margins, own, scanned & ~inside))
+                    slivers.append(raster._thin(mode, chunk, z, margins, away, own, scanned & ~inside))
                     inside |= own
                 raster.inside[chunk, *part] = np.moveaxis(scanned & inside, 2, 0)
             rim = raster.inside.copy()
@@ -107,14 +109,15 @@ class Raster:
         )  # fmt: skip
 
     def _thin(
-        self, mode: Designs, designs: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
+        self, mode: Designs, designs: Ints, place: Complexes, margins: Floats, away: Floats, inside: Flags,
+        scanned: Flags,
     ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
         Cells that no margin excludes are divided once, and again while that takes no more points than the raster has.
         Cells left then count as undecided if no part of them lies inside and each margin is positive at some part.
         """
-        row, column, lane = _open(margins, *np.nonzero(scanned & ~_spread(inside)))
+        row, column, lane = _open(margins, away, *np.nonzero(scanned & ~_spread(inside)))
         design, place, cell = designs[lane], place[row, column, lane], self.cell[designs[lane]]
         cell_design, witness, cell_of_part = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
         rises = np.zeros(len(lane), dtype=bool)
@@ -125,11 +128,12 @@ class Raster:
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
-            is_inside, margins = mode.look(part, design, assembly=True)
+            is_inside, margins, away = mode.look(part, design, assembly=True)
             hit = is_inside.any(axis=0)
             witness[cell_of_part[hit]] = part[is_inside.argmax(axis=0), np.arange(len(design))][hit]
             misses = np.nonzero(np.broadcast_to(~hit, (PARTS, PARTS, len(design))))
-            row, column, lane = _open(margins.reshape(len(margins), PARTS, PARTS, len(design)), *misses)
+            shape = len(margins), PARTS, PARTS, len(design)
+            row, column, lane = _open(margins.reshape(shape), away.reshape(shape), *misses)
             at = row * PARTS + column
             design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
             rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
@@ -264,31 +268,36 @@ def _spread(cells: Flags) -> Flags:
     return cells
 
 
-def _open(margins: Floats, row: Ints, column: Ints, lane: Ints) -> tuple[Ints, Ints, Ints]:
+def _open(margins: Floats, away: Floats, row: Ints, column: Ints, lane: Ints) -> tuple[Ints, Ints, Ints]:
     """Cells that no margin excludes: each margin exceeds zero when its change to a neighbouring cell is added.
 
-    Margins are of shape (margins, rows, columns, lanes).
+    Margins, and how far angles are `away` from the middle of their limits, are of shape (margins, rows, columns,
+    lanes).
     """
-    for margin in margins:
+    for margin, from_middle in zip(margins, away, strict=True):
         largest = margin[row, column, lane]
         below = np.flatnonzero(~(largest > 0))
-        largest[below] = _most(margin, row[below], column[below], lane[below])
+        largest[below] = _most(margin, from_middle, row[below], column[below], lane[below])
         unknown = np.flatnonzero(np.isnan(largest))
         if unknown.size:
             # A margin that is unknown beside a stretched leg is judged by the neighbouring cells.
             beside = _beside(margin, row[unknown], column[unknown])
-            largest[unknown] = np.fmax.reduce([_most(margin, *place, lane[unknown]) for place in beside])
+            largest[unknown] = np.fmax.reduce([_most(margin, from_middle, *place, lane[unknown]) for place in beside])
         keep = largest > 0
         row, column, lane = row[keep], column[keep], lane[keep]
     return row, column, lane
 
 
-def _most(margin: Floats, row: Ints, column: Ints, lane: Ints) -> Floats:
-    """A margin at cells plus its largest change to a neighbouring cell; nan where it is unknown."""
+def _most(margin: Floats, away: Floats, row: Ints, column: Ints, lane: Ints) -> Floats:
+    """A margin at cells plus its largest change to a neighbouring cell; nan where it is unknown.
+
+    The margin of an angle is positive on the way from one side of its limits to the other.
+    """
     value, change = margin[row, column, lane], np.zeros(len(row))
     with np.errstate(invalid="ignore"):
         for place in _beside(margin, row, column):
             change = np.fmax(change, np.abs(margin[*place, lane] - value))
+            change[passed(away[row, column, lane], away[*place, lane])] = np.inf
         return value + np.minimum(change, np.finfo(float).max)
 
 

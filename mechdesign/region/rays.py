@@ -126,15 +126,16 @@ class Designs:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
         return self.look(z, design)[0]
 
-    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
-        """Whether places lie in the region, as `inside`, and the margins there, shape (margins, places, designs).
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats, Floats]:
+        """Whether places lie in the region, as `inside`, and margins there, shape (margins, places, designs).
 
-        Without `assembly`, margins of the assembly are inf where other margins exclude a place.
+        With `Field.away` of them. Without `assembly`, margins of the assembly are inf where other margins exclude a
+        place.
         """
         field, places = self.field, self.of(design)
         complete = assembly or field.plan.iterative or not field.same_assembly
-        margins = field.margins(z, places, assembly=complete)
-        inside = np.asarray((margins > 0).all(axis=0))
+        margins, configuration = field.look(z, places, complete)
+        inside, away = np.asarray((margins > 0).all(axis=0)), field.away(configuration, margins)
         if not complete:
             # Determinants cost as much as all other margins together: they are computed only where they decide.
             place, lane = np.nonzero(inside)
@@ -142,8 +143,8 @@ class Designs:
             inside[place, lane] = (all_margins > 0).all(axis=0)
             of_assembly = np.full((len(all_margins) - len(margins), *z.shape), np.inf)
             of_assembly[:, place, lane] = all_margins[len(margins) :]
-            margins = np.concatenate([margins, of_assembly])
-        return inside, margins
+            margins, away = np.concatenate([margins, of_assembly]), np.concatenate([away, np.zeros(of_assembly.shape)])
+        return inside, margins, away
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """Intersect one block of rays with the region, as `trace` does.
@@ -202,16 +203,16 @@ class Designs:
         def radius_at(lane: Ints, part: Floats) -> Floats:
             return spread(inner[lane], outer[lane], np.clip(part, INSET, 1 - INSET), cosine)[0]
 
-        def look(lane: Ints, part: Floats) -> tuple[Floats, Complexes]:
+        def look(lane: Ints, part: Floats) -> tuple[Floats, Floats, Complexes]:
             z = start[lane] + radius_at(lane, part) * direction[lane]
             of_lanes = {name: picked(value, lane) for name, value in local.items()}
-            values, rotations = self.field.sampled(z, of_lanes, assembly=assembly)
+            values, away, rotations = self.field.sampled(z, of_lanes, assembly=assembly)
             lengths = np.sqrt(np.fmax(values[legs], np.finfo(float).tiny))
-            values = values[rows]
+            values, away = values[rows], np.concatenate([away[rows], np.zeros(lengths.shape)])
             # Margins whose roots bound the intervals already have none.
             margin, column = np.nonzero(~counted[:, owner[lane]])
             values[margin, ..., column] = 1.0
-            return np.concatenate([values, lengths]), rotations
+            return np.concatenate([values, lengths]), away, rotations
 
         margin, lane, turn, part, negative, (doubtful, ends) = sign_changes(
             look, len(sampled), max(self.effort.samples, OF_EXPRESSIONS if expressions else 0),

@@ -79,8 +79,9 @@ def _doubts(region: Reached) -> Iterator[Caution]:
     if error > AREA_SURE * values["area"][0]:
         yield Caution(
             "unconverged",
-            f"the area{there} is only known to {error:.2g}: a raster of places that are reached shows more than the "
-            "integral has found; put scan.about into the region, or take more rays",
+            f"the area{there} is only known to {error:.2g}: a limit begins and ends too often along its rays or "
+            "between them, or a raster of places that are reached shows more than the integral has found; put "
+            "scan.about into the region, take more rays, or state limits that oscillate less",
             "indices",
         )
     for name in ("GII", "GRI"):
