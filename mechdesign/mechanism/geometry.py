@@ -77,14 +77,19 @@ class Geometry:
         """Coordinates of a point in its body's frame; of a pin that has an offset, those of its hole."""
         return vector(*(self.term(term, values) for term in self.graph.points[body, point]))
 
-    def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
-        """The offset of the pin at a point, in its body's frame; the plain zero where it has none."""
-        dx, dy = (values.get(name, 0.0) for name in offset_names(body, point))
-        return vector(dx, dy) if np.ndim(dx) or np.ndim(dy) or dx or dy else 0.0
-
     def local(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
         """Coordinates of the pin at a point in the body's frame."""
-        return plus(self.place(body, point, values), 1, self.pin(body, point, values))
+        return vector(*self._local(body, point, values))
+
+    def _local(self, body: str, point: str, values: Mapping[str, Value]) -> tuple[Value, Value]:
+        x, y = (self.term(term, values) for term in self.graph.points[body, point])
+        dx, dy = self._pin(body, point, values)
+        return plus(x, 1, dx), plus(y, 1, dy)
+
+    def _pin(self, body: str, point: str, values: Mapping[str, Value]) -> tuple[Value, Value]:
+        """The offset of the pin at a point, in its body's frame."""
+        dx, dy = (values.get(name, 0.0) for name in offset_names(body, point))
+        return dx, dy
 
     def angle(self, turns: Sequence[Turn], values: Mapping[str, Value]) -> Value:
         """Sum of turns in radians."""
@@ -157,11 +162,16 @@ class Geometry:
     ) -> tuple[Vector, Vector]:  # fmt: skip
         """Vectors w and d of an edge; `offsets` are the rotations of the bodies that have one."""
         total: Vector = 0.0
+        x: Value = 0.0
+        y: Value = 0.0
         for sign, body, arm, _ in self._arms(edge, values):
             offset = offsets.get(body, 1.0)
-            if not isinstance(offset, float) and not isinstance(arm, float):
-                arm = arm * offset
-            total = plus(total, sign, arm)
+            if isinstance(offset, float):
+                # No complex number is made of each arm: that costs as much as its product.
+                x, y = plus(x, sign, arm[0]), plus(y, sign, arm[1])
+            else:
+                total = plus(total, sign, vector(*arm) * offset)
+        total = plus(total, 1, vector(x, y))
         d: Vector = 0.0
         if edge.slide is not None:
             d = rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j
@@ -200,19 +210,19 @@ class Geometry:
                 total = 1j * ((place == name) * vectors.d[k] + values.get(name, 0.0) * d_z[k])
             for sign, body, arm, change in self._arms(edge, values, place):
                 turn = self.angle_derivative(self.graph.bodies[body][1], place, values)
-                total = total + sign * (change + 1j * turn * arm) * vectors.offsets[body]
+                total = total + sign * (change + 1j * turn * vector(*arm)) * vectors.offsets[body]
             w_z.append(total)
         return w_z, d_z
 
     def _arms(
         self, edge: Edge, values: Mapping[str, Value], place: str = ""
-    ) -> Iterator[tuple[int, str, Vector, complex]]:
-        """Terms of an edge's w: sign, body, vector in the body's frame, and its derivative by a place."""
+    ) -> Iterator[tuple[int, str, tuple[Value, Value], complex]]:
+        """Terms of an edge's w: sign, body, x and y in the body's frame, and its derivative by a place."""
         for sign, body, point in edge.locals:
             change = _equal(self.graph.points[body, point], place) + _equal(offset_names(body, point), place)
-            yield sign, body, self.local(body, point, values), change
+            yield sign, body, self._local(body, point, values), change
         for sign, body, point in edge.pins:
-            yield sign, body, self.pin(body, point, values), _equal(offset_names(body, point), place)
+            yield sign, body, self._pin(body, point, values), _equal(offset_names(body, point), place)
 
 
 def _equal(terms: tuple[Term, Term], place: str) -> complex:

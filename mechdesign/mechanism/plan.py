@@ -337,8 +337,8 @@ class Plan:
             for k, _ in self.structure.spans:
                 open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
         reason = np.zeros(shape, dtype=np.int8)
-        reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
         if np.any(open_):
+            reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
             reason[np.broadcast_to(self._free(state), shape)] = Reason.NOT_DETERMINED
         if reached is not None:
             solved = state.solved(shape)

@@ -156,7 +156,8 @@ class Normal(Marginal):
     def draw(self, rng: np.random.Generator, out: Floats) -> None:
         rng.standard_normal(out=out)
         out *= self.sigma
-        out += self.mean
+        if self.mean:
+            out += self.mean
 
     def at(self, u: Floats) -> Floats:
         return np.asarray(self.mean + self.sigma * u)

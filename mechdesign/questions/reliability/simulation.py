@@ -126,7 +126,7 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
     values = nominal_values(setting.mechanism, solved, channels, setting.rates, forces)
     errors = np.empty((len(question.channels), count))
     for error, value, centre in zip(errors, values, setting.centres, strict=False):
-        error[:] = value - centre
+        np.subtract(value, centre, out=error)
     if elastic is not None:
         moved = elastic.errors(made.loads, count)
         errors += moved[: len(errors)]
@@ -191,7 +191,7 @@ class Sums:
         Samples in each cell, of `counted` samples.
     trend : ndarray, shape (steps, 3 + channels)
         Numbers of samples, valid ones and failures, and sums of errors, cumulated step by step.
-    kept : ndarray, shape (channels, n)
+    first : tuple of ndarray, each of shape (channels, n)
         Errors of valid samples of the first chunks.
     """
 
@@ -204,7 +204,12 @@ class Sums:
     density: Ints
     counted: int
     trend: Floats
-    kept: Floats
+    first: tuple[Floats, ...]
+
+    @cached_property
+    def kept(self) -> Floats:
+        """Errors of the samples that are kept, shape (channels, n)."""
+        return np.concatenate([np.empty((len(self.errors), 0)), *self.first], axis=1)
 
     @property
     def mean(self) -> Floats:
@@ -241,7 +246,7 @@ class Sums:
             self.density + other.density if len(other.density) else self.density,
             self.counted + other.counted,
             np.concatenate([self.trend, other.trend + offset]) if len(other.trend) else self.trend,
-            np.concatenate([self.kept, other.kept], axis=1) if other.kept.size else self.kept,
+            self.first + other.first,
         )
 
 
@@ -276,23 +281,24 @@ def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
     errors, valid = errors_of(setting, made, count)
     kept = setting.question.kept(errors)
     within = np.asarray(kept.all(axis=0))
-    broken = count - np.count_nonzero(kept, axis=1)
+    broken = np.array([count - np.count_nonzero(row) for row in kept], dtype=np.intp)
     failures, assembled = count - int(np.count_nonzero(within)), int(np.count_nonzero(valid))
     early = setting.followed and chunk < _TREND_CHUNKS
     trend = _trend(errors, valid, within) if early else np.zeros((0, 3 + len(errors)))
     if assembled < count:
         errors = errors[:, valid]
-    sums = errors.sum(axis=1)
+    # Row by row, which takes linear algebra half the time of so flat a product of matrices.
+    sums, products = errors.sum(axis=1), np.array([errors @ row for row in errors])
     if setting.followed and not early and chunk.bit_count() == 1:
         trend = np.concatenate([[count, assembled, failures], sums])[None]
     density = np.zeros(0, dtype=np.intp)
     if setting.scale is not None and setting.question.pair is not None and chunk < _DENSITY_CHUNKS:
-        standard = [(errors[k] - mean) / sigma
-                    for k, (mean, sigma) in zip(setting.question.pair, setting.scale, strict=True)]  # fmt: skip
-        density = _count_cells(np.stack(standard))
+        density = _count_cells(*(
+            (errors[k] - mean) / sigma for k, (mean, sigma) in zip(setting.question.pair, setting.scale, strict=True)
+        ))  # fmt: skip
     return Sums(
-        count, assembled, failures, broken, sums, errors @ errors.T, density, assembled if len(density) else 0, trend,
-        errors if early else np.empty((len(errors), 0)),
+        count, assembled, failures, broken, sums, products, density, assembled if len(density) else 0, trend,
+        (errors,) if early else (),
     )  # fmt: skip
 
 
@@ -303,8 +309,11 @@ def _trend(errors: Floats, valid: Flags, within: Flags) -> Floats:
     return np.concatenate([counts[None], np.add.reduceat(steps, begins, axis=1).cumsum(axis=1)]).T
 
 
-def _count_cells(standard: Floats) -> Ints:
-    """Samples in each cell of the density's grid, from two standardised errors, shape (2, n)."""
-    cells = np.floor((standard + REACH) * (CELLS / (2 * REACH)))
-    x, y = cells[:, ((cells >= 0) & (cells < CELLS)).all(axis=0)]
-    return np.bincount((x * CELLS + y).astype(np.intp), minlength=CELLS * CELLS)
+def _count_cells(x: Floats, y: Floats) -> Ints:
+    """Samples in each cell of the density's grid, from standardised errors of both outputs, shape (n,)."""
+    # A row of cells on either side counts what lies beyond the grid, or is nan.
+    x, y = (
+        np.fmin(np.fmax(np.floor((part + REACH) * (CELLS / (2 * REACH))), -1.0), float(CELLS)) + 1.0 for part in (x, y)
+    )
+    counts = np.bincount((x * (CELLS + 2) + y).astype(np.intp), minlength=(CELLS + 2) ** 2)
+    return counts.reshape(CELLS + 2, -1)[1:-1, 1:-1].ravel()

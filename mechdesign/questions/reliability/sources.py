@@ -199,10 +199,11 @@ class Sources:
             for scalar, row, u in zip(self.scalars, drawn, normal, strict=False):
                 row[:] = scalar.law.at(u)
         for pin, parts in zip(self.pins, self._by_pin(drawn), strict=True):
-            parts[0] = 0.0
-            if pin.law is not None:
+            if pin.law is None:
+                parts[0] = pin.radius
+            else:
                 pin.law.draw(rng, parts[0])
-            parts[0] += pin.radius
+                parts[0] += pin.radius
             pin.laws[pin.sampled].draw(rng, parts[1:])
         return drawn
 
