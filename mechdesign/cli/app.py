@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from copy import copy
 from functools import partial
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -368,6 +369,14 @@ def schema() -> None:
         emit(json.dumps(study_schema(), indent=2, ensure_ascii=False) + "\n")
 
 
+def answer() -> None:
+    """Do what the command line says; of a command that is named first, Typer prepares that one alone."""
+    asked = copy(app)
+    named = [command for command in app.registered_commands if command.name in sys.argv[1:2]]
+    asked.registered_commands = named or app.registered_commands
+    asked()
+
+
 def main() -> None:
     """The command in a process of its own."""
-    process.run(app)
+    process.run(answer)

@@ -15,7 +15,7 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cautions import Caution
-from mechdesign.cli import places, terminal
+from mechdesign.cli import places, process, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.live_table import Bar
 from mechdesign.cli.options import PDF, Options
@@ -83,6 +83,7 @@ def load_source(source: StudySource, options: Options) -> Study:
     # The rule for files is of what a study names, not of what its user does.
     folder = dataclasses.replace(source.folder, given=given)
     study = load_bytes(source.text, source.path, changes, options.seed, folder)
+    process.settle()
     return dataclasses.replace(study, strict=True) if options.strict else study
 
 
