@@ -34,7 +34,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
-from mechdesign.study import Study, load, template_path
+from mechdesign.study import Study, template_path
 from mechdesign.study.loaded import StudySource
 from mechdesign.study.loading import load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES, leaves, read
@@ -107,7 +107,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     output = extras(command, options)
     before = under = None
     if options.before is not None:
-        before = load(options.before, seed=options.seed, allow_files=options.allow_files)
+        before = mechdesign.load(options.before, seed=options.seed, allow_files=options.allow_files)
         manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
     compute, merging = getattr(mechdesign, command), options.command == MERGE
