@@ -373,7 +373,15 @@ def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
     for name, value in stated.items() if rows.any() else ():
         equal = equal_to(table[name], value)
         if not (rows & equal).any():
-            return f"no row of {table.name} has {name} {value}; {present_words(table[name][rows], value)}"
+            return (
+                f"no row of {table.name} has {_stated(table, name, value)}; {present_words(table[name][rows], value)}"
+            )
         together = together & equal
-    words = ", ".join(f"{name} {value}" for name, value in stated.items())
+    words = ", ".join(_stated(table, name, value) for name, value in stated.items())
     return f"no row of {table.name} has {words} at once" if rows.any() and not together.any() else ""
+
+
+def _stated(table: Table, name: str, value: Any) -> str:
+    """A value of a column in words; a quantity with the unit of the column, to which it was converted."""
+    number = isinstance(value, float) and not isinstance(value, Measured)
+    return f"{name} {value:.12g} {table.column(name).unit}".rstrip() if number else f"{name} {value}"

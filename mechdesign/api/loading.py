@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from mechdesign import study as studies
 from mechdesign.api.shown import ShownStudy
+from mechdesign.errors import StudyError
+from mechdesign.study.loading import load_bytes, load_data, read_file
+from mechdesign.study.text.inputs import Folder
 
 
 def load(
@@ -56,4 +59,16 @@ def load(
     >>> study.mechanism.mobility
     1
     """
-    return ShownStudy.of(studies.load(source, overrides, seed, text=text, allow_files=allow_files))
+    named = isinstance(source, str) and "\n" not in source
+    if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
+        raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
+    if text is not None:
+        content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
+        study = load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
+    elif isinstance(source, Mapping):
+        study = load_data(source, overrides, seed, Folder(anywhere=allow_files))
+    else:
+        assert source is not None
+        file = Path(source)
+        study = load_bytes(read_file(file), file, overrides, seed, Folder(file.parent, allow_files))
+    return ShownStudy.of(study)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import partial
+from copy import copy
+from importlib import import_module
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,6 +22,7 @@ from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted, StudyError
 
+_OPTIONS = {field.name for field in dataclasses.fields(Options)}
 # Typer brings its own Click, or is built on the one that is installed.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
@@ -118,71 +121,19 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, given.with_kinds(args))
 
 
-def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
-    """Add a command: what it does, its arguments and options, and its help."""
+def _add(name: str, action: str, takes: Sequence[Parameter], short: str, long: str) -> None:
+    """Add a command: its function, ``module.function`` of this package, its arguments and options, and its help."""
+    module, _, function = action.partition(".")
 
     def command(**said: Any) -> None:
         with _guard():
-            raise typer.Exit(action(**said))
+            options = Options(command=name, **{key: said.pop(key) for key in list(said) if key in _OPTIONS})
+            with _placed(options):
+                answer: Callable[..., int] = getattr(import_module(f"mechdesign.cli.{module}"), function)
+                raise typer.Exit(answer(options, **said))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, cls=_Command, short_help=short, help=long)(command)
-
-
-# The actions of the commands.
-
-
-def _ask(command: str, study: Path | None, **said: Any) -> int:
-    from mechdesign.cli.execution import ask
-
-    options = Options(command=command, **said)
-    with _placed(options):
-        return ask(command, study, options).exit_code
-
-
-def _sweep(study: Path | None, **said: Any) -> int:
-    from mechdesign.cli.sweep import Matrix, sweep
-
-    matrix = Matrix(**{option.name: said.pop(option.name) for option in given.MATRIX})
-    options = Options(command=SWEEP.name, **said)
-    with _placed(options):
-        return sweep(study, options, matrix)
-
-
-def _run(command: str, study: Sequence[Path] | None, **said: Any) -> int:
-    from mechdesign.cli import batch, compare
-
-    options = Options(command=command, **said)
-    if options.verify is not None:
-        return compare.verify(study, options)
-    with _placed(options):
-        return batch.run(study, options)
-
-
-def _check(study: Sequence[Path] | None, **said: Any) -> int:
-    from mechdesign.cli.check import check
-
-    return check(study, Options(command="check", **said))
-
-
-def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
-    from mechdesign.cli.watch import watch
-
-    return watch(file, commands or (), Options(command="watch", **said))
-
-
-def _export(
-    study: Path | None, to: str, at: str | None, rate: str | None, paper: str | None, **said: Any
-) -> int:  # fmt: skip
-    from mechdesign.cli.export import export
-
-    return export(study, to, (at, rate, paper), Options(command="export", **said))
-
-
-def _compare(**said: Any) -> int:
-    from mechdesign.cli.compare import compare
-
-    return compare(**said)
 
 
 def _placed(options: Options) -> AbstractContextManager[None]:
@@ -197,10 +148,10 @@ def _placed(options: Options) -> AbstractContextManager[None]:
 
 for _name, _question in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
-    _add(partial(_ask, _name), _name, _takes, _question.question, f"{_question.question} {_question.answer}")
+    _add(_name, "execution.question", _takes, _question.question, f"{_question.question} {_question.answer}")
 _add(
-    _sweep,
     SWEEP.name,
+    "sweep.sweep",
     (
         *given.COMMON[:2], *given.MATRIX, *given.COMMON[2:],
         given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
@@ -209,8 +160,8 @@ _add(
     f"{SWEEP.question} {SWEEP.answer}",
 )  # fmt: skip
 _add(
-    partial(_run, "run"),
     "run",
+    "batch.run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
         given.RESUME, given.VERIFY, given.EXECUTOR, given.SHARD,
@@ -219,8 +170,8 @@ _add(
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
 )  # fmt: skip
 _add(
-    partial(_run, MERGE),
     MERGE,
+    "batch.run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
         given.EXECUTOR,
@@ -230,8 +181,8 @@ _add(
     "such as by --set and --seed, is kept with them; --out is given again.",
 )  # fmt: skip
 _add(
-    _check,
     "check",
+    "check.check",
     (
         given.STUDIES,
         given.OUT_DRAWINGS,
@@ -247,8 +198,8 @@ _add(
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
 )
 _add(
-    _export,
     "export",
+    "export.export",
     (
         given.STUDY,
         given.TO,
@@ -267,8 +218,8 @@ _add(
     "JSON.",
 )
 _add(
-    _watch,
     "watch",
+    "watch.watch",
     (
         given.FILE, given.COMMANDS, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET, given.STRICT,
         given.NO_PLOTS, given.FORMAT, given.STYLE, given.REPORT, given.ANIMATE, given.ALLOW_FILES,
@@ -278,8 +229,8 @@ _add(
     "told, and it goes on until Ctrl-C.",
 )  # fmt: skip
 _add(
-    _compare,
     "compare",
+    "compare.compare",
     (
         given.OLD, given.NEW, given.RTOL, given.ATOL, given.JUNIT, given.JSON, given.QUIET,
     ),
@@ -368,6 +319,14 @@ def schema() -> None:
         emit(json.dumps(study_schema(), indent=2, ensure_ascii=False) + "\n")
 
 
+def answer() -> None:
+    """Do what the command line says; of a command that is named first, Typer prepares that one alone."""
+    asked = copy(app)
+    named = [command for command in app.registered_commands if command.name in sys.argv[1:2]]
+    asked.registered_commands = named or app.registered_commands
+    asked()
+
+
 def main() -> None:
     """The command in a process of its own."""
-    process.run(app)
+    process.run(answer)

@@ -99,8 +99,17 @@ def source_of(path: Path | None, options: Options) -> StudySource:
     return source(path, options)
 
 
+def run(options: Options, paths: Sequence[Path] | None) -> int:
+    """Answer every question of the studies, or repeat what manifests say; returns the exit code."""
+    if options.verify is None:
+        return answer_all(paths, options)
+    from mechdesign.cli.compare import verify
+
+    return verify(paths, options)
+
+
 @one_thread()
-def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()) -> int:
+def answer_all(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()) -> int:
     """Answer every question of the studies, or only some; returns the exit code, the highest of them all.
 
     Every study is read before the first is computed. Several are answered side by side, by as many processes as there

@@ -28,7 +28,7 @@ from mechdesign.work.threads import one_thread
 
 
 @one_thread()
-def check(paths: Sequence[Path] | None, options: Options) -> int:
+def check(options: Options, paths: Sequence[Path] | None) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     worst = 0
     owners: dict[str, Path | None] = {}

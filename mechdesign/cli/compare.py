@@ -34,16 +34,7 @@ _SHOWN = 12  # digits of a hash
 _EXACTLY = Allowance(0.0, 0.0)
 
 
-def compare(
-    old: Path,
-    new: Path,
-    rtol: float,
-    atol: float | None,
-    junit: Path | None,
-    *,
-    json: bool,
-    quiet: bool,
-) -> int:
+def compare(options: Options, old: Path, new: Path, rtol: float, atol: float | None) -> int:
     """Compare two folders of results; returns 1 where something moved beyond its tolerance, is missing or new, else 0.
 
     Raises
@@ -55,10 +46,9 @@ def compare(
     """
     if not (math.isfinite(rtol) and math.isfinite(atol or 0)):
         raise StudyError("--rtol and --atol take numbers from 0 on")
-    if junit is not None:
-        check_replaceable(junit)
-    total = comparison.compare(old, new, Allowance(rtol, atol))
-    return _tell(total, "compare", junit, as_json=json, quiet=quiet)
+    if options.junit is not None:
+        check_replaceable(options.junit)
+    return _tell(comparison.compare(old, new, Allowance(rtol, atol)), "compare", options)
 
 
 @one_thread()
@@ -100,7 +90,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             code = max(code, exit_code(result.failed, verdicts, result.main))
             _verify(total, folder, root / folder, content, Path(there))
     total.differences += comparison.stale(recorded)
-    return max(code, _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet))
+    return max(code, _tell(total, "verify", options))
 
 
 def _repeat(
@@ -152,22 +142,22 @@ def _verify(total: Comparison, folder: str, kept: Path, content: dict[str, Any],
             )
 
 
-def _tell(total: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
+def _tell(total: Comparison, command: str, options: Options) -> int:
     """Show a comparison and return the exit code."""
     for note in total.notes:
-        terminal.say(f"{command}: note: {note}", quiet=quiet)
+        terminal.say(f"{command}: note: {note}", quiet=options.quiet)
     for difference in total.differences:
         if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
     tables, columns = total.compared["tables"], total.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
-    terminal.say(f"{command}: {counted(len(total.differences), 'difference')} in {compared}", quiet=quiet)
-    if as_json or not sys.stdout.isatty():
-        terminal.show(total.table, as_json=as_json)
+    terminal.say(f"{command}: {counted(len(total.differences), 'difference')} in {compared}", quiet=options.quiet)
+    if options.json or not sys.stdout.isatty():
+        terminal.show(total.table, as_json=options.json)
     else:
         terminal.show_lines([str(line) for line in total.differences if line.change not in _SAID])
-    if junit is not None:
-        writer.write_file(junit, _junit(total, command).encode())
+    if options.junit is not None:
+        writer.write_file(options.junit, _junit(total, command).encode())
     return 1 if total.differences else 0
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cautions import Caution
-from mechdesign.cli import places, terminal
+from mechdesign.cli import places, process, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.live_table import Bar
 from mechdesign.cli.options import PDF, Options
@@ -34,7 +34,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
-from mechdesign.study import Study, load, template_path
+from mechdesign.study import Study, template_path
 from mechdesign.study.loaded import StudySource
 from mechdesign.study.loading import load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES, leaves, read
@@ -83,6 +83,7 @@ def load_source(source: StudySource, options: Options) -> Study:
     # The rule for files is of what a study names, not of what its user does.
     folder = dataclasses.replace(source.folder, given=given)
     study = load_bytes(source.text, source.path, changes, options.seed, folder)
+    process.settle()
     return dataclasses.replace(study, strict=True) if options.strict else study
 
 
@@ -106,7 +107,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     output = extras(command, options)
     before = under = None
     if options.before is not None:
-        before = load(options.before, seed=options.seed, allow_files=options.allow_files)
+        before = mechdesign.load(options.before, seed=options.seed, allow_files=options.allow_files)
         manifest.check_folder(directory, command, output, manifest.read_by(before))
         output = dataclasses.replace(output, before=manifest.shown_before(before))
     compute, merging = getattr(mechdesign, command), options.command == MERGE
@@ -345,9 +346,15 @@ def drawing_ahead(options: Options) -> AbstractContextManager[None]:
     return ahead.importing(PICTURES, worker_count(options.jobs))
 
 
+def question(options: Options, path: Path | None) -> int:
+    """Answer one question of a study; returns the exit code."""
+    return ask(path, options).exit_code
+
+
 @one_thread()
-def ask(command: str, path: Path | None, options: Options) -> Outcome:
-    """Load a study, answer one question, write and show the result."""
+def ask(path: Path | None, options: Options) -> Outcome:
+    """Load a study, answer the question that is the command, write and show the result."""
+    command = options.command
     with drawing_ahead(options):
         study = load_study(path, options)
         directory = place(folder(study, command, options), options)

@@ -20,8 +20,10 @@ from mechdesign.work.threads import one_thread
 
 
 @one_thread()
-def export(path: Path | None, to: str, said: tuple[str | None, str | None, str | None], options: Options) -> int:
-    """Write one file of a study; returns the exit code. `said` are the pose, the rate and the paper of `PosedStudy`."""
+def export(
+    options: Options, path: Path | None, to: str, at: str | None, rate: str | None, paper: str | None
+) -> int:  # fmt: skip
+    """Write one file of a study in a pose, with a rate or on a paper (see `PosedStudy`); returns the exit code."""
     declared = export_named(to)
     study = load_study(path, options)
     target = options.out or RESULTS / study.label / "export"
@@ -29,7 +31,7 @@ def export(path: Path | None, to: str, said: tuple[str | None, str | None, str |
         target /= to
     check_writable(target.parent)
     check_replaceable(target, read_by(study))
-    view = PosedStudy(study, *said)
+    view = PosedStudy(study, at, rate, paper)
     content = declared.make(view)
     warnings = content.warnings + declared.ignored(view)
     for warning in warnings:

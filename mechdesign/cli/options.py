@@ -54,9 +54,9 @@ def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
     return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotated[kind, meaning])
 
 
-def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
+def _study(name: str, kind: Any, metavar: str, meaning: str) -> Parameter:
     argument = typer.Argument(metavar=metavar, help=meaning, show_default=False, autocompletion=_studies)
-    return _parameter("study", kind | None, None, argument)
+    return _parameter(name, kind | None, None, argument)
 
 
 def _name(flag: str) -> str:
@@ -92,11 +92,13 @@ def _out(meaning: str) -> Parameter:
 
 
 STUDY = _study(
+    "path",
     Path,
     "STUDY",
     "The study file; - is standard input. Left out: study.yaml here, or else the built-in two-link arm.",
 )
 STUDIES = _study(
+    "paths",
     list[Path],
     "STUDY...",
     "The study files, folders of them (*.yaml, *.yml) or patterns; - is standard input. Left out: study.yaml here.",
@@ -243,7 +245,7 @@ def _folder(name: str, meaning: str) -> Parameter:
 
 
 FILE = _parameter(
-    "file", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
+    "path", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
 )
 COMMANDS = _parameter(
     "commands",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import logging
 import os
@@ -51,6 +52,13 @@ def run(command: Callable[[], Any]) -> None:
     if output.lost and (code is None or isinstance(code, int)):
         code = max(code or 0, _NOT_WRITTEN)
     sys.exit(code)
+
+
+def settle() -> None:
+    """Look for garbage from here on, but not among what the command imported (see `mechdesign.__main__`)."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
 
 
 class _Unfailing(io.FileIO):

@@ -72,7 +72,11 @@ def _solve_group(
         start = starts(mechanism, poses, rows) if plan.continued else None
         if plan.angles and anchors is not None:
             start = anchors.at(*np.divmod(rows, poses.line))
-        return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+        solved = plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+        if solved.shape != rows.shape:
+            # A structure, which has no drives, stands in the same pose in every row.
+            return replace(solved, shape=rows.shape, reason=np.full(rows.shape, solved.reason))
+        return solved
 
     turns = _Turns(motion, angles, curve)
     for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):

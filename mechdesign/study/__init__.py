@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mechdesign.study.loaded import Study as Study
-    from mechdesign.study.loading import load as load
     from mechdesign.study.templates import template as template
     from mechdesign.study.templates import template_path as template_path
     from mechdesign.study.text.units import Units as Units
 
 _HOMES = {
-    **dict.fromkeys(("Study", "load"), "loading"),
+    "Study": "loaded",
     **dict.fromkeys(("template", "template_path"), "templates"),
     "Units": "text.units",
 }

@@ -1,4 +1,4 @@
-"""`load`: from a study file to a validated `Study`."""
+"""From the text or the data of a study to a validated `Study`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import contextlib
 import dataclasses
 import hashlib
 import json
-import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
@@ -28,6 +27,7 @@ from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.loaded import TEXT, UNNAMED, Study, StudySource
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import check_result
@@ -36,40 +36,11 @@ from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.study_file import annotation_of, keys_at, model_of, override
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
+from mechdesign.study.text.given import override_texts, plain_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread
-
-if TYPE_CHECKING:
-    pass
-from mechdesign.study.loaded import TEXT, UNNAMED, Study, StudySource
-from mechdesign.study.text.given import override_texts, plain_data
-
-
-def load(
-    source: str | os.PathLike[str] | Mapping[str, Any] | None = None,
-    overrides: Sequence[str] | Mapping[str, Any] = (),
-    seed: int | None = None,
-    *,
-    text: str | bytes | None = None,
-    allow_files: bool = False,
-) -> Study:
-    """Load a study from a file, a mapping or a text in YAML.
-
-    Parameters and errors are told at `mechdesign.load`, which calls this.
-    """
-    named = isinstance(source, str) and "\n" not in source
-    if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
-        raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
-    if text is not None:
-        content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
-        return load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
-    if isinstance(source, Mapping):
-        return load_data(source, overrides, seed, Folder(anywhere=allow_files))
-    assert source is not None
-    file = pathlib.Path(source)
-    return load_bytes(read_file(file), file, overrides, seed, Folder(file.parent, allow_files))
 
 
 def read_file(file: pathlib.Path) -> bytes:
@@ -93,7 +64,7 @@ def load_data(
     drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
     """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
-    folder. See `load`.
+    folder.
     """
     data = plain_data(mapping, "the study")
     source = StudySource(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
@@ -108,7 +79,7 @@ def load_bytes(
     seed: int | None = None,
     folder: Folder | None = None,
 ) -> Study:
-    """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
+    """Load a study from the bytes of a file. Without a `folder`, files that it names lie beside it."""
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
     source = StudySource(path, folder, content, hashlib.sha256(content).hexdigest())
     return _load_changed(read(content, str(path or TEXT)), source, override_texts(overrides), seed)
@@ -160,7 +131,7 @@ def load_document(
     seed: int | None = None,
     original: Mechanism | None = None,
 ) -> Study:
-    """Load a study from the data of a file, overrides applied; see `load`.
+    """Load a study from the data of a file, overrides applied.
 
     Where it differs from the `original` in numbers alone the assembly is that of the original; else the sketch chooses.
     """

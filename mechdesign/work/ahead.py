@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
@@ -35,7 +36,7 @@ def importing(module: str, jobs: int) -> Iterator[None]:
     except OSError:
         yield
         return
-    process.submit(import_module, module)
+    process.submit(_import, module)
     before = _ready.set(Pool(lambda: process, 1))
     try:
         yield
@@ -43,6 +44,13 @@ def importing(module: str, jobs: int) -> Iterator[None]:
         _ready.reset(before)
         process.kill()
         process.shutdown()
+
+
+def _import(module: str) -> None:
+    import_module(module)
+    # What was imported is no garbage, among which a collection would look for some.
+    gc.freeze()
+    gc.enable()
 
 
 def call(function: Callable[Arguments, Value], *arguments: Arguments.args, **options: Arguments.kwargs) -> Value:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.study import load
+from mechdesign import load
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

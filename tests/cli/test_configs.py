@@ -14,11 +14,12 @@ from helpers.pages import faults, lost_curves
 from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
+from mechdesign import load
 from mechdesign.cli.batch import questions
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
-from mechdesign.study import load, template_path
+from mechdesign.study import template_path
 from mechdesign.study.templates import templates
 
 ROOT = Path(__file__).parents[2]

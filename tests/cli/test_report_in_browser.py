@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.pictures import figure_of
 
+from mechdesign import load
 from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
@@ -24,7 +25,6 @@ from mechdesign.report.page.printing import pdf
 from mechdesign.report.page.section import section
 from mechdesign.report.page.vector import picture
 from mechdesign.report.requirements import requirements
-from mechdesign.study import load
 
 try:
     from playwright.sync_api import expect

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mechdesign import load
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.results import Result
-from mechdesign.study import Study, load
+from mechdesign.study import Study
 
 FOLDER = Path(__file__).parents[2] / "configs" / "gallery"
 

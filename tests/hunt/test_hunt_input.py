@@ -23,12 +23,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mechdesign import load
 from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
 from mechdesign.questions.dynamics import motion_in_time
 from mechdesign.questions.optimize import variables
-from mechdesign.study import load, poses, template
+from mechdesign.study import poses, template
 from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
 

@@ -129,6 +129,16 @@ def test_what_newton_cannot_reach_is_not_passed_off_as_the_asked_assembly() -> N
     assert np.isnan(pose["P.x"][1])
 
 
+def test_a_structure_is_answered_in_every_pose_that_is_listed_of_it() -> None:
+    study = study_of(
+        "mechanism: {links: {ground: {O: [0, 0], D: [100, 0]}, a: [O, A, 80], b: [D, A, 80]}, sketch: {A: [50, 60]}}\n"
+        "kinematics: {poses: [{}, {}], outputs: [A]}\n"
+    )
+    motion = mechdesign.kinematics(study).main
+    assert motion["A.y"] == pytest.approx([np.sqrt(80**2 - 50**2)] * 2)
+    assert motion["valid"].all()
+
+
 def test_relative_drive_turns_with_the_link_it_is_mounted_on() -> None:
     text = """
 mechanism:

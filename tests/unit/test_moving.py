@@ -12,11 +12,11 @@ from helpers.studies import study_of
 from helpers.tracks import decoded
 
 import mechdesign
+from mechdesign import load
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS, joined
-from mechdesign.study import load
 
 
 def places(data, point):

@@ -90,6 +90,16 @@ def test_rows_that_never_are_are_mistakes_of_the_study(where, told):
     assert "requirements.0" in str(caught.value)
 
 
+def test_a_quantity_that_no_row_has_is_told_in_the_unit_of_the_column():
+    study = mechdesign.load(
+        text="mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}\n"
+        "kinematics: {poses: [{arm: 0}, {arm: 60}], outputs: [P]}\n"
+        "requirements: [{result: kinematics.P.x, where: {arm: 1 rad}, at_least: 1}]\n"
+    )
+    with pytest.raises(mechdesign.StudyError, match=r"no row of motion has arm 57\.2957795131 deg; there are 0, 60"):
+        _ = mechdesign.kinematics(study).verdicts
+
+
 def test_the_nearest_of_many_rows_is_told():
     motion = {"theta": np.linspace(0, 360, 73), "mu": np.ones(73)}
     with pytest.raises(mechdesign.StudyError, match="there are 0 to 360, 35 the nearest"):
