@@ -113,14 +113,14 @@ def pass_over(question: PoseQuestion, progress: Progress, jobs: int | None) -> P
     arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}
     totalled = sum((part.totals for part in parts), np.zeros(()))
     whole = PoseValues(own, np.concatenate([part.reason for part in parts]), arrays, totalled)
-    shown = replace(kept.shown, motion=own.motion, rows=np.searchsorted(np.concatenate(rows), kept.rows))
+    shown = replace(kept.shown, rows=np.searchsorted(np.concatenate(rows), kept.rows))
     return Passage(question, whole, shown, reason, [totals], [])
 
 
 def _long(question: PoseQuestion) -> bool:
     """Whether poses are too many to be held with all their columns, and all of one kind and one design."""
     poses = question.poses
-    single = len(poses.groups) == 1 and poses.designs == 1 and not poses.regions
+    single = len(poses.groups) == 1 and poses.designs == 1 and not poses.rule.regions
     return question.divisible and poses.count > POSES_AT_ONCE and single and not poses.listed
 
 
@@ -169,7 +169,7 @@ class _Kept:
         whole = self.parts[0]
         if len(self.parts) > 1:
             whole = joined(self.parts, self.rows.shape, whole.take(0).vectors, {})
-        return SolvedPoses(self.motion, self.rows, self.motion.poses.groups[0].names, whole)
+        return SolvedPoses(self.motion.at(self.motion.poses.take(self.rows)), self.rows, whole)
 
 
 def shown_rows(poses: Poses, most: int = MAX_SHOWN_POSES) -> Ints:

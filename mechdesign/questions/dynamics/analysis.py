@@ -172,7 +172,7 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
         return [*warnings, *assumed(study), *between.warnings], gaps
 
     def drawn(self, passage: Passage, between: Forced) -> DrawnForces:
-        return DrawnForces(shown_of(self.study, passage.shown), passage.values, between.along)
+        return DrawnForces(shown_of(self.study, passage), passage.values, between.along)
 
     def _undefined(self, row: int) -> str:
         """What leaves the forces at a row without a value: the slope of a coupling, or else a load."""

@@ -14,7 +14,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.passage import MAX_SHOWN_POSES, Mark
 from mechdesign.motion.question import PoseValues, unfilled
-from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.rows import TIME, GivenRows, Poses
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress
@@ -156,14 +156,11 @@ def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
         {drive.name: of(drive, course.positions.rate(drive, part)) for drive in drives}
         for part in (course.rates.velocity, course.rates.acceleration)
     )
-    poses = Poses(
-        (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
-        slopes=slopes, bends=bends,
-    )  # fmt: skip
+    poses = Poses(GivenRows.single({TIME: course.times, **values}, slopes=slopes, bends=bends))
     question = DynamicQuestion.of(study, poses)
     if len(course.rates.friction):
         question = replace(question, forces=replace(question.acting, rubbing=course.rates.friction))
-    motion, solved = unfilled(question), SolvedPoses(question.motion, rows, mechanism.drives, course.configuration)
+    motion, solved = unfilled(question), SolvedPoses(question.motion, rows, course.configuration)
     mechanism.forward.judge(replace(course.configuration, reason=motion.reason))
     motion.put(rows, full(question.moved(solved)[0], rows.shape))
     # Efforts are known, also where the drives are singular.

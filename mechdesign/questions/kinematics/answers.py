@@ -156,7 +156,7 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
         return [*warnings, *cautions(self.study, between.cams, design)], []
 
     def drawn(self, passage: Passage, between: Events) -> DrawnMotion:
-        shown = shown_of(self.study, passage.shown)
+        shown = shown_of(self.study, passage)
         return DrawnMotion(shown, passage.values, between.along, between.limits, between.toggles)
 
 

@@ -54,8 +54,7 @@ class CamSide:
 def profiles(study: Study, poses: Poses) -> list[CamSide]:
     """The profiles of all cams in each design."""
     sides = []
-    per_design = poses.count // poses.designs
-    places = {name: values[::per_design, None] for name, values in poses.places.items()}
+    places = {name: values[:, None] for name, values in poses.own.places.items()}
     for cam in study.mechanism.cams:
         configuration = cam.along(cam.values, places)
         shape = poses.designs, len(cam.values)

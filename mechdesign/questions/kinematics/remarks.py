@@ -52,7 +52,7 @@ def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
-    subject = f"the steps of {'the motion' if poses.program is not None else poses.swept or 'the path'} are"
+    subject = f"the steps of {'the motion' if poses.rule.timed else poses.swept or 'the path'} are"
     return [Caution(
         "incomplete",
         f"{subject} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
@@ -173,11 +173,11 @@ def _conditioning(question: KinematicQuestion, marks: Mapping[str, Mark]) -> lis
 def _astray(question: KinematicQuestion) -> list[Caution]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
     study, section, poses = question.study, question.section, question.poses
-    if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
+    if not poses.followed or section.speed is not None or not set(section.rates) & set(poses.names):
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
     unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
-    constant = poses.section(section, slice(1)).rates
+    constant = poses.take(slice(1)).section(section).rates
     rates = np.array([np.sum(constant.get(name, 0.0)) * u for name, u in zip(poses.names, unit, strict=True)])
     if not rates.any():
         return []
