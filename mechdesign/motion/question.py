@@ -74,8 +74,8 @@ class PoseQuestion(ABC):
     def values(self, part: SolvedPoses) -> Mapping[str, Any]:
         """What it has at solved poses: arrays of shape (poses, ...), or lists of lanes with the `row` of a pose."""
 
-    def marks(self, values: PoseValues) -> Mapping[str, Flags]:
-        """Poses of which something is to be said, by what it is."""
+    def marks(self, values: PoseValues) -> Mapping[Any, Flags]:
+        """Poses of which something is to be said, by the `Remark`."""
         return {}
 
     def totals(self, values: PoseValues) -> Floats:
