@@ -13,7 +13,7 @@ from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import Poses, with_length
+from mechdesign.motion.rows import Path, Poses
 from mechdesign.motion.solving import curve_with
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL
@@ -177,7 +177,7 @@ class Timed:
         rows = np.linspace(0.0, poses.end, poses.end * LOOKS + 1)
         clock = self._clock(poses, rows)
         places = np.interp(times, clock, rows)
-        if poses.program is None and self.section.speed is not None:
+        if not poses.rule.timed and self.section.speed is not None:
             for _ in range(STEPS):
                 pace = poses.pace(np.zeros(len(times), dtype=np.intp), places) / self.section.speed
                 away = (self._clock(poses, places) - times) / np.where(pace > 0, pace, np.inf)
@@ -187,10 +187,10 @@ class Timed:
     def _clock(self, poses: Poses, places: Floats) -> Floats:
         """Time at places along the motion."""
         line = np.zeros(len(places), dtype=np.intp)
-        if poses.program is not None:
-            return poses.program.time(line, places)
-        if self.section.speed is not None:
-            return with_length(poses.paths)[0][1].way(line, places) / self.section.speed
+        if (timed := poses.along(line, places).times) is not None:
+            return timed
+        if self.section.speed is not None and isinstance(poses.rule, Path):
+            return poses.rule.way(line, places) / self.section.speed
         swept, rates = poses.swept, self.section.rates
         if any(self.section.accelerations.values()):
             raise StudyError("'accelerations' are those of single poses: give a 'motion' over time instead")

@@ -35,7 +35,7 @@ def units_of(units: Units, coordinates: Sequence[Coordinate]) -> list[float]:
 def inputs(motion: Motion, plan: Plan, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
     """Poses at places of lines, and what they give to their plan (radians, lengths)."""
     there = motion.poses.along(line, s)
-    columns = zip(there.groups[0].columns(), units_of(motion.units, plan.structure.given), strict=True)
+    columns = zip(there.values.values(), units_of(motion.units, plan.structure.given), strict=True)
     return there, [np.asarray(column * unit, dtype=float) for column, unit in columns]
 
 
@@ -45,11 +45,11 @@ def steps_of(motion: Motion, plan: Plan) -> tuple[Floats, Floats]:
     The steps are whole numbers of shape (lines, parts).
     """
     poses, mechanism = motion.poses, motion.mechanism
-    end, lines = float(poses.end), poses.count // poses.line
-    marks = distinct(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
+    end, lines, corners = float(poses.end), poses.count // poses.line, poses.rule.corners
+    marks = distinct(np.concatenate([[0.0, end], corners[(corners > 0) & (corners < end)]]))
     count = np.ones((lines, len(marks) - 1))
-    (group,), units = poses.groups, units_of(motion.units, plan.structure.given)
-    for coordinate, column, unit in zip(plan.structure.given, group.columns(), units, strict=True):
+    units = units_of(motion.units, plan.structure.given)
+    for coordinate, column, unit in zip(plan.structure.given, poses.values.values(), units, strict=True):
         size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * mechanism.size
         rows = column.reshape(lines, -1)
         rows = np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows
@@ -72,7 +72,7 @@ class Anchors:
         self.mechanism: Mechanism = motion.mechanism
         self.lines = self.poses.count // self.poses.line
 
-    def at(self, line: Ints, s: Floats) -> Configuration:
+    def at(self, line: Ints, s: Ints | Floats) -> Configuration:
         """The anchor nearest to each place of a line; the sketch where the line has none."""
         every, places, nearest = self._every
         beside = np.clip(np.searchsorted(places, s), 1, max(len(places) - 1, 1))
@@ -85,8 +85,7 @@ class Anchors:
     def _every(self) -> tuple[Configuration, Floats, Ints]:
         """Anchors of all lines and then the sketches, their places, and the number of the nearest valid one to each."""
         lines = np.arange(self.lines)
-        first = self.poses.line * lines
-        sketch = begun(self.mechanism, {name: place[first] for name, place in self.poses.places.items()})
+        sketch = begun(self.mechanism, self.poses.along(lines, lines * 0).places)
         if not sketch.shape:
             sketch = replace(sketch, shape=(1,), reason=sketch.reason.reshape(1)).take(np.zeros_like(lines))
         places = self._places

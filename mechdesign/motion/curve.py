@@ -23,7 +23,7 @@ from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.motion.anchors import Anchors, inputs, steps_of, units_of
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.pieces import Pieces, Search
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import DesignNumbers, GivenRows, Poses
 from mechdesign.motion.turns import drive_turns
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
@@ -76,8 +76,7 @@ class Curve:
         self.motion, self.angles, self._turning, self._drawn = motion, tuple(angles), turning, drawn
         self.mechanism: Mechanism = motion.mechanism
         self.poses = poses = motion.poses
-        (group,) = poses.groups
-        self.plan = self.mechanism.plan(group.names)
+        self.plan = self.mechanism.plan(poses.names)
         self.anchors = Anchors(motion, self.plan) if self.plan.continued else None
         self.lines = poses.count // poses.line
         self.spent = np.zeros(self.lines, dtype=bool)
@@ -119,7 +118,7 @@ class Curve:
             configuration = self.with_turns(line, s, configuration)
         if judged:
             self.plan.judge(configuration)
-        return SolvedPoses.all(self.motion.at(poses), configuration)
+        return SolvedPoses(self.motion.at(poses), np.arange(len(s)), configuration)
 
     def with_turns(self, line: Ints, s: Floats, configuration: Configuration) -> Configuration:
         """Solved poses with their angles in the turns that they have along the motion."""
@@ -216,14 +215,14 @@ class Curve:
 
     def _solved(self, line: Ints, s: Floats, poses: Poses, values: Sequence[Floats]) -> Configuration:
         start = None if self.anchors is None else self.anchors.at(line, s)
-        vectors = self._vectors.take(line) if poses.places else None
+        vectors = self._vectors.take(line) if poses.own.places else None
         return self.plan.solve(values, poses.places, vectors=vectors, start=start, limits=False)
 
     @cached_property
     def _vectors(self) -> Vectors:
         """Edges of the mechanism, of each line."""
-        first = self.poses.line * np.arange(self.lines)
-        return self.mechanism.geometry.vectors({name: place[first] for name, place in self.poses.places.items()})
+        lines = np.arange(self.lines)
+        return self.mechanism.geometry.vectors(self.poses.along(lines, lines * 0).places)
 
     def _look(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         margins, angles = [], []
@@ -295,7 +294,7 @@ class Curve:
                 values = chebyshev.at_places(row) + TURN * turns[rank][:, None]
                 least, most = (f.reduceat(g(values, axis=1), np.searchsorted(pieces.line, lines))
                                for f, g in ((np.minimum, np.min), (np.maximum, np.max)))  # fmt: skip
-                sizes = {name: place[lines * self.poses.line] for name, place in self.poses.places.items()}
+                sizes = self.poses.along(lines, lines * 0).places
                 turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
             if angle.name in near:
                 turns = np.round((near[angle.name] - begin) / TURN)
@@ -335,15 +334,14 @@ class Curve:
 def from_sketch(motion: Motion) -> dict[str, Floats]:
     """Angles of torsion springs at poses (radians), with the turns of the straight way there from the sketch."""
     mechanism, units, poses = motion.mechanism, motion.units, motion.poses
-    (group,), sketch = poses.groups, mechanism.sketch_configuration
-    if not mechanism.windings or not group.values:
+    sketch, count = mechanism.sketch_configuration, poses.count
+    if not mechanism.windings or not poses.values:
         return {}
-    coordinates, count = mechanism.plan(group.names).structure.given, poses.count
+    coordinates = mechanism.plan(names := poses.groups[0].names).structure.given
     begin = [float(sketch.value(c)) / unit for c, unit in zip(coordinates, units_of(units, coordinates), strict=True)]
-    ways = {name: np.stack([np.full(count, drawn), column], axis=1).ravel()
-            for (name, column), drawn in zip(group.values.items(), begin, strict=True)}  # fmt: skip
-    both = {name: np.repeat(column, 2) for name, column in poses.places.items()}
-    straight = replace(Poses.single(ways, (2,)), designs=count, places=both)
+    ways = {name: np.stack([np.full(count, drawn), poses.named[name]], axis=1)
+            for name, drawn in zip(names, begin, strict=True)}  # fmt: skip
+    straight = Poses(GivenRows(ways), DesignNumbers(count, places=poses.places))
     curve = Curve(motion.at(straight), [*mechanism.windings.values()], drawn=True)
     turned = curve.turned(np.arange(count), np.ones(count))
     return {name: np.where(curve.spent, drawn, angles)

@@ -150,7 +150,7 @@ class Functions(Means):
         place = self.curve.inside(line, place)
         # A function is flat at an extreme: a pose beside it with the same value is the place.
         row = np.round(place)
-        near = np.abs(row - place) <= (BESIDE_ROW if self.curve.poses.program is None else BESIDE_REST)
+        near = np.abs(row - place) <= (BESIDE_ROW if not self.curve.poses.rule.timed else BESIDE_REST)
         beside = np.flatnonzero(near & self.curve.holds(line, row, INSET * self.curve.poses.end))
         own = np.concatenate([rows, rows[beside]])
         table = self.at(np.concatenate([line, line[beside]]), np.concatenate([place, row[beside]]))

@@ -98,23 +98,27 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class SolvedPoses:
-    """Poses of a motion that give the same coordinates, solved: their rows in its poses, and the names given."""
+    """Poses that give the same coordinates, solved; and their rows among all poses of the question."""
 
     motion: Motion
     rows: Ints
-    names: tuple[str, ...]
     configuration: Configuration
-
-    @classmethod
-    def all(cls, motion: Motion, configuration: Configuration) -> SolvedPoses:
-        """Every pose of a motion whose poses give the same coordinates."""
-        (group,) = motion.poses.groups
-        return cls(motion, np.arange(motion.poses.count), group.names, configuration)
 
     @property
     def poses(self) -> Poses:
-        """All poses of the motion."""
+        """The poses."""
         return self.motion.poses
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What they give."""
+        return self.poses.groups[0].names
+
+    def take(self, index: Ints) -> SolvedPoses:
+        """Some of the poses."""
+        return SolvedPoses(
+            self.motion.at(self.poses.take(index)), self.rows[index], self.configuration.take(index)
+        )  # fmt: skip
 
 
 def radians(units: Units, coordinate: Coordinate, value: Value) -> Value:

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.cautions import Caution
+from mechdesign.errors import counted
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.configuration import joined
 from mechdesign.motion.motion import Motion, SolvedPoses
@@ -24,11 +26,51 @@ from mechdesign.results import LongTable, Scope, Table
 MAX_SHOWN_POSES = 2001
 
 
+@dataclass(frozen=True)
+class Remark:
+    """What is to be said of some poses of a design: a kind of warning, and its sentence.
+
+    Parameters
+    ----------
+    words : str
+        ``{number}`` of ``{count}`` poses, or of ``{poses}``; ``{are}`` and ``{lie}`` are their number with the verb.
+    table : str
+        Whose rows are the poses; left out: that of the question.
+    least : float
+        Part of the poses below which nothing is said.
+    first : bool
+        Whether the sentence names the first of the poses.
+    """
+
+    kind: str
+    words: str
+    table: str = ""
+    least: float = 0.0
+    first: bool = True
+
+
 class Mark(NamedTuple):
     """How many poses of a design something is to be said of, and the row of the first."""
 
     number: int
     first: int
+
+    @classmethod
+    def of(cls, where: Flags, begin: int = 0) -> Mark:
+        """The mark of some poses; the first has the row `begin`."""
+        return cls(int(np.count_nonzero(where)), begin + int(where.argmax()))
+
+    def caution(self, remark: Remark, question: PoseQuestion, design: int = 0) -> Caution | None:
+        """The warning about these poses; None where they are too few."""
+        number, row = self
+        count = question.poses.count // question.poses.designs
+        if number < max(remark.least * count, 1):
+            return None
+        pose = question.motion.in_words(row + design * count)
+        are, lie = ("1 pose is", "1 pose lies") if number == 1 else (f"{number} poses are", f"{number} poses lie")
+        words = remark.words.format(number=number, count=count, poses=counted(count, "pose"), are=are, lie=lie)
+        words += f"; the first: {pose}" if remark.first else ""
+        return Caution(remark.kind, words, remark.table or question.lead, row, pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +86,7 @@ class Passage:
         The poses that a picture shows, of those of the values.
     reason : int8 array, shape (poses,)
         Of all poses; see `mechdesign.mechanism.Reason`.
-    marks : list of mapping of str to Mark
+    marks : list of mapping of Remark to Mark
         By design, what is to be said of how many of all poses.
     solved : list of SolvedPoses
         The poses themselves, of designs with dimensions of their own; else empty.
@@ -54,8 +96,14 @@ class Passage:
     values: PoseValues
     shown: SolvedPoses
     reason: NDArray[np.int8]
-    marks: Sequence[Mapping[str, Mark]]
+    marks: Sequence[Mapping[Remark, Mark]]
     solved: Sequence[SolvedPoses]
+
+    def cautions(self, design: int) -> list[Caution]:
+        """Warnings about poses of a design."""
+        marks = self.marks[design].items()
+        said = (mark.caution(remark, self.question, design) for remark, mark in marks if remark.words)
+        return [caution for caution in said if caution is not None]
 
     @property
     def long(self) -> bool:
@@ -93,17 +141,17 @@ def pass_over(question: PoseQuestion, progress: Progress, jobs: int | None) -> P
             progress.update(len(part.rows))
 
         values = evaluate(question, jobs, keep)
-        flags = {name: where.reshape(poses.designs, -1) for name, where in question.marks(values).items()}
-        counts = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
+        flags = {remark: where.reshape(poses.designs, -1) for remark, where in question.marks(values).items()}
+        counts = [{remark: Mark.of(where[k]) for remark, where in flags.items()} for k in range(poses.designs)]
         return Passage(question, values, kept.shown, values.reason, counts, solved)
-    reason, totals = np.empty(poses.count, dtype=np.int8), dict[str, Mark]()
+    reason, totals = np.empty(poses.count, dtype=np.int8), dict[Remark, Mark]()
     rows, parts = list[Ints](), list[PoseValues]()
     for part, values in pieces(question, jobs):
         reason[part.rows] = values.reason
         begin = int(part.rows[0])
-        for name, where in question.marks(values).items():
-            new, old = _mark(where, begin), totals.get(name, Mark(0, -1))
-            totals[name] = Mark(old.number + new.number, old.first if old.number else new.first)
+        for remark, where in question.marks(values).items():
+            new, old = Mark.of(where, begin), totals.get(remark, Mark(0, -1))
+            totals[remark] = Mark(old.number + new.number, old.first if old.number else new.first)
         some = _notable(values, np.isin(part.rows, kept.rows))
         rows.append(part.rows[some])
         parts.append(PoseValues(question, values.reason[some], _taken(values.arrays, some), values.totals))
@@ -113,14 +161,14 @@ def pass_over(question: PoseQuestion, progress: Progress, jobs: int | None) -> P
     arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}
     totalled = sum((part.totals for part in parts), np.zeros(()))
     whole = PoseValues(own, np.concatenate([part.reason for part in parts]), arrays, totalled)
-    shown = replace(kept.shown, motion=own.motion, rows=np.searchsorted(np.concatenate(rows), kept.rows))
+    shown = replace(kept.shown, rows=np.searchsorted(np.concatenate(rows), kept.rows))
     return Passage(question, whole, shown, reason, [totals], [])
 
 
 def _long(question: PoseQuestion) -> bool:
     """Whether poses are too many to be held with all their columns, and all of one kind and one design."""
     poses = question.poses
-    single = len(poses.groups) == 1 and poses.designs == 1 and not poses.regions
+    single = len(poses.groups) == 1 and poses.designs == 1 and not poses.rule.regions
     return question.divisible and poses.count > POSES_AT_ONCE and single and not poses.listed
 
 
@@ -146,10 +194,6 @@ def _taken(arrays: Mapping[str, Any], rows: Ints) -> dict[str, Any]:
     return {name: column[rows] for name, column in arrays.items()}
 
 
-def _mark(where: Flags, begin: int) -> Mark:
-    return Mark(int(np.count_nonzero(where)), begin + int(where.argmax()))
-
-
 class _Kept:
     """What pictures show of the poses that are solved, part by part: evenly spread ones of the first group."""
 
@@ -169,7 +213,7 @@ class _Kept:
         whole = self.parts[0]
         if len(self.parts) > 1:
             whole = joined(self.parts, self.rows.shape, whole.take(0).vectors, {})
-        return SolvedPoses(self.motion, self.rows, self.motion.poses.groups[0].names, whole)
+        return SolvedPoses(self.motion.at(self.motion.poses.take(self.rows)), self.rows, whole)
 
 
 def shown_rows(poses: Poses, most: int = MAX_SHOWN_POSES) -> Ints:

@@ -254,6 +254,31 @@ class SplineOfEach(PointPath):
         return [np.concatenate(columns).astype(complex)[back] for columns in zip(*parts, strict=True)]
 
 
+@dataclass(frozen=True, eq=False)
+class EvenValues:
+    """Evenly spaced values of a coordinate, both ends included; numbers of each design, shape (designs,)."""
+
+    begin: Floats
+    step: Floats
+    end: Floats
+    count: int
+
+    def __getitem__(self, at: tuple[Ints, Ints]) -> Floats:
+        """Values of some designs, by their numbers."""
+        design, k = at
+        return np.where(k == self.count - 1, self.end[design], self.begin[design] + k * self.step[design])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Designs, and values of each."""
+        return len(self.begin), self.count
+
+    @classmethod
+    def from_to(cls, begin: Floats, end: Floats, count: int) -> EvenValues:
+        """So many values from one end to the other."""
+        return cls(begin, (end - begin) / max(count - 1, 1), end if count > 1 else begin, count)
+
+
 def _spline_lengths(curve: Any, begin: Floats, end: Floats) -> Floats:
     """Lengths of short pieces of a spline."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -261,8 +286,10 @@ def _spline_lengths(curve: Any, begin: Floats, end: Floats) -> Floats:
     return np.asarray(half * (np.abs(curve(middle[:, None] + half[:, None] * nodes, 1)) @ weights))
 
 
-def between(rows: NDArray[Any], line: Ints, s: Floats) -> NDArray[Any]:
-    """Values at places of some lines of rows, shape (lines, rows), that change evenly from row to row."""
+def between(rows: NDArray[Any] | EvenValues, line: Ints, s: Ints | Floats) -> NDArray[Any]:
+    """Values at rows of some lines, shape (lines, rows), or at places between them, where they change evenly."""
+    if s.dtype.kind == "i":
+        return np.asarray(rows[line, s.astype(np.intp, copy=False)])
     k = np.clip(np.floor(s), 0, max(rows.shape[1] - 2, 0)).astype(np.intp)
     begin = rows[line, k]
     return np.asarray(begin + (s - k) * (rows[line, np.minimum(k + 1, rows.shape[1] - 1)] - begin))

@@ -74,8 +74,8 @@ class PoseQuestion(ABC):
     def values(self, part: SolvedPoses) -> Mapping[str, Any]:
         """What it has at solved poses: arrays of shape (poses, ...), or lists of lanes with the `row` of a pose."""
 
-    def marks(self, values: PoseValues) -> Mapping[str, Flags]:
-        """Poses of which something is to be said, by what it is."""
+    def marks(self, values: PoseValues) -> Mapping[Any, Flags]:
+        """Poses of which something is to be said, by the `Remark`."""
         return {}
 
     def totals(self, values: PoseValues) -> Floats:
@@ -105,10 +105,7 @@ class PoseValues:
             self.put(part.rows, self.question.values(part))
             return
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
-        chunks = [
-            replace(part, rows=part.rows[index], configuration=configuration.take(index))
-            for index in (assembled[k : k + size] for k in range(0, len(assembled), size))
-        ]
+        chunks = [part.take(assembled[k : k + size]) for k in range(0, len(assembled), size)]
         for chunk, values in zip(chunks, map_chunks(self.question.values, chunks, jobs), strict=True):
             self.put(chunk.rows, values)
 
@@ -159,9 +156,8 @@ def evaluate(
 def pieces(question: PoseQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, PoseValues]]:
     """Solved poses of one kind, and what the question has there, part by part; what is held is a few parts."""
     for part in solved(question, jobs):
-        rows = part.rows
-        own = question.at(question.poses.take(slice(int(rows[0]), int(rows[-1]) + 1)))
+        own = question.at(part.poses)
         values = unfilled(own)
-        values.fill(replace(part, motion=own.motion, rows=np.arange(len(rows))), jobs)
+        values.fill(replace(part, rows=np.arange(len(part.rows))), jobs)
         values.totals = own.totals(values)
         yield part, values

@@ -1,37 +1,70 @@
-"""Poses at which a question is asked: lists, sweeps, grids and paths as arrays."""
+"""Poses at which a question is asked, as rules: lists, sweeps, grids, paths; of one design or of many."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, TypeVar
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
 from mechdesign.expressions import Number
-from mechdesign.motion.paths import PointPath, between
-from mechdesign.motion.timed import MotionProgram
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.text import fields
+from mechdesign.motion.paths import EvenValues, PointPath, bends, between
+from mechdesign.numerics.arrays import Complexes, Floats, Ints, distinct
+from mechdesign.study.text.fields import Model
 from mechdesign.study.text.units import Amount
 
 MAX_POSES = 10_000_000
 # What is swept along a motion over time.
 TIME = "time"
-_Section = TypeVar("_Section", bound=fields.Model)
+NOTHING: Mapping[str, Floats] = {}
+_Section = TypeVar("_Section", bound=Model)
 
 
 @dataclass(frozen=True, eq=False)
-class PoseGroup:
-    """Poses that give the same coordinates, as many as the mobility."""
+class DesignNumbers:
+    """The numbers of a study for some designs."""
+
+    count: int = 1
+    # Values that differ from the study's own design, shape (count,): parameters, and places (lengths, radians).
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
+    places: Mapping[str, Floats] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)  # every parameter of the study's own design
+    changed: frozenset[str] = frozenset()  # names with values of their own, which no longer follow parameters
+
+    def of(self, number: float) -> Floats:
+        """A number of each design, shape (count,)."""
+        expression = Amount.of(number).expression
+        moved = expression is not None and self.moves(number)
+        value = expression.evaluate({**self.nominal, **self.parameters}) if expression and moved else float(number)
+        return np.broadcast_to(np.asarray(value, dtype=float), self.count)
+
+    def moves(self, number: float) -> bool:
+        """Whether designs differ in a number."""
+        expression = Amount.of(number).expression
+        return expression is not None and not expression.names.isdisjoint(self.parameters)
+
+    def take(self, designs: Ints) -> DesignNumbers:
+        """Those of some designs."""
+        parameters, places = (
+            {name: values[designs] for name, values in part.items()} for part in (self.parameters, self.places)
+        )
+        return replace(self, count=len(designs), parameters=parameters, places=places)
+
+
+OWN = DesignNumbers()
+"""Those of the study's own design."""
+
+
+class PoseGroup(NamedTuple):
+    """Poses that give the same coordinates, as many as the mobility: their names, and the rows of the poses."""
 
     names: tuple[str, ...]
-    values: Mapping[str, Floats]  # in the study's units, shape (n,)
-    rows: Ints  # place of each pose in the study's order, shape (n,)
-
-    def columns(self) -> list[Floats]:
-        """Values in the order of the names."""
-        return [self.values[name] for name in self.names]
+    rows: Ints
 
 
 class Sector(NamedTuple):
@@ -49,63 +82,364 @@ class Sectors(NamedTuple):
     outline: tuple[Complexes, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Poses:
-    """All poses of a question; of several designs, one design's after the other's."""
+class Rows(ABC):
+    """Poses as a rule: what each gives follows from its place, in the study's units.
 
-    groups: tuple[PoseGroup, ...]  # one, unless listed poses give different coordinates
-    count: int  # number of poses over all groups
-    listed: bool  # whether a person listed these very poses, so that one that fails is an error
-    grid: tuple[int, ...]  # number of values of each swept coordinate, the last fastest; one number for lists and paths
-    designs: int = 1  # each has as many poses
-    # Where designs differ from the study's own, shape (count,): dimensions (lengths, radians), and parameters in the
-    # study's units.
-    places: Mapping[str, Floats] = field(default_factory=dict)
-    parameters: Mapping[str, Floats] = field(default_factory=dict)
-    nominal: Mapping[str, float] = field(default_factory=dict)  # every parameter of the study's own design
-    changed: frozenset[str] = frozenset()  # names of what is changed itself, and so follows nothing
-    motion: bool = False  # whether they are passed one after the other: a sweep of one coordinate, or a path
-    # Paths of points, by point. Other coordinates change evenly from pose to pose.
-    paths: Mapping[str, PointPath] = field(default_factory=dict)
-    corners: Floats = field(default_factory=lambda: np.empty(0))  # places of a motion that are not smooth, in rows
-    program: MotionProgram | None = None  # of a motion over time
-    times: Floats | None = None  # of its poses, in the study's unit, shape (count,)
-    # Along the path of a point, or over time, shape (count,): first and second derivative of every coordinate given by
-    # the path's length or by time, in the study's units; nan where the path has no direction.
+    Poses that follow one another are a line: those of a motion, or of a grid along its last coordinate. Lines are
+    numbered design by design; a place on a line is in rows from 0.
+    """
+
+    #: Whether a person listed these very poses, so that one that fails is an error.
+    listed: bool = False
+    #: Whether they are those of a motion over time.
+    timed: ClassVar[bool] = False
+    #: Of listed poses that give different coordinates, the number of the kind of each row.
+    number: Ints | None = None
+    #: The patches of a workspace over which they lie, one a value of its held coordinates.
+    regions: Sequence[Sectors] = ()
+    #: Paths of points, by point.
+    paths: Mapping[str, PointPath] = MappingProxyType({})
+    #: Places of a motion that are not smooth, in rows.
+    corners: Floats = np.empty(0)
+
+    @property
+    @abstractmethod
+    def grid(self) -> tuple[int, ...]:
+        """Numbers of values of each swept coordinate of a design, the last fastest; one number for lists and paths."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Every coordinate that some pose gives, in the order of the study."""
+
+    @abstractmethod
+    def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        """What poses give at rows of lines, or at places between these, of shape (n,); the time of a motion first."""
+
+    def rates(self, line: Ints, s: Ints | Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        """First and second derivatives of it by the length of a point's path or by time, where the motion has these."""
+        return {}, {}
+
+    @abstractmethod
+    def take(self, designs: Ints) -> Rows:
+        """The poses of some designs."""
+
+    @property
+    def kinds(self) -> Sequence[tuple[str, ...]]:
+        """The different sets of coordinates that poses give; one, unless listed poses give different ones."""
+        return [self.names]
+
+    @property
+    def path(self) -> str | None:
+        """The point along the length of whose path means are; None where there is no one such point."""
+        return None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the motion goes on from the last pose to the first."""
+        return any(path.closed for path in self.paths.values())
+
+    def pace(self, line: Ints, s: Floats, swept: str | None) -> Floats:
+        """How fast a motion passes places, shape (n,): change of what is swept, a row."""
+        if swept is None:
+            return np.ones(len(s))
+        k = np.clip(np.floor(s), 0, self.grid[-1] - 2).astype(np.intp)
+        return np.abs(self.at(line, k + 1)[swept] - self.at(line, k)[swept])
+
+
+@dataclass(frozen=True, eq=False)
+class GivenRows(Rows):
+    """Poses one by one, those of each line in an array.
+
+    Parameters
+    ----------
+    values : mapping of str to ndarray, shape (lines, rows)
+        nan where a pose does not give it. The time may be among them.
+    slopes, bends : mapping of str to ndarray, shape (lines, rows)
+        First and second derivatives.
+    sets : sequence of sequence of str, optional
+        The different sets of coordinates that poses give; `number` has that of each row.
+    """
+
+    values: Mapping[str, Floats]
+    listed: bool = False
+    lines: tuple[int, ...] = ()
     slopes: Mapping[str, Floats] = field(default_factory=dict)
     bends: Mapping[str, Floats] = field(default_factory=dict)
-    # Of a grid of rays over a workspace: one a value of its held coordinates.
-    regions: tuple[Sectors, ...] = ()
-    # Of some poses of a motion or grid: their rows among all, or their places between these.
-    rows: Ints | Floats | None = None
+    sets: Sequence[tuple[str, ...]] = ()
+    number: Ints | None = None
+    regions: Sequence[Sectors] = ()
 
     @classmethod
-    def single(cls, values: Mapping[str, Floats], grid: tuple[int, ...] = ()) -> Poses:
-        """Poses of one motion, or of a grid, that give the same coordinates, each of shape (count,)."""
-        count = len(next(iter(values.values()), (0,)))
-        group, grid = PoseGroup(tuple(values), values, np.arange(count)), grid or (count,)
-        return cls((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
+    def single(
+        cls, values: Mapping[str, Floats], *, listed: bool = False, slopes: Mapping[str, Floats] = NOTHING,
+        bends: Mapping[str, Floats] = NOTHING,
+    ) -> GivenRows:  # fmt: skip
+        """Poses of one line, values of shape (rows,)."""
+        values, slopes, bends = ({name: column[None] for name, column in part.items()}
+                                 for part in (values, slopes, bends))  # fmt: skip
+        return cls(values, listed, slopes=slopes, bends=bends)
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return (*self.lines, next(iter(self.values.values()), np.empty((1, 0))).shape[1])
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every coordinate that some pose gives, in the order of the study."""
-        return tuple(dict.fromkeys(name for group in self.groups for name in group.names))
+        return tuple(name for name in self.values if name != TIME)
+
+    def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        return {name: between(values, line, s) for name, values in self.values.items()}
+
+    def rates(self, line: Ints, s: Ints | Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        slopes, bends = ({name: between(values, line, s) for name, values in part.items()}
+                         for part in (self.slopes, self.bends))  # fmt: skip
+        return slopes, bends
+
+    @property
+    def kinds(self) -> Sequence[tuple[str, ...]]:
+        return self.sets or [self.names]
+
+    def take(self, designs: Ints) -> GivenRows:
+        return replace(self, values={name: values[designs] for name, values in self.values.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Grid(Rows):
+    """Every combination of values of some coordinates."""
+
+    axes: Mapping[str, EvenValues]
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return tuple(axis.count for axis in self.axes.values() if axis.count > 1) or (1,)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.axes)
+
+    def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        design, line = np.divmod(line, math.prod(self.grid[:-1]))
+        values, along = dict.fromkeys(self.axes, np.empty(0)), True
+        for name, axis in reversed([*self.axes.items()]):
+            if along and axis.count > 1:
+                values[name], along = between(axis, design, s), False
+            else:
+                line, k = np.divmod(line, axis.count)
+                values[name] = axis[design, k]
+        return values
+
+    def take(self, designs: Ints) -> Grid:
+        return Grid({
+            name: EvenValues(axis.begin[designs], axis.step[designs], axis.end[designs], axis.count)
+            for name, axis in self.axes.items()
+        })  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Path(Rows):
+    """What points and coordinates pass, of some designs."""
+
+    designs: int
+    count: int
+    names: tuple[str, ...] = ()
+    paths: Mapping[str, PointPath] = field(default_factory=dict)
+    #: Coordinates that are listed, shape (designs, count); without the path of a point they change evenly between.
+    columns: Mapping[str, Floats] = field(default_factory=dict)
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return (self.count,)
+
+    @cached_property
+    def corners(self) -> Floats:  # type: ignore[override]
+        listed = [column for name, column in self.columns.items() if name.rpartition(".")[0] not in self.paths]
+        corners = [path.corners for path in self.paths.values()]
+        return distinct(np.concatenate([*corners, bends(np.concatenate(listed))] if listed else corners))
+
+    @cached_property
+    def path(self) -> str | None:
+        first, end = np.zeros(1, dtype=np.intp), np.array([self.count - 1.0])
+        # The way of a point that stays where it is says nothing.
+        moving = [owner for owner, path in self.paths.items() if path.way(first, end)[0] > 0]
+        return moving[0] if len(moving) == 1 else None
+
+    def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        values, places = dict.fromkeys(self.names, np.empty(0)), dict[str, Complexes]()
+        for name in self.names:
+            owner = name.rpartition(".")[0]
+            if name in self.columns and (owner not in self.paths or s.dtype.kind == "i"):
+                values[name] = between(self._round(self.columns[name]), line, s)
+                continue
+            if owner not in places:
+                places[owner] = self.paths[owner].at(line, s.astype(float))
+            values[name] = places[owner].real if name.endswith(".x") else places[owner].imag
+        return values
+
+    def rates(self, line: Ints, s: Ints | Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        if self.path is None:
+            return {}, {}
+        row = np.clip(np.floor(s), 0, self.count - 2 + self.closed).astype(np.intp)
+        slopes = {name: steps[line, row] for name, steps in self._steps.items()}
+        bends = dict.fromkeys(self.names, np.zeros(len(s)))
+        slope, bend, _ = self.paths[self.path].course(line, s.astype(float))
+        for axis, part in (("x", np.real), ("y", np.imag)):
+            slopes[f"{self.path}.{axis}"], bends[f"{self.path}.{axis}"] = part(slope).copy(), part(bend).copy()
+        return slopes, bends
+
+    @cached_property
+    def _steps(self) -> dict[str, Floats]:
+        """By how much coordinates change from pose to pose, over the length of the path there."""
+        assert self.path is not None
+        line, row = np.divmod(np.arange(self.designs * self.count), self.count)
+        way, steps = self.paths[self.path].lengths(self.designs), dict[str, Floats]()
+        for name, column in self.at(line, row).items():
+            rise = np.diff(self._round(column.reshape(self.designs, -1)), axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                steps[name] = np.where(rise == 0, 0.0, rise / way)
+        return steps
+
+    def _round(self, rows: Floats) -> Floats:
+        """Values of rows, and where the path closes those of the first again."""
+        return np.concatenate([rows, rows[:, :1]], axis=1) if self.closed else rows
+
+    def way(self, line: Ints, s: Floats) -> Floats:
+        """Length of the point's path from its first pose."""
+        assert self.path is not None
+        return self.paths[self.path].way(line, s)
+
+    def take(self, designs: Ints) -> Path:
+        paths = {owner: path.take(designs) for owner, path in self.paths.items()}
+        columns = {name: column[designs] for name, column in self.columns.items()}
+        return replace(self, designs=len(designs), paths=paths, columns=columns)
+
+    def pace(self, line: Ints, s: Floats, swept: str | None) -> Floats:
+        return super().pace(line, s, swept) if self.path is None else self.paths[self.path].course(line, s)[2]
+
+
+class PoseNumbers(ABC):
+    """Numbers of a study at poses, where parameters may differ from pose to pose."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> Mapping[str, Floats]:
+        """Parameters that differ from the study's own, at each pose, in the study's units."""
+
+    @property
+    @abstractmethod
+    def nominal(self) -> Mapping[str, float]:
+        """Every parameter of the study's own design."""
+
+    @property
+    @abstractmethod
+    def times(self) -> Floats | None:
+        """Time of each pose of a motion over time."""
+
+    def of(self, number: float) -> Number:
+        """A number of the study: an array where it follows parameters that differ."""
+        expression, parameters = Amount.of(number).expression, self.parameters
+        if expression is None or expression.names.isdisjoint(parameters):
+            return float(number)
+        return expression.evaluate({**self.nominal, **parameters})
+
+    def section(self, section: _Section) -> _Section:
+        """A section of the study, with arrays where its numbers follow such parameters."""
+        return section.with_numbers(self.of) if self.parameters else section
+
+
+@dataclass(frozen=True, eq=False)
+class Poses(PoseNumbers):
+    """All poses of a question, of several designs one design's after the other's; or some of them.
+
+    Parameters
+    ----------
+    picked : pair of ndarray, shape (n,), optional
+        Lines and rows of some of the poses, or places between them.
+    """
+
+    rule: Rows
+    own: DesignNumbers = OWN
+    picked: tuple[Ints, Ints | Floats] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {part.name: getattr(self, part.name) for part in fields(self)}
+
+    @property
+    def places_along(self) -> tuple[Ints, Ints | Floats]:
+        """Line and row of each pose, shape (count,)."""
+        return self.picked or self._rows(np.arange(self.count))
+
+    def _rows(self, number: Ints) -> tuple[Ints, Ints]:
+        """Lines and rows by their numbers."""
+        line, row = np.divmod(number, max(self.rule.grid[-1], 1))
+        return line, row
+
+    @cached_property
+    def named(self) -> Mapping[str, Floats]:
+        """Time along a motion over time, and every coordinate, over all poses, shape (count,)."""
+        return self.rule.at(*self.places_along)
 
     @property
     def values(self) -> dict[str, Floats]:
         """Every coordinate over all poses, shape (count,); nan where a pose does not give it."""
-        if len(self.groups) == 1:
-            return dict(self.groups[0].values)
-        columns = {name: np.full(self.count, np.nan) for name in self.names}
-        for group in self.groups:
-            for name in group.names:
-                columns[name][group.rows] = group.values[name]
-        return columns
+        return {name: values for name, values in self.named.items() if name != TIME}
 
     @property
-    def named(self) -> dict[str, Floats]:
-        """Time along a motion over time, and every coordinate, over all poses, shape (count,)."""
-        return {**({} if self.times is None else {TIME: self.times}), **self.values}
+    def times(self) -> Floats | None:
+        return self.named.get(TIME)
+
+    @cached_property
+    def _rates(self) -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
+        return self.rule.rates(*self.places_along)
+
+    @property
+    def slopes(self) -> Mapping[str, Floats]:
+        """First derivatives of what is given, by the length of a point's path or by time, shape (count,).
+
+        In the study's units; nan where the path has no direction.
+        """
+        return self._rates[0]
+
+    @property
+    def bends(self) -> Mapping[str, Floats]:
+        """Second derivatives."""
+        return self._rates[1]
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.picked[0]) if self.picked is not None else self.own.count * math.prod(self.rule.grid)
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Numbers of values of each swept coordinate of a design, the last fastest; one number for lists and paths."""
+        return (self.count,) if self.picked is not None else self.rule.grid
+
+    @property
+    def designs(self) -> int:
+        """Number of designs, each with as many poses."""
+        return 1 if self.picked is not None else self.own.count
+
+    @property
+    def listed(self) -> bool:
+        """Whether a person listed these very poses, so that one that fails is an error."""
+        return self.rule.listed
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every coordinate that some pose gives, in the order of the study."""
+        return self.rule.names
+
+    @cached_property
+    def groups(self) -> Sequence[PoseGroup]:
+        """The poses by what they give: one group, unless listed poses give different coordinates."""
+        number = self.rule.number
+        if number is None:
+            return [PoseGroup(self.names, np.arange(self.count))]
+        own = number[self.places_along[1]]
+        return [
+            PoseGroup(names, rows) for k, names in enumerate(self.rule.kinds) if len(rows := np.flatnonzero(own == k))
+        ]
 
     @property
     def line(self) -> int:
@@ -115,68 +449,35 @@ class Poses:
     @property
     def closed(self) -> bool:
         """Whether the motion goes on from the last pose to the first."""
-        return any(path.closed for path in self.paths.values())
+        return self.rule.closed
 
     @property
     def end(self) -> int:
         """Last place of a motion or a line, in rows."""
         return self.line - 1 + self.closed
 
-    def along(self, line: Ints, s: Floats) -> Poses:
-        """Poses at places of some lines, in rows from 0 to `end`; beyond these the motion goes on straight or round.
+    @property
+    def design(self) -> Ints:
+        """The design of each pose."""
+        return self.places_along[0] // max(math.prod(self.rule.grid[:-1]), 1)
 
-        Parameters
-        ----------
-        line, s : ndarray, shape (n,)
-            The lines are numbered design by design.
-        """
-        (group,) = self.groups
-        values = {}
-        for name in group.names:
-            owner, _, axis = name.rpartition(".")
-            if self.program is not None:
-                values[name] = self.program.at(name, line, s)
-            elif owner in self.paths and axis in ("x", "y"):
-                place = self.paths[owner].at(line, s)
-                values[name] = place.real if axis == "x" else place.imag
-            else:
-                rows = group.values[name].reshape(-1, self.line)
-                rows = np.concatenate([rows, rows[:, :1]], axis=1) if self.closed else rows
-                values[name] = between(rows, line, s)
-        first = line * self.line
-        places, parameters = (
-            {name: column[first] for name, column in part.items()} for part in (self.places, self.parameters)
-        )
-        poses = Poses(
-            (PoseGroup(group.names, values, np.arange(len(s))),), len(s), False, (len(s),), places=places,
-            parameters=parameters, nominal=self.nominal,
-        )  # fmt: skip
-        if self.program is not None:
-            poses = replace(poses, times=self.program.time(line, s))
-            slopes, bends = by_time(self.program, line, s)
-        elif self.slopes:
-            slopes, bends = by_length(self, line, s)
-        else:
-            return poses
-        return replace(poses, slopes=slopes, bends=bends)
+    @property
+    def places(self) -> dict[str, Floats]:
+        """Dimensions in which designs differ from the study's own, at each pose, shape (count,); lengths, radians."""
+        return {name: values[self.design] for name, values in self.own.places.items()}
 
-    def of(self, number: float, rows: Ints | slice = slice(None)) -> Number:
-        """A number of the study at some poses: an array where it follows parameters in which designs differ."""
-        expression = number.expression if isinstance(number, Amount) else None
-        if expression is None or expression.names.isdisjoint(self.parameters):
-            return float(number)
-        env = {name: self.parameters[name][rows] if name in self.parameters else self.nominal[name]
-               for name in expression.names}  # fmt: skip
-        return expression.evaluate(env)
+    @property
+    def nominal(self) -> Mapping[str, float]:
+        return self.own.nominal
 
-    def section(self, section: _Section, rows: Ints | slice = slice(None)) -> _Section:
-        """A section of the study with the numbers of some poses, arrays where designs differ in them."""
-        return section.with_numbers(lambda number: self.of(number, rows)) if self.parameters else section
+    @cached_property
+    def parameters(self) -> dict[str, Floats]:
+        return {name: values[self.design] for name, values in self.own.parameters.items()}
 
     @property
     def followed(self) -> bool:
         """Whether they are those of motions, a line each, of which something can be said between the poses."""
-        return not self.listed and len(self.grid) == 1 and self.line > 1 and not self.regions
+        return not self.listed and len(self.rule.grid) == 1 and self.rule.grid[-1] > 1
 
     @property
     def swept(self) -> str | None:
@@ -193,19 +494,13 @@ class Poses:
         """What is swept, at each pose, or the row of the pose; shape (count,)."""
         if self.times is not None:
             return self.times
-        return self.numbers if self.swept is None else self.values[self.swept]
+        return self.numbers if self.swept is None else self.named[self.swept]
 
-    @property
+    @cached_property
     def moving(self) -> list[str]:
         """Coordinates that change from pose to pose of a design."""
         columns = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
         return [name for name, values in columns.items() if (np.ptp(values, axis=1) > 0).any()]
-
-    @property
-    def path(self) -> str | None:
-        """The point along the length of whose path means are; None where there is no one such point."""
-        moving = with_length(self.paths)
-        return moving[0][0] if len(moving) == 1 and self.program is None else None
 
     def pace(self, line: Ints, s: Floats, of: str | None = None) -> Floats:
         """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
@@ -213,85 +508,34 @@ class Poses:
         Means along the motion are by these; where several coordinates move without a path they are by rows, unless `of`
         says which of them counts.
         """
-        swept = self.swept or of
-        if self.program is not None:
-            return self.program.pace(line, s)
-        if self.path is not None:
-            return self.paths[self.path].course(line, s)[2]
-        if swept is None:
-            return np.ones(len(s))
-        rows = self.groups[0].values[swept].reshape(-1, self.line)
-        return np.asarray(np.abs(np.diff(rows, axis=1))[line, np.clip(np.floor(s), 0, self.line - 2).astype(np.intp)])
+        return self.rule.pace(line, s, self.swept or of)
 
     @property
     def numbers(self) -> Floats:
         """The row of each pose among those of its design, shape (count,)."""
-        if self.rows is not None:
-            return self.rows.astype(float)
-        return np.tile(np.arange(self.count // self.designs, dtype=float), self.designs)
+        line, row = self.places_along
+        return row.astype(float) + self.rule.grid[-1] * (line % max(math.prod(self.rule.grid[:-1]), 1))
+
+    def along(self, line: Ints, s: Ints | Floats) -> Poses:
+        """Poses at places of some lines, in rows from 0 to `end`; beyond these the motion goes on straight or round."""
+        return replace(self, picked=(line, s))
+
+    def take(self, rows: Ints | slice) -> Poses:
+        """Some of the poses, in their order."""
+        if self.picked is not None:
+            return replace(self, picked=(self.picked[0][rows], self.picked[1][rows]))
+        numbers = np.arange(*rows.indices(self.count)) if isinstance(rows, slice) else rows
+        return replace(self, picked=self._rows(numbers))
 
     def some(self, designs: Ints) -> Poses:
         """The poses of some designs."""
-        per_design = self.count // self.designs
-        rows = (per_design * designs[:, None] + np.arange(per_design)).ravel()
-        first = per_design * np.arange(len(designs))[:, None]
-        groups = []
-        for group in self.groups:
-            values = {name: v.reshape(self.designs, -1)[designs].ravel() for name, v in group.values.items()}
-            own = group.rows[: len(group.rows) // self.designs]
-            groups.append(PoseGroup(group.names, values, (first + own).ravel()))
-        return replace(
-            self, groups=tuple(groups), count=len(rows), designs=len(designs),
-            paths={owner: path.take(designs) for owner, path in self.paths.items()},
-            program=None if self.program is None else self.program.take(designs), **self._columns(rows),
-        )  # fmt: skip
-
-    def take(self, rows: Ints | slice) -> Poses:
-        """Some poses of a motion or a grid of one design, in their order."""
-        (group,) = self.groups
-        taken = np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows
-        values, count = {name: column[rows] for name, column in group.values.items()}, len(taken)
-        return replace(
-            self, groups=(PoseGroup(group.names, values, np.arange(count)),), count=count, grid=(count,), rows=taken,
-            **self._columns(rows),
-        )  # fmt: skip
-
-    def _columns(self, rows: Ints | slice) -> dict[str, Any]:
-        """What some poses have besides the coordinates that they give."""
-        parts = {key: getattr(self, key) for key in ("places", "parameters", "slopes", "bends")}
-        columns = {key: {name: column[rows] for name, column in part.items()} for key, part in parts.items()}
-        return {**columns, "times": self.times[rows] if self.times is not None else None}
+        return Poses(self.rule.take(designs), self.own.take(designs))
 
 
-def with_length(points: Mapping[str, PointPath]) -> list[tuple[str, PointPath]]:
-    """Paths that have a length: the way of a point that stays where it is says nothing."""
-    first = np.zeros(1, dtype=np.intp)
-    return [(owner, course) for owner, course in points.items()
-            if course.way(first, np.array([course.count - 1.0]))[0] > 0]  # fmt: skip
+def instants(times: Floats) -> Poses:
+    """Poses of which nothing but the time is known."""
+    return Poses(GivenRows.single({TIME: times}, listed=True))
 
 
-def by_length(poses: Poses, line: Ints, s: Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Derivatives of what poses give by the length of a point's path, at places in rows: `slopes` and `bends`."""
-    (group,) = poses.groups
-    ((owner, course),) = with_length(poses.paths)
-    way = course.lengths(poses.designs)
-    slopes: dict[str, Floats] = {}
-    for name, column in group.values.items():
-        rows = column.reshape(poses.designs, -1)
-        # What is listed along with the point's path changes evenly between the places.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rise = np.diff(np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows, axis=1)
-            steps = np.where(rise == 0, 0.0, rise / way)
-        slopes[name] = steps[line, np.clip(np.floor(s), 0, steps.shape[1] - 1).astype(np.intp)]
-    slopes_of_point, bends_of_point, _ = course.course(line, s)
-    bends = dict.fromkeys(group.names, np.zeros(len(s)))
-    for axis, part in (("x", np.real), ("y", np.imag)):
-        slopes[f"{owner}.{axis}"] = part(slopes_of_point).copy()
-        bends[f"{owner}.{axis}"] = part(bends_of_point).copy()
-    return slopes, bends
-
-
-def by_time(program: MotionProgram, line: Ints, s: Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Derivatives of what poses give by time, at places in rows: `slopes` and `bends`."""
-    slopes, bends = ({name: program.at(name, line, s, order) for name in program.courses} for order in (1, 2))
-    return slopes, bends
+#: No poses, for what is asked of none.
+NOWHERE = Poses(GivenRows({}))

@@ -64,34 +64,34 @@ def _solve_group(
 
     anchors = anchors_of(motion, plan, curve)
 
-    def at(piece: slice) -> Configuration:
+    def at(piece: slice) -> SolvedPoses:
         """Poses of some rows, not yet judged by the limits."""
-        rows = group.rows[piece]
-        columns = zip(plan.structure.given, group.columns(), strict=True)
-        values = [np.asarray(radians(motion.units, c, v[piece]), dtype=float) for c, v in columns]
-        start = starts(mechanism, poses, rows) if plan.continued else None
+        some = poses.take(group.rows[piece])
+        columns = zip(plan.structure.given, group.names, strict=True)
+        values = [np.asarray(radians(motion.units, c, some.named[name]), dtype=float) for c, name in columns]
+        start = _starts(mechanism, some) if plan.continued else None
         if plan.angles and anchors is not None:
-            start = anchors.at(*np.divmod(rows, poses.line))
-        solved = plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+            start = anchors.at(*some.places_along)
+        solved, rows = plan.solve(values, some.places, start=start, limits=False), group.rows[piece]
         if solved.shape != rows.shape:
             # A structure, which has no drives, stands in the same pose in every row.
-            return replace(solved, shape=rows.shape, reason=np.full(rows.shape, solved.reason))
-        return solved
+            solved = replace(solved, shape=rows.shape, reason=np.full(rows.shape, solved.reason))
+        return SolvedPoses(motion.at(some), rows, solved)
 
     turns = _Turns(motion, angles, curve)
-    for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
-        rows = group.rows[piece]
-        near = from_sketch(motion.at(_alone(poses, group, piece))) if poses.listed else turns.near(rows, configuration)
+    for part in map_chunks(at, pieces, jobs):
+        configuration = part.configuration
+        near = from_sketch(part.motion) if poses.listed else turns.near(part.rows, configuration)
         configuration = replace(
             configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys()
         )
         plan.judge(configuration)
-        yield SolvedPoses(motion, rows, group.names, configuration)
+        yield replace(part, configuration=configuration)
 
 
 def curve_with(motion: Motion, coordinates: Sequence[Coordinate]) -> Curve:
     """The motion of some poses with the angles of coordinates, those of limits and of torsion springs."""
-    plan = motion.mechanism.plan(motion.poses.groups[0].names)
+    plan = motion.mechanism.plan(motion.poses.names)
     return curve_of(motion, followed_angles(motion.mechanism, plan, coordinates))
 
 
@@ -156,51 +156,38 @@ class _Turns:
                 finite = np.isfinite(lines)
                 begin = np.take_along_axis(lines, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
                 least, most = (f(np.where(finite, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
-                sizes = {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
-                turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, sizes))
+                turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, poses.own.places))
                 values += TURN * np.repeat(turns, lines.shape[1])
         return np.nan_to_num(table)
 
 
 def anchors_of(motion: Motion, plan: Plan, curve: Curve | None = None) -> Anchors | None:
     """Poses that count turns along the motions that some poses are; None where turns do not count, and of places."""
-    if not plan.angles or motion.poses.listed or motion.poses.regions:
+    if not plan.angles or motion.poses.listed or motion.poses.rule.regions:
         return None
     return Anchors(motion, plan) if curve is None else curve.anchors
 
 
-def _alone(poses: Poses, group: PoseGroup, piece: slice) -> Poses:
-    """Some poses of a group by themselves."""
-    alone = Poses.single({name: column[piece] for name, column in group.values.items()})
-    return replace(alone, places=dimensions(poses, group.rows[piece]))
-
-
-def dimensions(poses: Poses, rows: Ints | slice) -> dict[str, Floats]:
-    """Dimensions of the designs that some poses belong to, where they differ from the nominal ones; shape of `rows`."""
-    return {name: values[rows] for name, values in poses.places.items()}
-
-
-def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | None:
-    """Where poses of other designs without a closed form start, see `begun`; shape of `rows`."""
-    if not poses.places:
+def _starts(mechanism: Mechanism, poses: Poses) -> Configuration | None:
+    """Where poses of other designs without a closed form start, see `begun`."""
+    if not poses.own.places:
         return None
-    per_design = poses.count // poses.designs
-    designs, which = np.unique(rows // per_design, return_inverse=True)
-    return begun(mechanism, dimensions(poses, designs * per_design)).take(which.reshape(rows.shape))
+    designs, which = np.unique(poses.design, return_inverse=True)
+    return begun(mechanism, poses.own.take(designs).places).take(which.reshape(poses.count))
 
 
 def solve_rows(motion: Motion, rows: Ints) -> Configuration:
-    """Poses that give the same coordinates.
+    """Poses of some rows, which give the same coordinates.
 
     Raises
     ------
     MechdesignError
         Where these do not determine the mechanism.
     """
-    poses = motion.poses
-    names = next(group.names for group in poses.groups if rows[0] in group.rows)
+    poses = motion.poses.take(rows)
+    names = poses.groups[0].names
     plan = motion.mechanism.plan(names)
     given = zip(plan.structure.given, names, strict=True)
-    values = [radians(motion.units, coordinate, poses.values[name][rows]) for coordinate, name in given]
+    values = [radians(motion.units, coordinate, poses.named[name]) for coordinate, name in given]
     anchors = anchors_of(motion, plan)
-    return plan.solve(values, start=None if anchors is None else anchors.at(*np.divmod(rows, poses.line)))
+    return plan.solve(values, start=None if anchors is None else anchors.at(*poses.places_along))

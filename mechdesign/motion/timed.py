@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from mechdesign.motion.paths import bends, between
+from mechdesign.motion.rows import TIME, Rows
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Times that differ by less than this part of the whole time are the same.
@@ -57,9 +59,8 @@ class TimedCourse:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionProgram:
-    """What coordinates do over time; functions of the place along the motion, in rows from 0, which is even in time
-    between the rows.
+class Timed(Rows):
+    """What coordinates do over time, which is even between the rows.
 
     Parameters
     ----------
@@ -69,6 +70,15 @@ class MotionProgram:
 
     courses: Mapping[str, TimedCourse]
     times: Floats
+    timed: ClassVar[bool] = True
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return (self.times.shape[1],)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.courses)
 
     @cached_property
     def _places(self) -> dict[str, Floats]:
@@ -87,29 +97,36 @@ class MotionProgram:
         return places
 
     @cached_property
-    def corners(self) -> Floats:
-        """Places at which a motion is not smooth: between its phases, and where steps of time change."""
+    def corners(self) -> Floats:  # type: ignore[override]
+        """Places at which it is not smooth: between its phases, and where steps of time change."""
         phases = [places.ravel() for places in self._places.values()]
         return np.unique(np.concatenate([*phases, bends(self.times)]))
 
-    def time(self, line: Ints, s: Floats) -> Floats:
-        """Time at places of some designs, both of shape (n,)."""
+    def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        return {TIME: self._time(line, s.astype(float)), **self._derivatives(line, s.astype(float), 0)}
+
+    def rates(self, line: Ints, s: Ints | Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        return self._derivatives(line, s.astype(float), 1), self._derivatives(line, s.astype(float), 2)
+
+    def _time(self, line: Ints, s: Floats) -> Floats:
         return between(self.times, _row(self.times, line), s)
 
-    def at(self, name: str, line: Ints, s: Floats, order: int = 0) -> Floats:
-        """A coordinate, its velocity (order 1) or acceleration (order 2) there; of a jump what follows."""
-        places = self._places[name]
-        return self.courses[name].at(line, _phase(places, _row(places, line), s), self.time(line, s), order)
+    def _derivatives(self, line: Ints, s: Floats, order: int) -> dict[str, Floats]:
+        """Coordinates, their velocities (order 1) or accelerations (order 2); at a jump what follows it."""
+        time = self._time(line, s)
+        return {
+            name: course.at(line, _phase(places, _row(places, line), s), time, order)
+            for (name, course), places in zip(self.courses.items(), self._places.values(), strict=True)
+        }
 
-    def pace(self, line: Ints, s: Floats) -> Floats:
+    def pace(self, line: Ints, s: Floats, swept: str | None) -> Floats:
         """Time a row."""
         row = np.clip(np.floor(s), 0, self.times.shape[1] - 2).astype(np.intp)
         return np.asarray(np.diff(self.times)[_row(self.times, line), row])
 
-    def take(self, designs: Ints) -> MotionProgram:
-        """That of some designs."""
+    def take(self, designs: Ints) -> Timed:
         courses = {name: course.take(designs) for name, course in self.courses.items()}
-        return MotionProgram(courses, self.times[designs] if len(self.times) > 1 else self.times)
+        return Timed(courses, self.times[designs] if len(self.times) > 1 else self.times)
 
 
 def _row(values: Floats, line: Ints) -> Ints:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.cautions import Caution
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
@@ -16,11 +15,9 @@ from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.statics import Balance, Reaction
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.passage import Remark
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
-from mechdesign.questions.poses import pose_in_words
-from mechdesign.study import Study
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
 _JAMS, _HOLDS = "jams in", "is held by"
@@ -34,6 +31,15 @@ NOTABLE_MOMENT = 0.01
 # against inertia, friction holds every mechanism.
 OFTEN = 0.5
 _MOMENT = "moment without length"
+# What is said of poses by these columns: a kind of warning, words about a joint, and the least part of the poses.
+_REMARKS = (
+    (_JAMS, "jammed", "friction in {} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
+     "forces are nan; a longer guide, a smaller offset or coefficient frees it", 0.0),
+    (_HOLDS, "self_locking", "friction holds what the loads would move, most of it in {}: the mechanism is "
+     "self-locking there, and the drives must push in either direction", OFTEN),
+    (_MOMENT, "incomplete", "{} bears a moment, which presses on both ends of its guide, and its friction counts the "
+     "force across alone; give its 'length'", 0.0),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,47 +113,16 @@ class JointFriction:
                 number = np.where(large, own, number)
         return number
 
-    def marks(self, arrays: Mapping[str, Floats]) -> dict[str, Flags]:
+    def marks(self, arrays: Mapping[str, Floats]) -> dict[Remark, Flags]:
         """Poses of which something is to be said."""
         return {
-            f"{what} {name}": np.equal(arrays[what], k)
-            for what in (_JAMS, _HOLDS, _MOMENT)
+            Remark(kind, f"in {{number}} of {{count}} poses {text.format(name)}", least=least): np.equal(
+                arrays[what], k
+            )
             for k, name in enumerate(self.names, 1)
+            for what, kind, text, least in _REMARKS
         }
 
     def jammed(self, arrays: Mapping[str, Floats]) -> Flags:
         """Poses in which the mechanism jams."""
         return np.asarray(arrays[_JAMS] > 0)
-
-    def cautions(
-        self, study: Study, poses: Poses, marks: Mapping[str, tuple[int, int]], table: str
-    ) -> list[Caution]:  # fmt: skip
-        """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
-        warnings, count = [], poses.count // poses.designs
-
-        def caution(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
-            number, row = marks[f"{what} {name}"]
-            where = pose_in_words(study, poses, row) if number >= least else ""
-            words = f"in {number} of {count} poses {text}; the first: {where}"
-            return (words, table, row, where) if number >= least else None
-
-        for name in self.names:
-            text = (
-                f"friction in {name} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
-                "forces are nan; a longer guide, a smaller offset or coefficient frees it"
-            )
-            if jams := caution(_JAMS, name, 1, text):
-                warnings.append(Caution("jammed", *jams))
-            text = (
-                f"friction holds what the loads would move, most of it in {name}: the mechanism is self-locking there, "
-                "and the drives must push in either direction"
-            )
-            if holds := caution(_HOLDS, name, max(OFTEN * count, 1), text):
-                warnings.append(Caution("self_locking", *holds))
-            text = (
-                f"{name} bears a moment, which presses on both ends of its guide, and its friction counts the force "
-                "across alone; give its 'length'"
-            )
-            if turns := caution(_MOMENT, name, 1, text):
-                warnings.append(Caution("incomplete", *turns))
-        return warnings

@@ -13,8 +13,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import TIME, Poses
-from mechdesign.numerics.arrays import Ints
+from mechdesign.motion.rows import TIME, PoseNumbers
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 from mechdesign.study.text.fields import MAX_NUMBER
@@ -35,10 +34,10 @@ def corners_in(loads: Sequence[Load]) -> list[Corner]:
 
 
 class Loading:
-    """Loads at some rows of poses."""
+    """Loads at some poses."""
 
-    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice) -> None:
-        self.study, self.loads, self.poses, self.rows = study, loads, poses, rows
+    def __init__(self, study: Study, loads: Sequence[Load], poses: PoseNumbers) -> None:
+        self.study, self.loads, self.poses = study, loads, poses
 
     @quiet
     def add(self, forces: Forces, moving: Moving) -> None:
@@ -61,23 +60,20 @@ class Loading:
         """A number of a load or an effort; nan where an expression has no value."""
         if isinstance(quantity, Expression):
             value = quantity.evaluate({
-                name: variable(self.study, name, self.poses, self.rows, forces.configuration, moving)
-                for name in quantity.names
+                name: variable(self.study, name, self.poses, forces.configuration, moving) for name in quantity.names
             })  # fmt: skip
             # Beyond what a study takes as a number it has no value.
             return np.where(np.abs(value) <= MAX_NUMBER, value, np.nan)
         return quantity
 
 
-def variable(
-    study: Study, name: str, poses: Poses, rows: Ints | slice, configuration: Configuration, moving: Moving
-) -> Number:
-    """Value of a variable of a load at some rows of poses: a parameter, the time, a coordinate or its velocity."""
+def variable(study: Study, name: str, poses: PoseNumbers, configuration: Configuration, moving: Moving) -> Number:
+    """Value of a variable of a load at some poses: a parameter, the time, a coordinate or its velocity."""
     if name in study.parameters.nominal:
-        return poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), rows)
+        return poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)))
     if name == TIME:
         assert poses.times is not None
-        return poses.times[rows]
+        return poses.times
     coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
     if coordinate.name == name:
         return np.asarray(in_study_units(study.units, coordinate, configuration.value(coordinate)), dtype=np.float64)

@@ -10,55 +10,36 @@ import numpy as np
 
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.passage import MAX_SHOWN_POSES, shown_rows
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.passage import MAX_SHOWN_POSES, Passage, shown_rows
+from mechdesign.motion.rows import OWN, DesignNumbers, Poses
 from mechdesign.motion.solving import POSES_AT_ONCE, solve_rows
 from mechdesign.numerics.arrays import Ints
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.expansion import OWN, DesignNumbers, default, expand, number_of_poses
-from mechdesign.study.schema.poses import PoseSection
 
 
 def study_poses(study: Study, section: str, numbers: DesignNumbers = OWN) -> Poses:
     """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked, of the study's own design or of some.
-
-    A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
 
     Raises
     ------
     StudyError
         Where nothing sensible can be assumed.
     """
-    for owner in _with_poses(study, section):
-        if owner.at_nodes:
-            # Here, for regions need SciPy, which is slow to import.
-            from mechdesign.region.curves import workspace_nodes
+    owner = study.motions.owner(section)
+    if owner is not None and study.sections[owner].at_nodes:
+        # Here, for regions need SciPy, which is slow to import.
+        from mechdesign.region.curves import workspace_nodes
 
-            return workspace_nodes(study)
-        poses = expand(owner, study.folder, numbers)
-        if poses is not None:
-            return poses
-    return default(study.mechanism.description, numbers)
-
-
-def _with_poses(study: Study, section: str) -> list[PoseSection]:
-    """The sections of a study that may give the poses of one, in their order."""
-    own: PoseSection | None = getattr(study, section)
-    names = (section, *(own.fallbacks if own is not None else ("kinematics",)))
-    return [part for name in dict.fromkeys(names) if (part := getattr(study, name)) is not None]
+        return workspace_nodes(study)
+    return study.motions[section] if numbers is OWN else study.motions.of(section, numbers)
 
 
 def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
     if not len(rows):
         return
-    owner = next((part for part in _with_poses(designs.study, section) if part.source is not None), None)
-    counts = (
-        np.zeros((len(rows), 0))
-        if owner is None
-        else number_of_poses(owner, designs.study.folder, designs.take(rows).numbers)
-    )
+    counts = designs.study.motions.counts(section, designs.take(rows).numbers)
     kinds, which = np.unique(counts, axis=0, return_inverse=True)
     for kind in range(len(kinds)):
         members = rows[which.ravel() == kind]
@@ -90,18 +71,16 @@ class Shown:
     @property
     def solved(self) -> SolvedPoses:
         """The poses as those of their motion."""
-        return SolvedPoses(
-            self.study.motion(self.poses), self.rows, self.poses.groups[0].names, self.configuration
-        )  # fmt: skip
+        return SolvedPoses(self.study.motion(self.poses.take(self.rows)), self.rows, self.configuration)
 
     def take(self, index: Ints) -> Self:
         """Some of the poses."""
         return replace(self, rows=self.rows[index], configuration=self.configuration.take(index))
 
 
-def shown_of(study: Study, solved: SolvedPoses) -> Shown:
-    """Solved poses of a study, as pictures show them."""
-    return Shown(study, solved.poses, solved.rows, solved.configuration)
+def shown_of(study: Study, passage: Passage) -> Shown:
+    """What pictures show of a pass over the poses of a study."""
+    return Shown(study, passage.values.question.poses, passage.shown.rows, passage.shown.configuration)
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:

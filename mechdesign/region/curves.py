@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.errors import AssemblyError
-from mechdesign.motion.rows import PoseGroup, Poses, Sector, Sectors
+from mechdesign.motion.rows import GivenRows, Poses, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.region.patches import GRID, patches
 from mechdesign.region.pieces import counted
@@ -66,5 +66,5 @@ def workspace_nodes(study: Study) -> Poses:
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
     values |= {name: np.concatenate(parts) for name, parts in held.items()}
-    group = PoseGroup(tuple(values), values, np.arange(len(z)))
-    return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(all_sectors))
+    lines = {name: column.reshape(-1, GRID) for name, column in values.items()}
+    return Poses(GivenRows(lines, lines=(len(z) // GRID,), regions=all_sectors))

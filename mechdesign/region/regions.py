@@ -10,12 +10,12 @@ import numpy as np
 
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism.jacobians import mixes
+from mechdesign.motion.rows import DesignNumbers
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import HELD, LENGTH, Field
 from mechdesign.study import Study
-from mechdesign.study.expansion import DesignNumbers
 from mechdesign.study.text.units import Amount
 
 # Rays of the tables of local indices and of the boundary, unless the study says how many.

@@ -14,8 +14,8 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism.mechanism import Variant
+from mechdesign.motion.rows import DesignNumbers
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study.expansion import DesignNumbers
 from mechdesign.study.loaded import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.targets import Target

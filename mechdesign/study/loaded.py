@@ -17,6 +17,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses
 from mechdesign.study.building.parameters import Parameters
+from mechdesign.study.motions import Motions
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.schema.study_file import override
 from mechdesign.study.schema.targets import Target
@@ -105,6 +106,14 @@ class Study:
     def with_sections(self, **sections: Any) -> Self:
         """The study with other sections, by their keys."""
         return dataclasses.replace(self, sections={**self.sections, **sections})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {part.name: getattr(self, part.name) for part in dataclasses.fields(self)}
+
+    @cached_property
+    def motions(self) -> Motions:
+        """Poses by command, as rules; see `Motions`."""
+        return Motions(self.sections, self.mechanism.description, self.folder)
 
     @cached_property
     def questions(self) -> tuple[str, ...]:

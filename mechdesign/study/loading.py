@@ -21,8 +21,6 @@ from mechdesign.functions import RESERVED
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.motion.rows import Poses
-from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
@@ -34,7 +32,7 @@ from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.study_file import annotation_of, keys_at, model_of, override
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.given import override_texts, plain_data
 from mechdesign.study.text.inputs import Folder
@@ -157,12 +155,10 @@ def load_document(
     reporter.done()
     doubts.note(checker, parts, description)
     assert mechanism is not None
-    _check_poses(parts, mechanism, reporter, source.folder)
-    reporter.done()
     name = parts.get("name") or (source.path.stem if source.path is not None else UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
-    return Study(
+    study = Study(
         name=name,
         path=source.path,
         text=source.text,
@@ -183,6 +179,9 @@ def load_document(
         folder=source.folder,
         warnings=reporter.warnings,
     )
+    _check_poses(study, reporter)
+    reporter.done()
+    return study
 
 
 def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
@@ -279,37 +278,37 @@ def _checked(checker: Checker) -> dict[str, Any]:
     return sections
 
 
-def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
+def _check_poses(study: Study, reporter: Reporter) -> None:
     """Check that poses determine the mechanism and are not too many, and that the targets fit the poses of
     kinematics.
     """
     for command in COMMANDS:
-        section = parts.get(command)
-        poses: Poses | None = None
-        if isinstance(section, PoseSection) and (key := section.source) is not None:
+        section = study.sections.get(command)
+        key = section.source if isinstance(section, PoseSection) and not section.at_nodes else None
+        if key is not None:
             try:
-                poses = expansion.expand(section, folder)
+                poses = study.motions[command]
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
-            for group in poses.groups if poses is not None else ():
+            for k, names in enumerate(poses.rule.kinds):
                 try:
-                    mechanism.plan(group.names)
+                    study.mechanism.plan(names)
                 except MechanismError as error:
-                    place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
-                    reporter.report(place, str(error))
-            if poses is not None and not poses.slopes and getattr(section, "speed", None) is not None:
+                    first = [] if key != "poses" else [int(poses.groups[k].rows[0])]
+                    reporter.report((command, key, *first), str(error))
+            if poses.rule.path is None and key == "path" and getattr(section, "speed", None) is not None:
                 reporter.report(
                     (command, "speed"),
                     "the path's point does not move: it has no direction; give two different places",
                     at_key=True,
                 )
-        if command == "kinematics" and parts["targets"]:
+        if command == "kinematics" and study.targets:
             try:
-                assumed = poses or expansion.default(mechanism.description)
+                assumed = study.motions[command]
             except StudyError:
                 continue
-            targets.check_poses(parts["targets"], mechanism, assumed, reporter)
+            targets.check_poses(study.targets, study.mechanism, assumed, reporter)
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from mechdesign.errors import StudyError
-from mechdesign.motion.timed import SAME_TIME, MotionProgram, TimedCourse
+from mechdesign.motion.timed import SAME_TIME, Timed, TimedCourse
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import Course
@@ -20,9 +20,7 @@ from mechdesign.study.text.tables import table_of
 SHORTEST = 1e-6
 
 
-def program(
-    motion: Mapping[str, Course], instants: int, folder: Folder, value: Callable[[float], Floats]
-) -> MotionProgram:
+def program(motion: Mapping[str, Course], instants: int, folder: Folder, value: Callable[[float], Floats]) -> Timed:
     """The motion of coordinates at so many instants evenly in time, and at the ends of their segments.
 
     Parameters
@@ -40,7 +38,7 @@ def program(
         if wrong.any():
             raise StudyError(message)
     times, counts = _times(courses, instants)
-    return MotionProgram(courses, times[:, : counts[0]])
+    return Timed(courses, times[:, : counts[0]])
 
 
 def number_of_instants(

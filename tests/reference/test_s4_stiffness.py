@@ -126,9 +126,9 @@ def test_agrees_with_beam_elements_at_three_poses(kind: str) -> None:
     """Within 0.0001 % at the reference pose and at two displaced ones (Sec. 3.3)."""
     study = load(kind)
     result = mechdesign.stiffness(study)
-    group = study_poses(study, "stiffness").groups[0]
-    assert len(group.rows) == 3
-    pose = study.mechanism.solve(group.values)
+    poses = study_poses(study, "stiffness")
+    assert poses.count == 3
+    pose = study.mechanism.solve(poses.values)
     for row in range(3):
         points = {name: complex(pose[f"{name}.x"][row], pose[f"{name}.y"][row]) for name in study.mechanism.points}
         assert compliance(result, row) == pytest.approx(build(kind, points), rel=1e-6)
@@ -138,8 +138,7 @@ def test_displaced_poses_are_displaced() -> None:
     """0.4 m away along x, and along y where the platform can go there, as in Sec. 3.3; type III moves on a curve."""
     for kind in TYPES:
         study = load(kind)
-        group = study_poses(study, "stiffness").groups[0]
-        pose = study.mechanism.solve(group.values)
+        pose = study.mechanism.solve(study_poses(study, "stiffness").values)
         places = np.asarray(pose["P.x"]) + 1j * np.asarray(pose["P.y"])
         assert places[0] == pytest.approx(1j)
         assert abs(places[1:] - places[0]).min() >= 0.4 - 1e-12

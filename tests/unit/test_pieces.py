@@ -394,9 +394,8 @@ def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
 @pytest.mark.nightly
 def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
     poses = workspace_nodes(study_of(FIVE_BAR))
-    (group,) = poses.groups
     filled = Filled(five_bar(), 0.85)
-    z = group.values["P.x"] + 1j * group.values["P.y"]
+    z = poses.values["P.x"] + 1j * poses.values["P.y"]
     assert filled.at(0, -0.25) not in {0, *(filled.at(p.real, p.imag) for p in z)}
 
 

@@ -1,5 +1,7 @@
 """Poses: lists, sweeps, grids, paths, and what is assumed where a study gives none."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -131,3 +133,18 @@ def test_wrong_poses(poses, section, message):
     with pytest.raises(mechdesign.StudyError) as caught:
         poses(CRANK + f"kinematics: {section}")
     assert message in str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mechanism", "poses"),
+    [
+        (CRANK, "sweep: {crank: {from: 0, to: 360, number: 1000000}}"),
+        (ARM, "path: {P: {circle: {center: [8, 5], radius: 3}, points: 1000000}}"),
+        (CRANK, "{motion: {crank: [{from: 0, to: 90, time: 1}]}, instants: 1000000}"),
+    ],
+    ids=["sweep", "path", "motion"],
+)
+def test_a_study_of_a_million_poses_goes_to_another_process_in_some_kilobytes(mechanism, poses):
+    study = mechdesign.load(text=f"{mechanism}kinematics: {poses if poses[0] == '{' else '{' + poses + '}'}\n")
+    assert len(pickle.dumps(study)) < 20_000

@@ -17,7 +17,7 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.answer import Between, MotionQuestion, alone
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.passage import Passage
+from mechdesign.motion.passage import Passage, Remark
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import Flags, Floats
@@ -31,7 +31,7 @@ from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestio
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
-from mechdesign.questions.kinematics.cams import beyond_profile, outside
+from mechdesign.questions.kinematics.cams import outside
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import Shown, shown_of, study_poses
@@ -43,8 +43,13 @@ from mechdesign.work.threads import one_thread
 # Tables with a row a pose, or several.
 A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
 TABLES = (*A_ROW_A_POSE, "extremes")
-# Before the name of a cam: the poses in which its follower lifts off.
-_LIFTED = "lifted off "
+_SINGULAR = Remark(
+    "singular",
+    "{number} of {count} poses are singular: the drives hold the mechanism no longer, and efforts and joint forces are "
+    "nan there",
+    first=False,
+)  # fmt: skip
+_UNDEFINED = Remark("undefined", "")  # whose sentence depends on what has no value in the first pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +97,18 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
     a_row_a_pose: ClassVar = A_ROW_A_POSE
     poses_only: ClassVar[Sequence[str]] = ("modes",)
 
-    def marks(self, values: PoseValues) -> Mapping[str, Flags]:
+    def marks(self, values: PoseValues) -> Mapping[Remark, Flags]:
         """Poses of which something is to be said: where the drives hold it no longer, or a load is nan."""
         (effort, *_) = (static.name for static in self.statics)
         unknown = ~np.isfinite(sum(values.arrays[name] for name in (effort, "shaking", "shaking_moment")))
         regular = values.arrays["conditioning"] >= STALLED
-        marks: dict[str, Flags] = {}
+        marks = dict[Remark, Flags]()
         if (friction := self.acting.friction) is not None:
-            marks = {name: values.valid & where for name, where in friction.marks(values.arrays).items()}
+            marks = {remark: values.valid & where for remark, where in friction.marks(values.arrays).items()}
             unknown &= ~friction.jammed(values.arrays)
         singular, undefined = values.valid & unknown & ~regular, values.valid & unknown & regular
-        return {"singular": singular, "undefined": undefined, **marks, **outside(values)} | {
-            f"{_LIFTED}{coupling}": where for coupling, where in lift_off.lifted(values)
-        }  # fmt: skip
+        lifted = {remark: where for _, remark, where in lift_off.lifted(values)}
+        return {_SINGULAR: singular, _UNDEFINED: undefined, **dict(outside(values)), **lifted, **marks}
 
     def along(self, requests: Collection[Request]) -> KinematicAlong | None:
         return along_of(self, (), requests=requests)
@@ -139,24 +143,14 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
 
     def say(self, passage: Passage, between: Forced, design: int) -> tuple[list[Caution], list[str]]:
         poses, study, marks = self.poses, self.study, passage.marks[design]
-        count, friction, gaps, warnings = poses.count // poses.designs, self.acting.friction, [], list[Caution]()
-        if (mark := marks["singular"]).number:
-            warnings.append(Caution(
-                "singular", f"{mark.number} of {count} poses are singular: the drives hold the mechanism no longer, "
-                "and efforts and joint forces are nan there", "dynamics", mark.first,
-            ))  # fmt: skip
-        if (mark := marks["undefined"]).number:
+        count, friction, gaps = poses.count // poses.designs, self.acting.friction, list[str]()
+        warnings = passage.cautions(design)
+        if (mark := marks[_UNDEFINED]).number:
             message = f"{self._undefined(mark.first)} at {mark.number} of {count} poses: forces are nan there"
             warnings.append(Caution("undefined", message, "dynamics", mark.first))
-        warnings += beyond_profile(study, poses, marks, "dynamics", design)
-        for name, mark in marks.items():
-            coupling = name.removeprefix(_LIFTED)
-            if name.startswith(_LIFTED) and mark.number:
-                warnings.append(lift_off.caution(study, poses, coupling, mark, design))
-            elif name.startswith(_LIFTED) and between.along is not None:
+        for coupling, remark, _ in lift_off.lifted(passage.values):
+            if between.along is not None and not marks[remark].number:
                 warnings += lift_off.between(self.acting, between.along, coupling, design)
-        if friction is not None:
-            warnings += friction.cautions(study, poses, marks, "dynamics")
         jumps = velocity_jumps(self, study.mechanism.description.masses, design)
         if len(jumps):
             warnings.append(jumps_in_words(self, jumps, "dynamics", design))
@@ -172,7 +166,7 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
         return [*warnings, *assumed(study), *between.warnings], gaps
 
     def drawn(self, passage: Passage, between: Forced) -> DrawnForces:
-        return DrawnForces(shown_of(self.study, passage.shown), passage.values, between.along)
+        return DrawnForces(shown_of(self.study, passage), passage.values, between.along)
 
     def _undefined(self, row: int) -> str:
         """What leaves the forces at a row without a value: the slope of a coupling, or else a load."""

@@ -31,7 +31,7 @@ from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
 from mechdesign.motion.curve import from_sketch
 from mechdesign.motion.motion import in_study_units, radians
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import GivenRows, Poses, instants
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.question import ForceQuestion
@@ -106,7 +106,7 @@ class EquationsOfMotion:
             begin = {
                 drive.name: np.atleast_1d(in_study_units(self.study.units, drive, at.value(drive))) for drive in drives
             }
-            wound = from_sketch(self.study.motion(Poses.single(begin)))
+            wound = from_sketch(self.study.motion(Poses(GivenRows.single(begin))))
             at = replace(at, near={**at.near, **{name: angle[0] for name, angle in wound.items()}})
         self.drives, friction = drives, question.friction
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
@@ -213,13 +213,13 @@ class EquationsOfMotion:
         chart, last, _, _, window = self.branch
         times = np.clip(times, *window)
         linear, count, shape = chart.solve(x, last), len(chart.rows), times.shape
-        configuration, section, rows = linear.configuration, self.acting.section, slice(None)
+        configuration, section = linear.configuration, self.acting.section
         moves = linear.velocity([*velocity[chart.rows]])
         cases = 1 + count + len(self.contacts)
         moving = Moving(moves, linear.acceleration(moves, [*np.eye(cases)[1 : count + 1, :, None]]))
-        poses = Poses((), len(times), True, shape, times=times)
-        forces, energy = self.acting.acting(poses, configuration, rows, moving)
-        loading = Loading(self.study, section.loads, poses, rows)
+        poses = instants(times)
+        forces, energy = self.acting.acting(poses, configuration, moving)
+        loading = Loading(self.study, section.loads, poses)
         given = [loading.value(self.efforts.get(d.name, NOTHING), forces, moving) for d in self.drives]
         efforts = np.array([np.broadcast_to(effort, shape) for effort in given], dtype=float)
         for drive, effort in zip(self.drives, efforts, strict=True):
@@ -282,8 +282,7 @@ class EquationsOfMotion:
         linear, count = self.branch.chart.solve(x[:, None], self.branch.last), len(self.branch.chart.rows)
         still = linear.velocity([0.0] * count)
         moving = Moving(still, linear.acceleration(still, [*np.eye(count + 1)[1:, :, None]]))
-        poses = Poses((), 1, True, (1,), times=np.array([time]))
-        forces, _ = self.acting.acting(poses, linear.configuration, slice(None), moving)
+        forces, _ = self.acting.acting(instants(np.array([time])), linear.configuration, moving)
         table = np.array([np.broadcast_to(e, (count + 1, 1)) for e in balance(linear, forces).efforts])[..., 0]
         return table[:, 1:] - table[:, :1], linear
 

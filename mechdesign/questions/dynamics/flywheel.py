@@ -6,16 +6,13 @@ from the effort as a function along the motion, as in ``extremes.csv``.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.motion.motion import radians
 from mechdesign.motion.question import PoseValues
-from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats
+from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.questions.dynamics.columns import FLYWHEEL
 from mechdesign.questions.dynamics.schema import Flywheel
 from mechdesign.questions.kinematics.along import KinematicAlong
@@ -144,10 +141,5 @@ def _twice(question: MovedQuestion) -> MovedQuestion:
     """The question for a sweep that goes on as far again."""
     (name,), poses = question.poses.names, question.poses
     values = poses.values[name]
-    longer = Poses.single({name: np.append(values, values[1:] + (values[-1] - values[0]))})
-
-    def constant(columns: dict[str, Floats]) -> dict[str, Floats]:
-        return {key: np.full(longer.count, column[0]) for key, column in columns.items()}
-
-    places, parameters = constant(dict(poses.places)), constant(dict(poses.parameters))
-    return question.at(replace(longer, places=places, parameters=parameters, nominal=poses.nominal))
+    longer = GivenRows.single({name: np.append(values, values[1:] + (values[-1] - values[0]))})
+    return question.at(Poses(longer, poses.own))

@@ -14,7 +14,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.passage import MAX_SHOWN_POSES, Mark
 from mechdesign.motion.question import PoseValues, unfilled
-from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.rows import TIME, GivenRows, Poses
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress
@@ -116,10 +116,9 @@ def _cautions(study: Study, integration: Integration, course: IntegratedMotion) 
 def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iterator[Caution]:
     """Warnings of followers that lift off their cams, at rows, or only between them."""
     contacts = lift_off.contacts(integration.equations.question)
-    for coupling, where in lift_off.lifted(rows):
-        if where.any():
-            mark = Mark(int(np.count_nonzero(where)), int(where.argmax()))
-            yield lift_off.caution(study, rows.question.poses, coupling, mark)
+    for coupling, remark, where in lift_off.lifted(rows):
+        if (caution := Mark.of(where).caution(remark, rows.question)) is not None:
+            yield caution
             del contacts[coupling]
     if not contacts or not integration.time:
         return
@@ -135,11 +134,8 @@ def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iter
     for k, coupling in enumerate(contacts):
         times = [change.place for change in changes if change.function == k and change.sign < 0]
         if times:
-            message = (
-                f"cam {coupling}: the follower lifts off between the instants, where it would have to be pulled; a "
-                f"spring holds it on the cam; {len(times)} times, first at {_at(study, times[0])}"
-            )
-            yield Caution("cam", message, "joint_forces")
+            words = lift_off.lifts(coupling, "between the instants").words
+            yield Caution("cam", f"{words}; {len(times)} times, first at {_at(study, times[0])}", "joint_forces")
 
 
 def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
@@ -156,14 +152,11 @@ def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
         {drive.name: of(drive, course.positions.rate(drive, part)) for drive in drives}
         for part in (course.rates.velocity, course.rates.acceleration)
     )
-    poses = Poses(
-        (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
-        slopes=slopes, bends=bends,
-    )  # fmt: skip
+    poses = Poses(GivenRows.single({TIME: course.times, **values}, slopes=slopes, bends=bends))
     question = DynamicQuestion.of(study, poses)
     if len(course.rates.friction):
         question = replace(question, forces=replace(question.acting, rubbing=course.rates.friction))
-    motion, solved = unfilled(question), SolvedPoses(question.motion, rows, mechanism.drives, course.configuration)
+    motion, solved = unfilled(question), SolvedPoses(question.motion, rows, course.configuration)
     mechanism.forward.judge(replace(course.configuration, reason=motion.reason))
     motion.put(rows, full(question.moved(solved)[0], rows.shape))
     # Efforts are known, also where the drives are singular.

@@ -80,7 +80,7 @@ class _Poses:
 
     def __init__(self, motion: PoseValues, shown: Shown) -> None:
         self.motion, self.question = motion, question_of(motion)
-        self.study, self.poses = self.question.study, motion.question.poses
+        self.study, self.poses = self.question.study, shown.solved.poses
         self.rows, self.configuration = shown.rows, shown.configuration
         linear = self.study.mechanism.linearize(self.configuration)
         self.moving = moving_at(motion.question.section, shown.solved, linear)
@@ -121,10 +121,10 @@ class _Poses:
                     yield self._acting("joint", contact.joint, side, at, force, sign * moment, reaction=sign < 0)
 
     def _masses(self) -> Iterator[Acting]:
-        geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section, self.rows)
+        geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section)
         factor, still = self.study.units.inertia_factor, Moving()
         gravity = section.gravity[0] + 1j * section.gravity[1]
-        for body, mass in self.question.masses(self.poses, self.rows, self.configuration.places).items():
+        for body, mass in self.question.masses(self.poses, self.configuration.places).items():
             for kind, fall, moving in (("weight", gravity, still), ("inertia", 0j, self.moving)):
                 forces = Forces(self.configuration)
                 inertia(forces, geometry, {body: mass}, moving, fall, factor)
@@ -136,7 +136,7 @@ class _Poses:
     def _loads(self) -> Iterator[Acting]:
         for load in self.question.section.loads:
             forces = Forces(self.configuration)
-            Loading(self.study, [load], self.poses, self.rows).add(forces, self.moving)
+            Loading(self.study, [load], self.poses).add(forces, self.moving)
             ends = (load.at,) if load.at is not None else load.between or ()
             yield from self._at_points("load", "load", forces, ends)
             if load.link is not None:

@@ -94,7 +94,7 @@ def _modes(
         still = linear.velocity([0.0] * count)
         units = [*np.eye(count + 1)[1:, :, None]] if accelerated else [0.0] * count
         moving = Moving(still, linear.acceleration(still, units))
-        forces, _ = question.acting(poses, linear.configuration, slice(None), moving)
+        forces, _ = question.acting(poses, linear.configuration, moving)
         shape = (count + 1, poses.count) if accelerated else (poses.count,)
         return np.array([np.broadcast_to(effort, shape) for effort in balance(linear, forces).efforts]), linear
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import instants
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.loads import Loading
 
@@ -50,5 +50,4 @@ class Instants:
     @cached_property
     def loading(self) -> Loading:
         """By which expressions get their values."""
-        poses = Poses((), len(self.times), True, self.times.shape, times=self.times)
-        return Loading(self.equations.study, (), poses, slice(None))
+        return Loading(self.equations.study, (), instants(self.times))

@@ -7,15 +7,12 @@ from collections.abc import Iterator
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.followed import Followed
-from mechdesign.motion.passage import Mark
+from mechdesign.motion.passage import Remark
 from mechdesign.motion.question import PoseValues
-from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.along import KinematicAlong
-from mechdesign.questions.poses import pose_in_words
-from mechdesign.study import Study
 
 # Part of the forces by which a contact force is rounding.
 PRESSED = 1e-9
@@ -31,11 +28,18 @@ def contacts(question: ForceQuestion) -> dict[str, str]:
     }
 
 
-def lifted(motion: PoseValues) -> Iterator[tuple[str, Flags]]:
-    """By the coupling of each cam, the poses in which its follower would have to be pulled."""
+def lifts(coupling: str, where: str) -> Remark:
+    """What is said where the follower of a cam lifts off."""
+    cure = "where it would have to be pulled; a spring holds it on the cam"
+    return Remark("cam", f"cam {coupling}: the follower lifts off {where}, {cure}", "joint_forces")
+
+
+def lifted(motion: PoseValues) -> Iterator[tuple[str, Remark, Flags]]:
+    """By the coupling of each cam, what is said of poses in which its follower would have to be pulled, and which."""
     question = question_of(motion)
     for coupling, normal in contacts(question).items():
-        yield coupling, motion.valid & (motion.arrays[normal] < -PRESSED * question.size)
+        remark = lifts(coupling, "at {number} of {count} poses")
+        yield coupling, remark, motion.valid & (motion.arrays[normal] < -PRESSED * question.size)
 
 
 def between(question: ForceQuestion, along: KinematicAlong, coupling: str, design: int) -> Iterator[Caution]:
@@ -44,19 +48,4 @@ def between(question: ForceQuestion, along: KinematicAlong, coupling: str, desig
     force, place = (end[design] for end in along.worst(column, -1))
     if force < -PRESSED * question.size:
         most = Followed(along, column, design).shown(float(place))
-        message = (
-            f"cam {coupling}: the follower lifts off between the poses, where it would have to be pulled; "
-            f"a spring holds it on the cam; by most at {most}"
-        )
-        yield Caution("cam", message, "joint_forces")
-
-
-def caution(study: Study, poses: Poses, coupling: str, mark: Mark, design: int = 0) -> Caution:
-    """The warning that the follower of a cam lifts off in some poses of a design."""
-    count = poses.count // poses.designs
-    first = pose_in_words(study, poses, mark.first + design * count)
-    message = (
-        f"cam {coupling}: the follower lifts off at {mark.number} of {count} poses, where it would have to be pulled; "
-        f"a spring holds it on the cam; the first: {first}"
-    )
-    return Caution("cam", message, "joint_forces", mark.first, first)
+        yield Caution("cam", f"{lifts(coupling, 'between the poses').words}; by most at {most}", "joint_forces")

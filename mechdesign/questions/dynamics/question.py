@@ -25,8 +25,8 @@ from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.motion.rows import PoseNumbers, Poses
+from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import JointFriction, Slipping
@@ -141,20 +141,20 @@ class ForceQuestion:
 
     @quiet
     def columns(
-        self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+        self, poses: PoseNumbers, linear: Linearization, moving: Moving
     ) -> Mapping[str, Value]:  # fmt: skip
         """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
 
         Of a subset of the columns joint forces are computed only if one is among them.
         """
-        columns, held = self._held(poses, linear, rows, moving)
+        columns, held = self._held(poses, linear, moving)
         if any(self._counts(name) for name in self.forces):
             borne, stiffness = self._borne(held), self.study.stiffness
             moments = any(self._counts(f"{name}.moment") for name in self.forces)
             if moments and self.joints.open and stiffness is not None and isinstance(held, Balance):
-                section = poses.section(stiffness, rows)
+                section = poses.section(stiffness)
                 applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
-                self.apply(applied, 0, poses, rows, moving)
+                self.apply(applied, 0, poses, moving)
                 borne = with_open_moments(
                     borne, self.joints, applied, section, self.study.mechanism.size, held.couplings
                 )  # fmt: skip
@@ -200,18 +200,17 @@ class ForceQuestion:
         return columns
 
     def _held(
-        self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+        self, poses: PoseNumbers, linear: Linearization, moving: Moving
     ) -> tuple[dict[str, Value], Balance | Slipping]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         mechanism = self.study.mechanism
-        forces, energy = self.acting(poses, linear.configuration, rows, moving)
+        forces, energy = self.acting(poses, linear.configuration, moving)
         columns: dict[str, Value] = {}
         if self.friction is None:
             held: Balance | Slipping = balance(linear, forces, mechanism.engaged)
         else:
             back = self.subset is None or "back_efficiency" in self.subset
-            given = None if self.rubbing is None else self.rubbing[:, rows]
-            held = self.friction.solve(linear, forces, moving.velocity, back=back, given=given)
+            held = self.friction.solve(linear, forces, moving.velocity, back=back, given=self.rubbing)
             columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
@@ -224,33 +223,31 @@ class ForceQuestion:
         columns["potential_energy"] = energy.potential
         return columns, held
 
-    def acting(
-        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving
-    ) -> tuple[Forces, Energy]:
-        """Loads, springs, weights and inertia forces of all masses at some rows of poses, and the energies."""
-        return self.forces_at(poses, configuration, rows, moving, self.masses(poses, rows, configuration.places))
+    def acting(self, poses: PoseNumbers, configuration: Configuration, moving: Moving) -> tuple[Forces, Energy]:
+        """Loads, springs, weights and inertia forces of all masses at some poses, and the energies."""
+        return self.forces_at(poses, configuration, moving, self.masses(poses, configuration.places))
 
     def _borne(self, held: Balance | Slipping) -> list[Reaction]:
         return held.reactions if isinstance(held, Slipping) else reactions(self.joints, held)
 
     def forces_at(
-        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving, masses: Mapping[str, Mass]
+        self, poses: PoseNumbers, configuration: Configuration, moving: Moving, masses: Mapping[str, Mass]
     ) -> tuple[Forces, Energy]:
         """What acts on the mechanism: loads, springs, and weights and inertia of some masses; and their energies."""
-        study, section = self.study, poses.section(self.section, rows)
+        study, section = self.study, poses.section(self.section)
         geometry, gravity = study.mechanism.geometry, section.gravity[0] + 1j * section.gravity[1]
         forces = Forces(configuration)
-        Loading(study, section.loads, poses, rows).add(forces, moving)
+        Loading(study, section.loads, poses).add(forces, moving)
         energy = springs(forces, geometry, list(study.mechanism.description.springs.values()), moving)
         energy += inertia(forces, geometry, masses, moving, gravity, study.units.inertia_factor)
         return forces, energy
 
-    def apply(self, applied: Applied, case: int, poses: Poses, rows: Ints | slice, moving: Moving) -> None:
+    def apply(self, applied: Applied, case: int, poses: PoseNumbers, moving: Moving) -> None:
         """Add what acts to a load on the network of stiffness; the mass of beams is spread along them."""
-        masses, gravity = self.study.mechanism.description.masses, poses.section(self.section, rows).gravity
-        forces, _ = self.forces_at(poses, applied.configuration, rows, moving, masses)
+        masses, gravity = self.study.mechanism.description.masses, poses.section(self.section).gravity
+        forces, _ = self.forces_at(poses, applied.configuration, moving, masses)
         applied.add(case, forces)
-        stiffness = poses.section(StiffnessSection.of(self.study), rows)
+        stiffness = poses.section(StiffnessSection.of(self.study))
         for link in weighed_beams(self.study):
             if link not in masses and link in applied.beams:
                 profile = stiffness.sections[stiffness.elastic[link]]
@@ -258,16 +255,16 @@ class ForceQuestion:
                 weight = self.study.units.inertia_factor * profile.density * profile.extent[0]
                 applied.spread(case, link, _density(forces, moving, link, weight, gravity[0] + 1j * gravity[1]))
 
-    def masses(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
+    def masses(self, poses: PoseNumbers, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of bodies: those given, and of other links those of their beams."""
-        return {**self._beams(poses, rows, places), **self.study.mechanism.description.masses}
+        return {**self._beams(poses, places), **self.study.mechanism.description.masses}
 
-    def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
+    def _beams(self, poses: PoseNumbers, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""
         stiffness, mechanism = self.study.stiffness, self.study.mechanism
         if stiffness is None:
             return {}
-        sections, masses = poses.section(stiffness, rows).sections, dict[str, Mass]()
+        sections, masses = poses.section(stiffness).sections, dict[str, Mass]()
         for name in weighed_beams(self.study):
             link, section = mechanism.description.links[name], sections[stiffness.elastic[name]]
             assert section.density is not None
@@ -395,6 +392,6 @@ class DynamicQuestion(MovedQuestion):
         arrays, linear, moving = self.positions(solved)
         if self.forces is not None:
             regular = np.asarray(arrays["conditioning"]) >= STALLED
-            columns = self.forces.columns(solved.poses, linear, solved.rows, moving)
+            columns = self.forces.columns(solved.poses, linear, moving)
             arrays |= {name: np.where(regular, values, np.nan) for name, values in columns.items()}
         return arrays, linear

@@ -128,7 +128,8 @@ class KinematicAlong(AlongMotion):
         section, poses = self.question.section, self.question.poses
         if not section.rated or section.means is not None or section.clocked(poses.swept):
             return ""
-        return f"the length of the path of {poses.path}" if poses.path is not None else poses.swept or "the poses"
+        path = poses.rule.path
+        return f"the length of the path of {path}" if path is not None else poses.swept or "the poses"
 
     def again(self, curve: Curve, requests: Collection[Request], also: Collection[str] = ()) -> KinematicAlong:
         return KinematicAlong(self.question, curve, (), also=also, requests=requests)
@@ -198,8 +199,8 @@ class KinematicAlong(AlongMotion):
             return whole.pace(line, s)
         velocity = moving_at(question.section, there, linear).velocity
         assert velocity is not None
-        if whole.path is not None:
-            return whole.pace(line, s) / np.abs(velocity.nodes[study.mechanism.graph.node(whole.path)])
+        if whole.rule.path is not None:
+            return whole.pace(line, s) / np.abs(velocity.nodes[study.mechanism.graph.node(whole.rule.path)])
         coordinate = study.mechanism.coordinate(whole.swept or whole.moving[0])
         speed = in_study_units(study.units, coordinate, first(linear.configuration, coordinate, velocity))
         return whole.pace(line, s, coordinate.name) / np.abs(speed)

@@ -66,9 +66,8 @@ def _modes(
             other = Kinematics.of(dataclasses.replace(study, mechanism=assembly.mechanism), poses)
             passage = pass_over(other, NULL, jobs)
         if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
-            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = shown_of(
-                study, passage.shown
-            )
+            label = f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label
+            pictured[label] = shown_of(study, passage)
         passages[assembly.label] = passage
         bad = int(np.count_nonzero(passage.reason))
         if bad:

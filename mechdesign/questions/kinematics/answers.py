@@ -13,7 +13,7 @@ from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.motion.answer import Between, MotionQuestion
 from mechdesign.motion.ends import Change
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.passage import Passage
+from mechdesign.motion.passage import Passage, Remark
 from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
@@ -22,14 +22,14 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import LimitPlace, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
-from mechdesign.questions.kinematics.remarks import marks_of, remarks, unfollowed, valued, without_centre, without_value
+from mechdesign.questions.kinematics.remarks import astray, marks_of, unfollowed, valued, without_value
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.questions.kinematics.targets import totals
 from mechdesign.questions.kinematics.values import KinematicValues
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import shown_of
 from mechdesign.results import Table
-from mechdesign.statistics import Request
+from mechdesign.statistics import Request, no_value_along
 
 # Tables in the order in which they are shown.
 ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres", "cam")
@@ -61,7 +61,7 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
     # Rows of a cam are places of its profile.
     poses_only: ClassVar[Sequence[str]] = ("cam",)
 
-    def marks(self, values: PoseValues) -> Mapping[str, Flags]:
+    def marks(self, values: PoseValues) -> Mapping[Remark, Flags]:
         return marks_of(values)
 
     def totals(self, values: PoseValues) -> Floats:
@@ -130,10 +130,10 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
         }
 
     def say(self, passage: Passage, between: Events, design: int) -> tuple[list[Caution], list[str]]:
-        designs, along, marks = self.poses.designs, between.along, passage.marks[design]
+        designs, along = self.poses.designs, between.along
         own = self if designs == 1 else self.at(self.poses.some(np.array([design])))
         valid = passage.reason.reshape(designs, -1)[design] == 0
-        warnings = remarks(own, marks)
+        warnings = [*passage.cautions(design), *astray(own)]
         jumps = velocity_jumps(self, self.study.mechanism.description.links, design)
         if len(jumps):
             warnings.append(jumps_in_words(self, jumps, "motion", design))
@@ -149,14 +149,16 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
                     "known, but extremes may lie between the places that were looked at; sweep less of it",
                     "extremes",
                 ))  # fmt: skip
-        lost: dict[str, float] = {}
         if along is not None and not along.curve.spent[design]:
-            lost = {name: float(along.lost(name)[design]) for name in valued(own) if name in along.columns}
-        warnings += without_value(own, marks, lost) + without_centre(own, marks)
+            for name in valued(own):
+                lost = along.lost(name)[design] if name in along.columns else 0.0
+                if lost and not passage.marks[design][without_value(name)].number:
+                    words = f"{name} has {no_value_along(lost)}, between its poses"
+                    warnings.append(Caution("undefined", words, "motion"))
         return [*warnings, *cautions(self.study, between.cams, design)], []
 
     def drawn(self, passage: Passage, between: Events) -> DrawnMotion:
-        shown = shown_of(self.study, passage.shown)
+        shown = shown_of(self.study, passage)
         return DrawnMotion(shown, passage.values, between.along, between.limits, between.toggles)
 
 

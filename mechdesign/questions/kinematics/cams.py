@@ -13,13 +13,12 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.passage import Mark
+from mechdesign.motion.passage import Remark
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM
 from mechdesign.questions.kinematics.moved import OUTSIDE
-from mechdesign.questions.poses import pose_in_words
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -54,8 +53,7 @@ class CamSide:
 def profiles(study: Study, poses: Poses) -> list[CamSide]:
     """The profiles of all cams in each design."""
     sides = []
-    per_design = poses.count // poses.designs
-    places = {name: values[::per_design, None] for name, values in poses.places.items()}
+    places = {name: values[:, None] for name, values in poses.own.places.items()}
     for cam in study.mechanism.cams:
         configuration = cam.along(cam.values, places)
         shape = poses.designs, len(cam.values)
@@ -79,28 +77,15 @@ def profiles(study: Study, poses: Poses) -> list[CamSide]:
     return sides
 
 
-def outside(motion: PoseValues) -> dict[str, Flags]:
-    """Valid poses beyond the profile of a cam, by the name of the mark."""
-    marks = (f"{OUTSIDE}{cam.coupling}" for cam in motion.question.study.mechanism.cams)
-    return {name: motion.valid & (motion.arrays[name] == 1.0) for name in marks}
-
-
-def beyond_profile(
-    study: Study, poses: Poses, marks: Mapping[str, Mark], table: str, design: int = 0
-) -> list[Caution]:  # fmt: skip
-    """Warnings of a design's poses beyond the profile of a cam."""
-    warnings, count = [], poses.count // poses.designs
-    for cam in study.mechanism.cams:
-        number, row = marks.get(f"{OUTSIDE}{cam.coupling}", Mark(0, 0))
-        if number:
-            low, high = (float(in_study_units(study.units, cam.followed, end)) for end in cam.given.range)
-            pose = pose_in_words(study, poses, row + design * count)
-            words = (
-                f"cam {cam.coupling}: {number} of {count} poses lie outside of its range, {cam.followed.name} from "
-                f"{low:g} to {high:g}, where it has no profile; the first: {pose}"
-            )
-            warnings.append(Caution("cam", words, table, row, pose))
-    return warnings
+def outside(motion: PoseValues) -> Iterator[tuple[Remark, Flags]]:
+    """Valid poses beyond the profile of a cam, and what is said of them."""
+    for cam in motion.question.study.mechanism.cams:
+        low, high = (float(in_study_units(motion.question.study.units, cam.followed, end)) for end in cam.given.range)
+        words = (
+            f"cam {cam.coupling}: {{number}} of {{count}} poses lie outside of its range, {cam.followed.name} from "
+            f"{low:g} to {high:g}, where it has no profile"
+        )
+        yield Remark("cam", words), motion.valid & (motion.arrays[f"{OUTSIDE}{cam.coupling}"] == 1.0)
 
 
 def cam_table(study: Study, sides: Sequence[CamSide]) -> Table:

@@ -54,9 +54,7 @@ def variables_of(
             moving = moving_at(section, there, study.mechanism.linearize(configuration))
         parts = {name: value for one in expressions.values() for name, value in configuration.user_values(one).items()}
         return {
-            name: parts[name]
-            if name in parts
-            else variable(study, name, there.poses, slice(None), configuration, moving)
+            name: parts[name] if name in parts else variable(study, name, there.poses, configuration, moving)
             for name in names
         }
 

@@ -30,7 +30,7 @@ def gaps_in_words(motion: PoseValues, along: KinematicAlong | None, name: str) -
     if along is not None and name in along.columns:
         between = np.where(along.curve.spent, 0.0, along.lost(name))
     # Of a long motion some poses are kept, those without a value among them.
-    some = "no value in some poses" if poses.rows is not None else ""
+    some = "no value in some poses" if poses.picked is not None else ""
     return [
         (some or no_value(number, valid)) if number else no_value_along(part) if part else ""
         for number, valid, part in zip(lost.tolist(), count.tolist(), between.tolist(), strict=True)

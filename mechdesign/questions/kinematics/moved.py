@@ -21,7 +21,7 @@ from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.motion.motion import Motion, SolvedPoses, in_study_units, radians
 from mechdesign.motion.question import PoseQuestion, unfilled
-from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics import targets
@@ -97,7 +97,7 @@ class MovedQuestion(PoseQuestion):
         return not any(len(table) == self.whole.count for table in tables)
 
     def at(self, poses: Poses) -> Self:
-        return replace(self, motion=self.motion.at(poses), whole=poses if poses.rows is None else self.whole)
+        return replace(self, motion=self.motion.at(poses), whole=poses if poses.picked is None else self.whole)
 
     @abstractmethod
     def lean(self, names: Collection[str]) -> Self:
@@ -108,7 +108,7 @@ class MovedQuestion(PoseQuestion):
         mechanism, units, configuration = solved.motion.mechanism, solved.motion.units, solved.configuration
         arrays: dict[str, Value] = {
             # As the study gives it, not there and back through radians; also where the pose fails.
-            coordinate.name: solved.poses.values[coordinate.name][solved.rows]
+            coordinate.name: solved.poses.named[coordinate.name]
             if coordinate.name in solved.names
             else in_study_units(units, coordinate, configuration.value(coordinate))
             for coordinate in self.watched
@@ -127,7 +127,8 @@ class MovedQuestion(PoseQuestion):
     def values(self, part: SolvedPoses) -> Mapping[str, Floats | Flags]:
         arrays = full(self.moved(part)[0], part.rows.shape)
         smooth = _through_change_points(self, part, arrays)
-        rows = part.rows if self.poses.rows is None else self.poses.rows[part.rows].astype(np.intp)
+        line, row = part.poses.places_along
+        rows = (line * self.whole.line + row).astype(np.intp)
         errors = targets.errors(self.study, self.whole, arrays, rows)
         return {**arrays, THROUGH: smooth, **{error.name: error.values for error in errors}}
 
@@ -227,21 +228,15 @@ def _through_change_points(question: MovedQuestion, solved: SolvedPoses, arrays:
     mechanism, units, poses = solved.motion.mechanism, solved.motion.units, solved.poses
     plan, smooth = mechanism.plan(solved.names), np.zeros(len(solved.rows), dtype=bool)
     near = np.equal(solved.configuration.reason, Reason.OK) & (arrays["conditioning"] < NEAR_SINGULAR)
-    if plan.change_points is None or len(poses.groups) > 1 or not near.any():
+    if plan.change_points is None or len(question.poses.groups) > 1 or not near.any():
         return smooth
     lanes, (name,), coordinate = np.flatnonzero(near), solved.names, plan.structure.given[0]
-    rows, lane = solved.rows[lanes], np.repeat(lanes, len(STENCIL))
+    lane = np.repeat(lanes, len(STENCIL))
     steps = in_study_units(units, coordinate, STENCIL * (1.0 if coordinate.quantity == "angle" else mechanism.size))
-    values = (poses.values[name][rows][:, None] + steps).ravel()
-    slopes, bends = (
-        {key: np.repeat(column[rows], len(STENCIL)) for key, column in part.items()}
-        for part in (poses.slopes, poses.bends)
-    )
-    beside = Poses(
-        (PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),), slopes=slopes,
-        bends=bends,
-    )  # fmt: skip
-    around = unfilled(question.at(beside))
+    values = (poses.named[name][lanes][:, None] + steps).reshape(1, -1)
+    slopes, bends = ({key: column[None, lane] for key, column in part.items()} for part in (poses.slopes, poses.bends))
+    beside = GivenRows({name: values}, listed=True, slopes=slopes, bends=bends)
+    around = unfilled(question.at(Poses(beside)))
     angles = [(angle, c) for angle, c in angles_of(question.watched).items() if angle != name]
     for part in solve_poses(around.question.motion):
         turns = {angle: radians(units, c, arrays[angle][lane[part.rows]]) for angle, c in angles}

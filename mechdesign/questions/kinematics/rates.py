@@ -46,7 +46,7 @@ def drive_rates(
     `linear` is the mechanism at the solved poses.
     """
     mechanism, units, poses = solved.motion.mechanism, solved.motion.units, solved.poses
-    section = poses.section(section, solved.rows)
+    section = poses.section(section)
     inverse = section.inverse(mechanism.drives)
     names = solved.names if inverse else mechanism.drives
     coordinates = [mechanism.coordinate(name) for name in names]
@@ -56,7 +56,7 @@ def drive_rates(
         pace = 1.0 if section.speed is None else section.speed
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
-            [radians(units, c, derivatives.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
+            [radians(units, c, derivatives.get(c.name, nowhere) * pace**order) for c in coordinates]
             for order, derivatives in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
     return inverse_rates(mechanism, linear, coordinates, rates) if inverse else rates

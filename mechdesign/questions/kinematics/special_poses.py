@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -85,7 +85,7 @@ def special_poses(
     section, poses = motion.question.section, motion.question.poses
     rates = any(section.rates.values()) or any(section.accelerations.values())
     rates = bool(rates or section.speed is not None or section.motion is not None)
-    if not poses.motion and not poses.listed:
+    if not poses.followed and not poses.listed:
         return SpecialPoses((), 0, rates)
     special, more = list[SpecialPose](), 0
     if along is not None:
@@ -93,15 +93,13 @@ def special_poses(
         special, more = _distinct(motion, _at_events(motion.question, along, events[:COMPARED])), len(events[COMPARED:])
     valid = np.flatnonzero(kept.configuration.valid)
     some, left_out = valid[:MOST], max(len(valid), len(special)) - MOST
-    if poses.motion:
+    if poses.followed:
         some, left_out = _spread(motion, kept, [pose.row for pose in special]), len(special) + more - MOST
-    configuration = kept.configuration.take(some)
     words = [
         (float(poses.numbers[k]), float(poses.abscissa[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
         for k in kept.rows[some].tolist()
     ]
-    solved = replace(kept.solved, rows=kept.rows[some], configuration=configuration)
-    special += _moving(motion.question, solved, words)
+    special += _moving(motion.question, kept.take(some).solved, words)
     special.sort(key=lambda pose: pose.row)
     return SpecialPoses(special[:MOST], max(left_out, 0), rates)
 
@@ -177,8 +175,7 @@ def _at_events(question: KinematicQuestion, along: KinematicAlong, events: Seque
         # Of a pose at a limit the words have the limit.
         where = at.in_words(k, DIGITS)
         words = [(events[k].place, float(shown[k]), where, "; ".join(events[k].words))]
-        one = replace(there, rows=np.array([k]), configuration=there.configuration.take(np.array([k])))
-        special += _moving(question, one, words)
+        special += _moving(question, there.take(np.array([k])), words)
     return special
 
 

@@ -158,10 +158,9 @@ def _goals(
 def _tables(target: Target, poses: Poses) -> Floats:
     """The target's table for each design, shape (designs, rows, columns); one where it follows no parameter."""
     assert target.table is not None
-    if not target.rows or not poses.parameters:
+    if not target.rows or not poses.own.parameters:
         return target.table[None]
-    first = np.arange(poses.designs) * (poses.count // poses.designs)
-    tables = table_of(target.rows, lambda number: np.broadcast_to(poses.of(number, first), poses.designs))
+    tables = table_of(target.rows, poses.own.of)
     order = np.argsort(tables[:, :, 0], axis=1, kind="stable")
     return np.take_along_axis(tables, order[..., None], axis=1) if target.timed else tables
 

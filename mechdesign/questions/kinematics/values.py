@@ -93,7 +93,7 @@ def _of_jacobian(
         return {}
     listed, drives, arrays = question.listed, question.drives, dict[str, Value]()
     length = characteristic_length(question.study)
-    arc = solved.poses.of(np.nan if length is None else length, solved.rows) if mixes(listed, drives) else None
+    arc = solved.poses.of(np.nan if length is None else length) if mixes(listed, drives) else None
     jacobian = Jacobian.of(linear, listed, arc)
     for output, line in zip(listed, jacobian.entries, strict=True):
         arrays |= {entry(output, drive): value for drive, value in zip(drives, line, strict=True)}
@@ -107,11 +107,11 @@ def statics(
     question: KinematicQuestion, linear: Linearization, solved: SolvedPoses, moving: Moving
 ) -> dict[str, Value]:  # fmt: skip
     """Efforts of the drives that balance the loads, mechanical advantages, and what cams have, by their columns."""
-    section = solved.poses.section(question.section, solved.rows)
+    section = solved.poses.section(question.section)
     columns: dict[str, Value] = {}
     if section.loads:
         forces = Forces(linear.configuration)
-        Loading(question.study, section.loads, solved.poses, solved.rows).add(forces, moving)
+        Loading(question.study, section.loads, solved.poses).add(forces, moving)
         if question.friction is None:
             efforts = balance(linear, forces).efforts
         else:

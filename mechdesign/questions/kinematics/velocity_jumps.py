@@ -28,8 +28,8 @@ def velocity_jumps(question: MovedQuestion, bodies: Collection[str], design: int
         return np.empty(0)
     own = curve.pieces.line == design
     ends = curve.pieces.end[own] if curve.corners else np.empty(0)
-    timed = question.section.speed is not None or poses.program is not None
-    places = distinct(np.concatenate([ends, poses.corners if timed else ends]))
+    timed = question.section.speed is not None or poses.rule.timed
+    places = distinct(np.concatenate([ends, poses.rule.corners if timed else ends]))
     places = places[(places > 0) & (places < poses.end)]
     sides = np.concatenate([places - BESIDE, places + BESIDE])
     there = curve.solve(np.full(len(sides), design), sides, judged=False)
@@ -50,7 +50,7 @@ def jumps_in_words(question: MovedQuestion, places: Floats, table: str, design: 
     poses, line = question.poses, np.array([design])
     first = question.motion.at(poses.along(line, places[:1])).in_words(0)
     row = int(places[0]) + design * poses.line if places[0] % 1 == 0 else None
-    if poses.program is None and np.isin(places, poses.corners).all():
+    if not poses.rule.timed and np.isin(places, poses.rule.corners).all():
         text = (
             f"the path has corners at {counted(len(places), 'pose')}, the first: {first}; velocities there are those "
             "of the segment that begins, and the acceleration that a corner takes is in no row; 'spline: true' has no "

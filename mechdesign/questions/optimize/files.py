@@ -12,7 +12,7 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.motion.rows import PoseGroup, Poses
+from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.motion.solving import solve_poses
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import in_words, parted
@@ -74,11 +74,10 @@ def _parted(study: Study, designs: DesignSet) -> Iterator[str]:
     poses = study_poses(study, "kinematics")
     if not poses.listed or len(poses.groups) > 1 or len(poses.names) > 1 or poses.count < 2:
         return
-    (name,), listed = poses.names, poses.groups[0].values[poses.names[0]]
+    (name,), listed = poses.names, poses.named[poses.names[0]]
     values = np.linspace(listed[:-1], listed[1:], BETWEEN + 2, axis=1)[:, 1:-1].ravel()
-    group = PoseGroup((name,), {name: values}, np.arange(len(values)))
     failed = np.zeros(len(values), dtype=bool)
-    for solved in solve_poses(study.motion(Poses((group,), len(values), False, (len(values),)))):
+    for solved in solve_poses(study.motion(Poses(GivenRows.single({name: values})))):
         failed[solved.rows] = ~solved.configuration.valid
     missed = np.flatnonzero(failed.reshape(-1, BETWEEN).any(axis=1)).tolist()
     unit = study.units.label(study.mechanism.quantity(name))

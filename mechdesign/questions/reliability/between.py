@@ -5,8 +5,6 @@ All methods judge the poses alone, and a cycle is one made mechanism at all of t
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mechdesign.cautions import Caution
@@ -43,7 +41,7 @@ def places_between(study: Study, question: ReliabilityQuestion, poses: Poses) ->
     nodes = _smooth(study, question, poses).pieces.nodes.ravel()
     s = np.arange(0.0, poses.end + 0.5 / parts, 1.0 / parts)
     s = np.unique(np.concatenate([s[np.round(s) != s], nodes[evenly(len(nodes), _MOST_PLACES)]]))
-    return replace(poses.along(np.zeros(len(s), dtype=np.intp), s), motion=True)
+    return poses.along(np.zeros(len(s), dtype=np.intp), s)
 
 
 def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:

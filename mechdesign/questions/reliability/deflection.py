@@ -18,7 +18,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel, CoordinateChannel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
@@ -151,7 +151,7 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
-    stiffness, poses = study.stiffness, Poses.single({}) if poses is None else poses
+    stiffness, poses = study.stiffness, poses or NOWHERE
     if stiffness is None:
         return None, []
     section = poses.section(ReliabilitySection.of(study))
@@ -173,7 +173,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, single)))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
-    question, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
+    question, mechanism = ask(study).at(poses), study.mechanism
     network, graph, links = question.network, mechanism.graph, mechanism.description.links
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()

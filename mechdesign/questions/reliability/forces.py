@@ -20,7 +20,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import PoseNumbers, Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import column_kinds
@@ -92,7 +92,7 @@ def load_bends(study: Study) -> list[Bend]:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceModel:
+class ForceModel(PoseNumbers):
     """The forces of a mechanism in motion, of designs or made mechanisms with `parameters` of their own.
 
     Those that are `changed` themselves follow nothing. `times` are those of poses over time.
@@ -102,6 +102,10 @@ class ForceModel:
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     changed: frozenset[str] = frozenset()
     times: Floats | None = None
+
+    @property
+    def nominal(self) -> Mapping[str, float]:
+        return self.question.study.parameters.nominal
 
     @property
     def coordinates(self) -> list[Coordinate]:
@@ -118,7 +122,7 @@ class ForceModel:
         """The model of made mechanisms, from deviations of parameters by their `FOLLOWED` names."""
         if not deviations:
             return self
-        nominal, parameters = self.question.study.parameters.nominal, self.question.study.parameters
+        nominal, parameters = self.nominal, self.question.study.parameters
         changed: dict[str, Number] = {name: self.parameters[name] for name in self.changed if name in self.parameters}
         for key, deviation in deviations.items():
             name = key.removeprefix(FOLLOWED)
@@ -133,11 +137,9 @@ class ForceModel:
         if self.question.moves:
             velocity = linear.velocity(rates.velocities)
             moving = Moving(velocity, linear.acceleration(velocity, rates.accelerations))
-        nominal = self.question.study.parameters.nominal
-        poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
-        columns = dict(self.question.lean(names).columns(poses, linear, slice(None), moving))
-        loading, acting = Loading(self.question.study, (), poses, slice(None)), Forces(linear.configuration)
+        columns = dict(self.question.lean(names).columns(self, linear, moving))
+        loading, acting = Loading(self.question.study, (), self), Forces(linear.configuration)
         for name, argument in self.arguments.items():
             if name in names:
                 columns[name] = loading.value(argument, acting, moving)
@@ -170,9 +172,9 @@ class ForceModel:
 
     def _scale(self, mechanism: Mechanism, name: str) -> float:
         """What a number is measured by: a radian, the size of the mechanism, or the largest number of its kind."""
-        places, nominal = mechanism.description.places, self.question.study.parameters.nominal
+        places = mechanism.description.places
         if name.startswith(FOLLOWED):
-            return abs(nominal[name.removeprefix(FOLLOWED)]) or 1.0
+            return abs(self.nominal[name.removeprefix(FOLLOWED)]) or 1.0
         if name in mechanism.drives:
             kind: str = mechanism.quantity(name)
         else:
@@ -191,7 +193,7 @@ def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
     question = ForceQuestion.of(study, moves=pace(study).rated)
     if poses is None:
         return ForceModel(question)
-    return ForceModel(question, poses.parameters, poses.changed, poses.times)
+    return ForceModel(question, poses.parameters, poses.own.changed, poses.times)
 
 
 def _one_of(names: Sequence[str], name: str) -> Floats:

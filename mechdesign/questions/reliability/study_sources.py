@@ -15,7 +15,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.couplings import MEASURED, play
 from mechdesign.mechanism.elements.joints import AnyJoint, Prismatic
 from mechdesign.mechanism.geometry import offset_names, slide_offset
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw, fit_law
@@ -48,7 +48,7 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
         message = "asks what varies: give 'dimensions' or 'clearances'"
         raise StudyError((study.problem(message, "reliability"),))
     mechanism: Mechanism = study.mechanism
-    poses = Poses.single({}) if poses is None else poses
+    poses = poses or NOWHERE
     section = poses.section(section)
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
     scalars = []
@@ -60,7 +60,7 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
         nominal = sizes.get(name, 0.0)
         if name in study.parameters.nominal:
             kind = "parameter"
-            slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.changed))
+            slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.own.changed))
             slopes |= {f"{FOLLOWED}{name}": 1.0} if name in counting else {}
             moved = [place for place, slope in slopes.items() if np.any(slope)]
             dimensions = [place for place in moved if not place.startswith((MEASURED, FOLLOWED))]

@@ -154,7 +154,7 @@ class Stiffness(MotionQuestion[Between]):
 
     def values(self, part: SolvedPoses) -> Mapping[str, Any]:
         """How the body is held, its springs, and the effects of the study's loads."""
-        body, configuration = self.body.at(part.poses, part.rows), part.configuration
+        body, configuration = self.body.at(part.poses), part.configuration
         if not self.loaded:
             held, springs = hold(body, configuration)
             return {**vars(held), "springs": list(springs)}
@@ -205,7 +205,7 @@ class Stiffness(MotionQuestion[Between]):
     def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
         """Tables of some names, as far as the study asks for them, with the rows of all designs."""
         motion, held, springs = self.motion, _read(Held, values), _springs(values)
-        body = self.body.at(motion.poses, np.arange(motion.poses.count))
+        body = self.body.at(motion.poses)
         soft, section, legs = held.compliance, body.section, body.legs
         effects = _read(Effects, values) if self.loaded else None
         count, method = len(section.wrenches), "serial legs" if legs is not None else "force method"
@@ -261,11 +261,11 @@ class Stiffness(MotionQuestion[Between]):
             self._drawn_pose(values, int(where.argmax())) if where.any() else None
             for where in (values.valid, np.isfinite(values.arrays["free"][:, 0]))
         )
-        return DrawnStiffness(shown_of(self.body.study, passage.shown), first, loose)
+        return DrawnStiffness(shown_of(self.body.study, passage), first, loose)
 
     def _drawn_pose(self, values: PoseValues, row: int) -> DrawnPose:
         """A pose with its springs, and with the twists that the loads make."""
-        body, configuration = self.body.at(self.poses, np.array([row])), solve_rows(self.motion, np.array([row]))
+        body, configuration = self.body.at(self.poses.take(np.array([row]))), solve_rows(self.motion, np.array([row]))
         parts = under_loads(body, configuration)[1] if body.given.wrenches else []
         twists = {
             vertex: np.concatenate([(part.displacements[vertex] @ applied)[0] for part, applied in parts], axis=1)

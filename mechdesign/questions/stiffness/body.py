@@ -52,8 +52,8 @@ class Body:
         forces at the pin.
     extent : float
         Size of the mechanism.
-    poses, rows : optional
-        All poses, and the rows of those in which the body is, where designs differ in numbers of the section.
+    poses : Poses, optional
+        Those in which the body is, where designs may differ in numbers of the section.
     """
 
     study: Study
@@ -64,22 +64,19 @@ class Body:
     condensed: bool
     extent: float
     poses: Poses | None = None
-    rows: Ints | None = None
 
-    def at(self, poses: Poses, rows: Ints) -> Body:
-        """The body in some of the poses."""
-        return replace(self, poses=poses, rows=rows)
+    def at(self, poses: Poses) -> Body:
+        """The body in some poses."""
+        return replace(self, poses=poses)
 
     def take(self, index: Ints) -> Body:
         """The body in the poses `index` of its own."""
-        return self if self.rows is None else replace(self, rows=self.rows[index])
+        return self if self.poses is None else self.at(self.poses.take(index))
 
     @cached_property
     def section(self) -> StiffnessSection:
         """The section with the numbers of the poses: arrays where designs differ in them."""
-        if self.poses is None or self.rows is None:
-            return self.given
-        return self.poses.section(self.given, self.rows)
+        return self.given if self.poses is None else self.poses.section(self.given)
 
     @property
     def loads(self) -> Floats:
@@ -213,19 +210,17 @@ def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[com
 @quiet
 def _applied(body: Body, configuration: Configuration) -> Applied:
     """The loads that do not act on the asked point alone."""
-    study, poses, rows = body.study, body.poses, body.rows
+    study, poses = body.study, body.poses
     assert poses is not None
-    assert rows is not None
     applied = Applied(body.network, configuration, len(body.others))
     for case, k in enumerate(body.others):
         if k == len(body.given.loads):
             rated = pace(study)
-            names = next(group.names for group in poses.groups if rows[0] in group.rows)
-            solved = SolvedPoses(study.motion(poses), rows, names, configuration)
+            solved = SolvedPoses(study.motion(poses), np.arange(poses.count), configuration)
             moving = moving_at(rated, solved, study.mechanism.linearize(configuration))
-            ForceQuestion.of(study, moves=rated.rated).apply(applied, case, poses, rows, moving)
+            ForceQuestion.of(study, moves=rated.rated).apply(applied, case, poses, moving)
         else:
             forces = Forces(configuration)
-            Loading(study, body.section.loads[k : k + 1], poses, rows).add(forces, Moving())
+            Loading(study, body.section.loads[k : k + 1], poses).add(forces, Moving())
             applied.add(case, forces)
     return applied

@@ -18,7 +18,7 @@ from mechdesign.motion.curve import Curve
 from mechdesign.motion.ends import Ends
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.workspace.columns import PATH, PATH_INDICES
 from mechdesign.questions.workspace.schema import WorkspaceSection
@@ -68,7 +68,7 @@ _SPEED = "speed"
 def _curve(study: Study, drive: str, low: float, high: float) -> Curve:
     """The motion of a drive between two values; the whole path is wanted, however many turns its limits leave it."""
     ends = np.array([low, high]) / (study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 1.0)
-    return curve_of(study.motion(Poses.single({drive: ends})), turning=False)
+    return curve_of(study.motion(Poses(GivenRows.single({drive: ends}))), turning=False)
 
 
 def point_path(study: Study) -> Result:

@@ -50,7 +50,7 @@ def _runs_over(result: Result) -> str:
     from mechdesign.questions.kinematics.drawn import DrawnMotion
 
     poses = DrawnMotion.of(result).shown.poses
-    return ", ".join(sorted(poses.values)) if poses.motion else ""
+    return ", ".join(sorted(poses.values)) if poses.followed else ""
 
 
 def _names(study: Study, before: Study) -> tuple[str, str]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.motion.rows import TIME, Poses, Sector, Sectors, with_length
+from mechdesign.motion.rows import TIME, Path, Poses, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Contours, Panel, Picture
@@ -65,8 +65,8 @@ def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
 
 def times(poses: Poses, rows: Floats, speed: float) -> Floats:
     """When a point that passes its path at a speed is at places of it, in rows; in the study's units."""
-    ((_, path),) = with_length(poses.paths)
-    return path.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
+    assert isinstance(poses.rule, Path)
+    return poses.rule.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
 
 
 def moving_names(poses: Poses) -> list[str]:
@@ -118,18 +118,18 @@ class Plane:
 
 def plane(study: Study, poses: Poses) -> Plane | None:
     """The plane of a grid over two coordinates, or of a workspace; None for every other choice of poses."""
-    names = poses.names[:2] if poses.regions else tuple(moving_names(poses))
+    names = poses.names[:2] if poses.rule.regions else tuple(moving_names(poses))
     if poses.listed or len(poses.grid) != 2 or len(names) != 2 or min(poses.grid) < 3:
         return None
     values = poses.values
     x, y = (values[name].reshape(poses.grid) for name in names)
-    maps = [("", region) for region in poses.regions]
+    maps = [("", region) for region in poses.rule.regions]
     if len(maps) > 1:
-        rows = [region.patches[0].rays.start * poses.grid[1] for region in poses.regions]
+        rows = [region.patches[0].rays.start * poses.grid[1] for region in poses.rule.regions]
         units = {name: study.units.label(study.mechanism.quantity(name)) for name in poses.names[2:]}
         words = [", ".join(f"{name} = {values[name][row]:g} {unit}".rstrip() for name, unit in units.items())
                  for row in rows]  # fmt: skip
-        maps = list(zip(words, poses.regions, strict=True))
+        maps = list(zip(words, poses.rule.regions, strict=True))
     whole = Sectors((Sector(slice(0, len(x)), 0j, x + 1j * y),), ())
     quantities = {study.mechanism.quantity(name) for name in names}
     return Plane((names[0], names[1]), x, y, quantities == {"length"}, tuple(maps) or (("", whole),))

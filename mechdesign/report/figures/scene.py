@@ -276,7 +276,7 @@ class Sweep(Shown):
     def traces(self) -> dict[str, Complexes]:
         """Path of every moving point as a curve: solved between the poses, too, where these are few."""
         count = len(self.rows)
-        if count < 2 or count >= _FEW_POSES or not self.poses.motion or self.poses.places:
+        if count < 2 or count >= _FEW_POSES or not self.poses.followed or self.poses.places:
             # A closed path is listed without its begin at its end.
             return {
                 name: np.append(path, path[:1]) if self.poses.closed else path for name, path in self.places.items()

@@ -142,7 +142,7 @@ def _solved(drawn: DrawnPoses, along: KinematicAlong, places: Floats) -> tuple[S
     """Poses at places of a motion, and the motion there, without errors of targets."""
     question = along.question
     there = along.curve.solve(np.zeros(len(places), dtype=np.intp), places)
-    own = question.at(replace(there.poses, motion=True, paths=question.poses.paths, rows=places))
+    own = question.at(there.poses)
     motion = PoseValues(own, there.configuration.reason)
     motion.put(there.rows, full(own.moved(there)[0], there.rows.shape))
     return Shown(drawn.shown.study, own.poses, there.rows, there.configuration), motion

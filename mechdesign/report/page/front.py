@@ -153,7 +153,7 @@ def _left_out(rows: Ints, error: MechdesignError) -> None:
 
 def _moved(study: Study, poses: Poses) -> list[Sweep]:
     """Designs of one mechanism in their poses; along a motion these are near enough to draw its paths."""
-    if not poses.motion:
+    if not poses.followed:
         return []
     curve = curve_of(study.motion(poses))
     places = evenly(poses.line, MAX_POSES).astype(float)
@@ -165,7 +165,7 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     sweeps = []
     for k in range(curve.lines):
         own = configuration.take(np.arange(k * len(places), (k + 1) * len(places)))
-        there = replace(poses.along(np.full(len(places), k), places), motion=True, paths=poses.paths, rows=places)
+        there = poses.along(np.full(len(places), k), places)
         sweeps.append(Sweep(study, there, np.arange(len(places)), own))
     return sweeps
 
@@ -179,8 +179,7 @@ def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[di
                for name, values in poses.values.items()]  # fmt: skip
     numbers = ShownNumbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), alike)
     fields = [[column.name, numbers.cell(column).unit, numbers.add(column)] for column in columns]
-    assert poses.rows is not None
-    share = (poses.rows - poses.rows[0]) / (poses.rows[-1] - poses.rows[0])
+    share = (poses.numbers - poses.numbers[0]) / (poses.numbers[-1] - poses.numbers[0])
     return {
         "drawing": "".join(tostring(part, encoding="unicode") for part in layer), "poses": len(sweep.rows),
         "first": int(sweep.valid[0]), "returns": sweep.returns, "gaps": gaps(sweep), "given": fields,

@@ -90,7 +90,7 @@ def moving(
             return None
         study, result = best.study, judged
     with style.context():
-        if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.motion:
+        if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
             return _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
         return roaming(study, result, command) if "local" in result.tables else None
 

@@ -40,7 +40,7 @@ def animation(shown: Shown) -> bytes:
     that a frame stores only what changed: a tenth of the time and the bytes of `matplotlib.animation.PillowWriter`.
     """
     sweep = Sweep.of(shown)
-    if not sweep.poses.motion or not len(sweep.valid):
+    if not sweep.poses.followed or not len(sweep.valid):
         return b""
     timed = sweep.poses.times is not None
     some, pause = _in_time(sweep) if timed else _in_steps(sweep)

@@ -47,7 +47,7 @@ class Centrodes(NamedTuple):
 def centrodes_figure(view: MotionView) -> Figure | None:
     """A panel for each pair of links whose instant centre is asked for; None where each stays at a pin."""
     sweep, table = view.sweep, view.result.tables.get("instant_centres")
-    if table is None or not sweep.poses.motion or not len(sweep.valid):
+    if table is None or not sweep.poses.followed or not len(sweep.valid):
         return None
     pairs = centrodes(sweep, table)[:MOST_PAIRS]
     if not pairs:

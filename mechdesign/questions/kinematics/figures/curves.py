@@ -83,7 +83,7 @@ class _Group(NamedTuple):
 def motion_picture(view: MotionView) -> Picture | None:
     """Every output of a motion."""
     poses = view.sweep.poses
-    return motion_curves(view.study, view.result.tables, poses, view.before) if poses.motion else None
+    return motion_curves(view.study, view.result.tables, poses, view.before) if poses.followed else None
 
 
 def motion_curves(

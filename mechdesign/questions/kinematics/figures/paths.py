@@ -68,7 +68,7 @@ _SMALL_SYMBOLS = 0.6
 @picture(MotionView, "paths", order=10)
 def motion_paths_figure(view: MotionView) -> Figure | None:
     """The paths of a motion; None where no pose is valid."""
-    if not view.sweep.poses.motion or not len(view.sweep.valid):
+    if not view.sweep.poses.followed or not len(view.sweep.valid):
         return None
     tables = view.result.tables
     kinds = _kinds(view.study, tables["loops"]) if "loops" in tables else []
@@ -145,7 +145,7 @@ def steps_of(sweep: Sweep) -> Steps | None:
     """Steps of a sweep of one coordinate, with their time where it has a constant rate; None of other motions."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
-    if section is None or not poses.motion or len(moving) != 1:
+    if section is None or not poses.followed or len(moving) != 1:
         return None
     (name,) = moving
     values = poses.values[name][sweep.rows]

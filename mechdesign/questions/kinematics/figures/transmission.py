@@ -52,7 +52,7 @@ def transmission_picture(view: MotionView) -> Picture | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
     study, tables, sweep = view.study, view.result.tables, view.sweep
     section = study.kinematics
-    if not sweep.poses.motion or not moving_names(sweep.poses):
+    if not sweep.poses.followed or not moving_names(sweep.poses):
         return None
     over = abscissa(study, sweep.poses, section.speed if section is not None else None)
     every = transmissions(study, tables.get("loops"), sweep, over)

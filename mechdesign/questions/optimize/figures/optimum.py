@@ -92,7 +92,7 @@ def design_figure(study: Study, motion: Result, words: str) -> Figure:
     shown = reached(table)
     title = style.folded(words, 11.0, style.width() - LEFT)
     above = _TITLE + _TITLE_LINE * title.count("\n")
-    if sweep.poses.motion:
+    if sweep.poses.followed:
         figure = paths_figure(sweep, above=above)
     else:
         worst = _worst(shown, sweep.valid)
@@ -130,7 +130,7 @@ def designs_picture(parts: Sequence[tuple[str, Shown, Result | None]]) -> Pictur
 
 def _draw_design(sweep: Sweep, axes: Axes) -> None:
     """A design in its first valid pose, and the paths of its points."""
-    if sweep.poses.motion:
+    if sweep.poses.followed:
         draw_paths(axes, sweep, width=0.8)
     draw_mechanism(
         axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
