@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
+from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
@@ -24,65 +25,66 @@ from mechdesign.questions.reliability.schema.section import ReliabilitySection, 
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 from mechdesign.study.text import fields
-from mechdesign.study.text.units import Units
 
 # Orders of channels, as tables name them.
 OF_DYNAMICS = "dynamics"
-ORDERS = ("position", "velocity", "acceleration")
+ORDERS = ("position", "velocity", "acceleration", OF_DYNAMICS)
 
 
 @dataclass(frozen=True)
-class CoordinateChannel:
-    """One quantity whose error is computed: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+class Channel:
+    """A quantity whose error is computed: a coordinate, its velocity or acceleration, or a column of dynamics.
 
-    coordinate: Coordinate
+    Parameters
+    ----------
+    order : int
+        Place in `ORDERS`.
+    kind : str
+        Kind of quantity of its unit in tables.
+    coordinate : Coordinate, optional
+        None of a column of dynamics, which is in the study's units.
+    vector : tuple of Channel
+        Components, one or two, of the vector whose length it is.
+    bends : tuple of Bend
+        Where it is not smooth, its arguments as channels; a length's are those of its vector.
+    """
+
+    output: str
     order: int
+    kind: str
+    coordinate: Coordinate | None = None
+    vector: tuple[Channel, ...] = ()
+    bends: tuple[Bend, ...] = ()
+
+    @classmethod
+    def of(cls, argument: Coordinate | Expression, order: int = 0, *, alone: bool = False) -> Channel:
+        """That of a coordinate, or of an expression that loads follow; `alone` without its vector and bends."""
+        if isinstance(argument, Expression):
+            return cls(argument_name(argument), ORDERS.index(OF_DYNAMICS), "none")
+        kind = QUANTITIES.get(argument.quantity, ("none",) * 3)[order]
+        if alone:
+            return cls(argument.name, order, kind, argument)
+        vector = vector_of(argument) if order == 0 else ()
+        own = _judged(dict.fromkeys(bend for part in vector or [argument] for bend in bends(part)))
+        return cls(argument.name, order, kind, argument, tuple(Channel.of(part, alone=True) for part in vector), own)
 
     @property
     def name(self) -> str:
         """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
-        return self.coordinate.name + SUFFIXES[self.order]
-
-    @property
-    def words(self) -> tuple[str, str]:
-        """Output and order, as tables name them."""
-        return self.coordinate.name, ORDERS[self.order]
+        return self.output + (*SUFFIXES, "")[self.order]
 
     @property
     def turns(self) -> bool:
         """Whether it is computed in radians."""
-        return self.coordinate.quantity == "angle"
-
-    def unit(self, units: Units) -> str:
-        """Its unit in tables."""
-        return units.label(QUANTITIES.get(self.coordinate.quantity, ("none",) * 3)[self.order])
+        return self.coordinate is not None and self.coordinate.quantity == "angle"
 
 
-@dataclass(frozen=True)
-class ForceChannel:
-    """A column of dynamics whose error is computed: an effort, a joint's force, an energy ..., in the study's units."""
-
-    name: str
-    kind: str
-    vector: tuple[str, ...] = ()  # columns of the components of a force whose size it is
-    bends: tuple[Bend, ...] = ()  # where the loads that it follows are not smooth
-
-    @property
-    def words(self) -> tuple[str, str]:
-        """Output and order, as tables name them."""
-        return self.name, OF_DYNAMICS
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is computed in radians."""
-        return False
-
-    def unit(self, units: Units) -> str:
-        """Its unit in tables."""
-        return units.label(self.kind)
-
-
-Channel = CoordinateChannel | ForceChannel
+def _judged(found: Iterable[Bend]) -> tuple[Bend, ...]:
+    """Bends with channels as their arguments."""
+    return tuple(
+        replace(bend, arguments=tuple(Channel.of(argument, alone=True) for argument in bend.arguments))
+        for bend in found
+    )
 
 
 @dataclass(frozen=True)
@@ -126,61 +128,34 @@ class ReliabilityQuestion:
     @property
     def coordinates(self) -> list[Coordinate]:
         """Coordinates of its channels."""
-        return [channel.coordinate for channel in self.channels if isinstance(channel, CoordinateChannel)]
+        return [channel.coordinate for channel in self.channels if channel.coordinate is not None]
 
     @property
     def columns(self) -> list[str]:
         """Columns of dynamics among its channels, which are the last of them."""
-        return [channel.name for channel in self.channels if isinstance(channel, ForceChannel)]
+        return columns_among(self.channels)
 
     @property
     def moving(self) -> bool:
         """Whether velocities count."""
-        return any(isinstance(channel, ForceChannel) or channel.order > 0 for channel in self.channels)
-
-    @cached_property
-    def _vectors(self) -> list[tuple[int, tuple[Channel, ...]]]:
-        """Channels that are the length of a vector, and its components."""
-        vectors: list[tuple[int, tuple[Channel, ...]]] = []
-        for k, channel in enumerate(self.channels):
-            if isinstance(channel, ForceChannel):
-                vectors.append((k, tuple(ForceChannel(name, channel.kind) for name in channel.vector)))
-            elif channel.order == 0:
-                vectors.append((k, tuple(CoordinateChannel(part, 0) for part in vector_of(channel.coordinate))))
-        return [(k, vector) for k, vector in vectors if vector]
-
-    @cached_property
-    def _bends(self) -> list[tuple[int, Bend]]:
-        """Channels with the places at which they are not smooth; a length's are those of its vector."""
-        vectors, places = dict(self._vectors), list[tuple[int, Bend]]()
-        for k, channel in enumerate(self.channels):
-            for part in vectors.get(k, (channel,)) if isinstance(channel, CoordinateChannel) else (channel,):
-                own = part.bends if isinstance(part, ForceChannel) else bends(part.coordinate)
-                places += [(k, bend) for bend in dict.fromkeys(own)]
-        return places
+        return any(channel.order > 0 for channel in self.channels)
 
     @cached_property
     def vectors(self) -> tuple[Channel, ...]:
         """The channels, and the components of those that are lengths."""
-        return (*self.channels, *(part for _, vector in self._vectors for part in vector))
+        return tuple(dict.fromkeys([*self.channels, *(part for channel in self.channels for part in channel.vector)]))
 
     @cached_property
     def whole(self) -> tuple[Channel, ...]:
         """The channels, the components of lengths, and the arguments by which corners are judged."""
-        arguments = (argument for _, bend in self._bends for argument in bend.arguments)
-        return (*self.vectors, *(
-            CoordinateChannel(argument, 0) if isinstance(argument, Coordinate)
-            else ForceChannel(argument_name(argument), "none") for argument in arguments
-        ))  # fmt: skip
+        arguments = [part for channel in self.channels for bend in channel.bends for part in bend.arguments]
+        return tuple(dict.fromkeys([*self.vectors, *arguments]))
 
     @cached_property
     def lengths(self) -> list[tuple[int, tuple[int, int]]]:
         """Channels that are lengths, with the places in `whole` of the components x and y; -1: always zero."""
-        place, lengths = len(self.channels), []
-        for k, vector in self._vectors:
-            lengths.append((k, (place, place + 1 if len(vector) > 1 else -1)))
-            place += len(vector)
-        return lengths
+        places = [(k, [*map(self.whole.index, channel.vector), -1]) for k, channel in enumerate(self.channels)]
+        return [(k, (pair[0], pair[1])) for k, pair in places if len(pair) > 1]
 
     @property
     def rows(self) -> list[int]:
@@ -188,13 +163,10 @@ class ReliabilityQuestion:
         return [*range(len(self.channels)), *(place for _, pair in self.lengths for place in pair)]
 
     @cached_property
-    def bends(self) -> list[tuple[int, range, Bend]]:
+    def bends(self) -> list[tuple[int, list[int], Bend]]:
         """Channels that are not smooth somewhere, the places in `whole` of the arguments, and where that is."""
-        place, judged = len(self.channels) + sum(len(vector) for _, vector in self._vectors), []
-        for k, bend in self._bends:
-            judged.append((k, range(place, place + len(bend.arguments)), bend))
-            place += len(bend.arguments)
-        return judged
+        return [(k, [*map(self.whole.index, bend.arguments)], bend)
+                for k, channel in enumerate(self.channels) for bend in channel.bends]  # fmt: skip
 
     @property
     def limited(self) -> bool:
@@ -222,12 +194,7 @@ class ReliabilityQuestion:
 
     def _about(self, band: Band, value: Any) -> Band:
         channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
-        if (
-            isinstance(channel, CoordinateChannel)
-            and channel.order == 0
-            and channel.turns
-            and np.isfinite(middle).all()
-        ):
+        if channel.order == 0 and channel.turns and np.isfinite(middle).all():
             value = value - TURN * np.round((value - middle) / TURN)
         return Band(band.output, band.low - value, band.high - value)
 
@@ -281,6 +248,11 @@ class ReliabilityQuestion:
         return np.stack(gradients)
 
 
+def columns_among(channels: Sequence[Channel]) -> list[str]:
+    """The columns of dynamics among channels."""
+    return [channel.name for channel in channels if channel.coordinate is None]
+
+
 def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
     """The limits at one pose or some, by an index of the arrays of poses."""
     return (
@@ -307,17 +279,18 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     outputs += expand_outputs(study, tuple(also))
     orders = 3 if section.rated else 1
     forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
-    channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
+    channels = [Channel.of(output, order) for order in range(orders) for output in outputs]
     joints = study.dynamics.joints(mechanism).names if forces and study.dynamics is not None else ()
     axes = {"shaking": ("shaking.x", "shaking.y")} | {name: (f"{name}.fx", f"{name}.fy") for name in joints}
-    bent = tuple(load_bends(study)) if forces else ()
-    channels += [
-        ForceChannel(name, kinds[name], axes.get(name, ()), () if name.endswith("_energy") else bent) for name in forces
-    ]
-    places = {channel.words: k for k, channel in enumerate(channels)}
+    bent = _judged(load_bends(study)) if forces else ()
+    last = ORDERS.index(OF_DYNAMICS)
+    for name in forces:
+        vector = tuple(Channel(part, last, kinds[name]) for part in axes.get(name, ()))
+        channels.append(Channel(name, last, kinds[name], None, vector, () if name.endswith("_energy") else bent))
+    places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
 
     def place(base: str, order: int) -> int:
-        return places[base, OF_DYNAMICS if base in kinds else ORDERS[order]]
+        return places[base, last if base in kinds else order]
 
     bands, discs = [], []
     for base, order, limit in limits:
@@ -360,8 +333,7 @@ def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Cautio
     warnings = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         plain = ("", study.mechanism.graph.node(point))
-        positions = [c for c in question.channels if isinstance(c, CoordinateChannel) and not c.order]
-        about = [c.name for c in positions if plain in c.coordinate.ends]
+        about = [c.name for c in question.channels if c.order == 0 and c.coordinate and plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
             warnings.append(Caution(
@@ -380,12 +352,10 @@ def _named(name: str, point: str) -> bool:
 def holders(study: Study, channel: Channel) -> str:
     """Names of the links whose points a channel uses, for points with a clearance or an elastic bearing."""
     graph = study.mechanism.graph
-    coordinates = [channel.coordinate] if isinstance(channel, CoordinateChannel) else []
     names = [
         link or " ".join(links)
         for point, links in links_meant(study.reliability, study.stiffness, graph).items()
-        for coordinate in coordinates
-        for link, node in coordinate.ends
+        for link, node in (channel.coordinate.ends if channel.coordinate is not None else ())
         if node == graph.node(point)
     ]
     return " ".join(dict.fromkeys(names))

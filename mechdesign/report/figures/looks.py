@@ -20,7 +20,7 @@ from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True)) | {OF_DYNAMICS: ""}
+SUFFIXES = dict(zip(ORDERS, (*ORDER_SUFFIXES, ""), strict=True))
 
 
 def look(name: str) -> Method:
