@@ -44,6 +44,7 @@ class Errors(PoseQuestion):
     doubts: Sequence[Caution]
 
     together = 2048
+    curve = None  # poses alone count: solving makes the motion between them where angles have turns
 
     @classmethod
     def of(cls, study: Study, poses: Poses) -> Self:

@@ -143,19 +143,19 @@ class ReliabilityQuestion:
     @cached_property
     def vectors(self) -> tuple[Channel, ...]:
         """The channels, and the components of those that are lengths."""
-        return tuple(dict.fromkeys([*self.channels, *(part for channel in self.channels for part in channel.vector)]))
+        return (*self.channels, *(part for channel in self.channels for part in channel.vector))
 
     @cached_property
     def whole(self) -> tuple[Channel, ...]:
         """The channels, the components of lengths, and the arguments by which corners are judged."""
-        arguments = [part for channel in self.channels for bend in channel.bends for part in bend.arguments]
-        return tuple(dict.fromkeys([*self.vectors, *arguments]))
+        return (*self.vectors, *(part for c in self.channels for bend in c.bends for part in bend.arguments))
 
     @cached_property
     def lengths(self) -> list[tuple[int, tuple[int, int]]]:
         """Channels that are lengths, with the places in `whole` of the components x and y; -1: always zero."""
-        places = [(k, [*map(self.whole.index, channel.vector), -1]) for k, channel in enumerate(self.channels)]
-        return [(k, (pair[0], pair[1])) for k, pair in places if len(pair) > 1]
+        places = iter(range(len(self.channels), len(self.vectors)))
+        return [(k, (next(places), next(places) if len(channel.vector) > 1 else -1))
+                for k, channel in enumerate(self.channels) if channel.vector]  # fmt: skip
 
     @property
     def rows(self) -> list[int]:
@@ -165,7 +165,8 @@ class ReliabilityQuestion:
     @cached_property
     def bends(self) -> list[tuple[int, list[int], Bend]]:
         """Channels that are not smooth somewhere, the places in `whole` of the arguments, and where that is."""
-        return [(k, [*map(self.whole.index, bend.arguments)], bend)
+        places = iter(range(len(self.vectors), len(self.whole)))
+        return [(k, [next(places) for _ in bend.arguments], bend)
                 for k, channel in enumerate(self.channels) for bend in channel.bends]  # fmt: skip
 
     @property
