@@ -12,8 +12,9 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.figures.view import ErrorsView
+from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
-from mechdesign.report.figures.looks import Sampled, heading, look
+from mechdesign.report.figures.looks import heading, look
 from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.shapes import lighter
@@ -37,18 +38,16 @@ Ends = tuple[float, float]
 @picture(ErrorsView, "density_contours", order=80)
 def density_picture(view: ErrorsView) -> Picture | None:
     """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
-    sampled = view.sampled("density")
-    if sampled is None:
+    samples = view.sampled("density")
+    if samples is None or samples.pair is None:
         return None
-    samples = sampled.samples
-    assert samples.pair is not None
     pair = list(samples.pair)
     errors, units, failed = samples.errors[pair], samples.units[pair], ~samples.kept
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
-    limits, alike = _Limits.of(sampled, ellipses[-1]), bool(units[0] == units[1])
+    limits, alike = _Limits.of(samples, ellipses[-1]), bool(units[0] == units[1])
     ends = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near])
     marks: list[PanelMark] = [Own(lambda axes: limits.draw(axes, *ends), label=limits.words)]
-    region, method = smoothed(errors), look(sampled.method).words
+    region, method = smoothed(errors), look(view.method).words
     if region is not None:
         colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
         levels = [*region.levels[::-1], 1.01 * region.density.max()]
@@ -76,7 +75,7 @@ def density_picture(view: ErrorsView) -> Picture | None:
     x, y = (Axis(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k], ends=end)
             for k, end in zip(pair, ends, strict=True))  # fmt: skip
     panel = Panel(marks, x, y, equal=alike, legend="beside")
-    return Picture(f"Two errors of made mechanisms {sampled.where}", [panel], (note,))
+    return Picture(f"Two errors of made mechanisms {view.where}", [panel], (note,))
 
 
 def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
@@ -136,8 +135,7 @@ class _Limits(NamedTuple):
     far: str
 
     @classmethod
-    def of(cls, sampled: Sampled, outermost: Floats) -> _Limits:
-        samples = sampled.samples
+    def of(cls, samples: Samples, outermost: Floats) -> _Limits:
         assert samples.pair is not None
         pair = samples.pair
         unit = samples.units[pair[0]]
