@@ -55,8 +55,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         samples=section.samples, most=section.samples if "samples" in section.model_fields_set else MAX_SAMPLES,
         precision=section.precision or task.precision, jobs=jobs, progress=progress,
     )  # fmt: skip
-    results: list[MethodResult] = []
-    interrupted = ""
+    results, stopped = list[MethodResult](), False
     indices: dict[int, SobolIndices] = {}
     allocated = Result("allocation", {})
     try:
@@ -64,42 +63,31 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
             results.append(with_cycle(methods.run(method, task), task, results))
         indices = sobol.indices(task, section)
         allocated = allocate(task, section)
-    except Partial as partial:
-        results.append(partial.result)
-        interrupted = "interrupted: "
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        results += [stop.result] if isinstance(stop, Partial) else []
         if not results:
             raise
-        interrupted = "interrupted: "
-    counts = {"poses": poses.count}
+        stopped = True
     done = [sums for result in results for sums in result.sums.values()]
-    if done:
-        counts["samples"] = sum(sums.samples for sums in done)
-        counts["invalid"] = sum(sums.samples - sums.valid for sums in done)
-        if counts["invalid"]:
-            words = f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
-            failures.append(Caution("unassembled", words))
-    cycles = [part.cycle.samples for part in results if part.cycle is not None and part.cycle.samples]
-    if cycles:
-        counts["cycles"] = cycles[0]
-    if interrupted:
-        interrupted += f"{counts.get('samples', 0)} samples, "
-        interrupted += f"{counts['cycles']} whole cycles, " if cycles else ""
-        interrupted += f"{', '.join(part.method for part in results)}"
-    built = [tables.moments(task, results)]
-    if task.question.limited:
-        built += [tables.success(task, results), tables.capability(task, results)]
-    built += [tables.contributions(task, indices)]
+    samples, invalid = sum(sums.samples for sums in done), sum(sums.samples - sums.valid for sums in done)
+    cycles = next((part.cycle.samples for part in results if part.cycle is not None and part.cycle.samples), 0)
+    counts = {"poses": poses.count} | ({"samples": samples, "invalid": invalid} if done else {})
+    counts |= {"cycles": cycles} if cycles else {}
+    if invalid:
+        words = f"{invalid} of {samples} samples cannot be assembled; they count as failures"
+        failures.append(Caution("unassembled", words))
+    named = f"{f'{cycles} whole cycles, ' * bool(cycles)}{', '.join(part.method for part in results)}"
     # Samples of the first method that samples the errors.
     sampled = next((part.sums for part in results if part.sums), {})
-    built += tables.of_drawn(task, sampled)
+    built = [*tables.judged(task, results, indices), *tables.of_drawn(task, sampled)]
     result = Result(
         "reliability", study.motion(poses).of_poses(built, task.reason) | dict(allocated.tables),
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
-        counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
+        counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files,
+        f"interrupted: {samples} samples, {named}" if stopped else "",
         tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,
     )  # fmt: skip
-    if interrupted:
+    if stopped:
         raise Interrupted(result)
     return result
 
@@ -121,14 +109,7 @@ def first_order_tables(
     results = [MethodResult(normal=(task.linear.whole.shift(), task.linear.whole.covariance()), method="analytic")]
     if "reliability" in names:
         results = [with_cycle(methods.run("analytic", task), task, ())]
-    built = [tables.moments(task, results)] if "moments" in names else []
-    if "reliability" in names and task.question.limited:
-        built.append(tables.success(task, results))
-    if "capability" in names and task.question.limited:
-        built.append(tables.capability(task, results))
-    if "contributions" in names:
-        built.append(tables.contributions(task, {}))
-    return {table.name: table for table in built}, task.reason, parts
+    return {table.name: table for table in tables.judged(task, results, {}, names)}, task.reason, parts
 
 
 def _settings(task: Task, errors: Errors, parts: Sequence[SolvedPoses]) -> list[Setting]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class FirstOrder:
         """Index of the source of each component, shape (components,)."""
         return np.repeat(np.arange(len(self.sources.all)), [len(source.directions) for source in self.sources.all])
 
-    def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
+    def take(self, poses: Sequence[int] | Ints) -> Self:
         """The model at these poses."""
         return replace(
             self, sources=self.sources.take(poses), components=self.components[:, :, poses],
@@ -176,29 +176,26 @@ def nominal_values(
     forces: ForceModel | None = None,
 ) -> list[Value]:
     """Values of the channels at solved configurations (radians, lengths, forces in the study's units)."""
-    orders = {channel.order for channel in channels if channel.coordinate is not None}
-    columns = columns_among(channels)
-    velocity = acceleration = None
+    linear, columns = mechanism.linearize(configuration), columns_among(channels)
     borne: Iterator[Value] = iter(())
-    if columns or orders - {0}:
-        linear = mechanism.linearize(configuration)
     if columns:
         assert forces is not None
         borne = iter(forces.values(columns, linear, rates))
-    if orders - {0}:
-        velocity = linear.velocity(rates.velocities)
-        acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
-    values = []
-    for channel in channels:
-        if channel.coordinate is None:
-            values.append(next(borne))
-        elif velocity is None or channel.order == 0:
-            values.append(configuration.value(channel.coordinate))
-        elif acceleration is None or channel.order == 1:
-            values.append(first(configuration, channel.coordinate, velocity))
-        else:
-            values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
-    return values
+    highest = max((channel.order for channel in channels if channel.coordinate is not None), default=0)
+    velocity = linear.velocity(rates.velocities) if highest else None
+    acceleration = linear.acceleration(velocity, rates.accelerations) if velocity and highest > 1 else None
+
+    def value(channel: Channel) -> Value:
+        coordinate = channel.coordinate
+        if coordinate is None:
+            return next(borne)
+        if velocity is None or channel.order == 0:
+            return configuration.value(coordinate)
+        if acceleration is None or channel.order == 1:
+            return first(configuration, coordinate, velocity)
+        return second(configuration, coordinate, velocity, velocity, acceleration)
+
+    return [value(channel) for channel in channels]
 
 
 def derivatives(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +65,18 @@ def _lost(results: Sequence[MethodResult], pose: Ints, method: Ints) -> Strings:
 
     pairs = {pair: words(pair[0], results[pair[1]]) for pair in {*zip(pose.tolist(), method.tolist(), strict=True)}}
     return np.array([pairs[pair] for pair in zip(pose.tolist(), method.tolist(), strict=True)], dtype=str)
+
+
+def judged(
+    task: Task,
+    results: Sequence[MethodResult],
+    indices: Mapping[int, SobolIndices],
+    names: Collection[str] | None = None,
+) -> Iterator[Table]:
+    """Tables of what the methods say, or some of them; of limits only where there are any."""
+    limits = {"reliability": success, "capability": capability} if task.question.limited else {}
+    makers = {"moments": moments, **limits, "contributions": lambda task, _: contributions(task, indices)}
+    return (make(task, results) for name, make in makers.items() if names is None or name in names)
 
 
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
