@@ -76,7 +76,7 @@ def graded(model: ToleranceModel, targets: Floats) -> Graded:
 
 def _programmed(choices: _Choices, finest: Ints, variances: list[Floats], most: Floats) -> tuple[Ints, float]:
     """The cheapest choice, shape (1, free), and a lower bound of the cost, by a mixed-integer programme."""
-    from scipy.optimize import LinearConstraint, milp
+    from scipy.optimize import Bounds, LinearConstraint, milp
 
     owner = np.repeat(np.arange(len(variances)), [part.shape[1] for part in variances])
     grade = np.concatenate([np.arange(part.shape[1]) for part in variances])
@@ -86,7 +86,7 @@ def _programmed(choices: _Choices, finest: Ints, variances: list[Floats], most: 
     bound = 0.0
     for _ in range(_MOST_PROGRAMMES):
         solution = milp(
-            costs * (_COSTS / costs.sum()), integrality=np.ones(len(costs)), bounds=(0, 1),
+            costs * (_COSTS / costs.sum()), integrality=np.ones(len(costs), dtype=np.int64), bounds=Bounds(0, 1),
             constraints=[LinearConstraint(single, 1, 1), LinearConstraint(rows, -np.inf, ends)],
             options={"mip_rel_gap": 0.0},
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -74,9 +75,12 @@ def judged(
     names: Collection[str] | None = None,
 ) -> Iterator[Table]:
     """Tables of what the methods say, or some of them; of limits only where there are any."""
-    limits = {"reliability": success, "capability": capability} if task.question.limited else {}
-    makers = {"moments": moments, **limits, "contributions": lambda task, _: contributions(task, indices)}
-    return (make(task, results) for name, make in makers.items() if names is None or name in names)
+    makers = {
+        "moments": partial(moments, task, results), "reliability": partial(success, task, results),
+        "capability": partial(capability, task, results), "contributions": partial(contributions, task, indices),
+    }  # fmt: skip
+    limits = () if task.question.limited else ("reliability", "capability")
+    return (make() for name, make in makers.items() if name not in limits and (names is None or name in names))
 
 
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:

@@ -49,7 +49,7 @@ def density_picture(view: ErrorsView) -> Picture | None:
     near = np.where(np.abs(outline) < _FAR_FROM_ERRORS * reach, outline, 0.0)
     ends, marks = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], near]), list[PanelMark]()
     if near.any():
-        marks.append(Own(lambda axes: axes.set_facecolor(_BEYOND) or axes.fill(*outline, color="white", zorder=0.4)))
+        marks.append(Own(partial(_tinted, outline)))
         edge = {"color": style.VERMILION, "linewidth": 1.8, "zorder": 2.6}
         marks.append(Trace(*outline, label=limits, look=edge))
     region, method = smoothed(errors), look(view.method).words
@@ -152,6 +152,12 @@ def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
     (left, right), (low, high) = sides
     outline = np.array([[left, right, right, left, left], [low, low, high, high, low]])
     return outline, "limits" * bool(limits), f"limits outside: {', '.join(far)}" if far else ""
+
+
+def _tinted(outline: Floats, axes: Axes) -> None:
+    """Tint what lies beyond the limits."""
+    axes.set_facecolor(_BEYOND)
+    axes.fill(*outline, color="white", zorder=0.4)
 
 
 def _ends(parts: Sequence[Floats]) -> tuple[Ends, Ends]:

@@ -31,7 +31,7 @@ class ErrorsView(PosesView):
     @property
     def method(self) -> str:
         """The first method that samples."""
-        return next(name for name in self.result.tables["moments"]["method"].tolist() if look(name).sampled)
+        return next(name for name in map(str, self.result.tables["moments"]["method"]) if look(name).sampled)
 
     @property
     def where(self) -> str:
