@@ -264,9 +264,8 @@ def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
-    mechanism = study.mechanism
-    kinds = kinds_of_forces(study)
-    limits = [(name, 0, limit) if name in kinds else (*_limited(mechanism, name), limit)
+    mechanism, kinds, last = study.mechanism, kinds_of_forces(study), ORDERS.index(OF_DYNAMICS)
+    limits = [(name, last, limit) if name in kinds else (*_limited(mechanism, name), limit)
               for name, limit in section.limits.items()]  # fmt: skip
     limited = [
         part
@@ -278,41 +277,30 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     listed = [output.name for output in outputs]
     also = dict.fromkeys(name for name in limited if name not in listed and name not in kinds)
     outputs += expand_outputs(study, tuple(also))
-    orders = 3 if section.rated else 1
+    channels = [Channel.of(output, order) for order in range(3 if section.rated else 1) for output in outputs]
     forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
-    channels = [Channel.of(output, order) for order in range(orders) for output in outputs]
     joints = study.dynamics.joints(mechanism).names if forces and study.dynamics is not None else ()
     axes = {"shaking": ("shaking.x", "shaking.y")} | {name: (f"{name}.fx", f"{name}.fy") for name in joints}
     bent = _judged(load_bends(study)) if forces else ()
-    last = ORDERS.index(OF_DYNAMICS)
     for name in forces:
         vector = tuple(Channel(part, last, kinds[name]) for part in axes.get(name, ()))
         channels.append(Channel(name, last, kinds[name], None, vector, () if name.endswith("_energy") else bent))
     places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
-
-    def place(base: str, order: int) -> int:
-        return places[base, last if base in kinds else order]
-
-    bands, discs = [], []
+    bands, discs = list[Band](), list[Disc]()
     for base, order, limit in limits:
         if limit.radius is not None:
-            discs.append(Disc(place(f"{base}.x", order), place(f"{base}.y", order), limit.radius))
-        else:
-            turns = channels[place(base, order)].turns
-            low, high = (
-                (value * study.units.angle_factor if turns else value) if value is not None else bound
-                for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
-            )
-            bands.append(Band(place(base, order), low, high, limit.absolute))
-    pair: tuple[int, int] | None = None
-    if len(bands) == 2 and not discs:
-        pair = (bands[0].output, bands[1].output)
-    elif len(discs) == 1 and not bands:
-        pair = (discs[0].x, discs[0].y)
-    elif not limited and len(outputs) + len(forces) == 2:
-        one, other = (place(name, 0) for name in [output.name for output in outputs] + forces)
-        pair = (one, other)
-    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), pair)
+            discs.append(Disc(places[f"{base}.x", order], places[f"{base}.y", order], limit.radius))
+            continue
+        output = places[base, order]
+        factor = study.units.angle_factor if channels[output].turns else 1.0
+        low, high = (bound if value is None else value * factor
+                     for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True))  # fmt: skip
+        bands.append(Band(output, low, high, limit.absolute))
+    pair = [band.output for band in bands] if not discs else [discs[0].x, discs[0].y] if not bands else []
+    if not limited:
+        pair = [k for k, channel in enumerate(channels) if channel.order in (0, last)]
+    alone = len(pair) == 2 and len(discs) < 2
+    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), (pair[0], pair[1]) if alone else None)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

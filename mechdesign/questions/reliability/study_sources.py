@@ -50,13 +50,11 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
     poses = Poses.single({}) if poses is None else poses
     section = poses.section(section)
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
-    scalars = []
-    slopes: dict[str, Number]
-    warnings: list[Caution] = []
-    together: list[str] = []
+    scalars, warnings, together = list[Scalar](), list[Caution](), list[str]()
     counting = followed(study)
     for name, dimension in section.dimensions.items():
-        nominal = sizes.get(name, 0.0)
+        kind = "load" if name in LOADS else "drive" if name in mechanism.drives else "place"
+        slopes: dict[str, Number] = {name: 1.0}
         if name in study.parameters.nominal:
             kind = "parameter"
             slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.changed))
@@ -64,19 +62,16 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
             moved = [place for place, slope in slopes.items() if np.any(slope)]
             dimensions = [place for place in moved if not place.startswith((MEASURED, FOLLOWED))]
             if not moved:
-                idle = f"parameter '{name}' changes no dimension of the mechanism"
-                warnings.append(Caution("ignored", idle))
+                warnings.append(Caution("ignored", f"parameter '{name}' changes no dimension of the mechanism"))
             elif len(dimensions) > 1:
                 together.append(f"'{name}' {', '.join(dimensions)}")
-        else:
-            kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
-            if kind == "place":
-                warnings += _twice(study, name, section.dimensions)
+        elif kind == "place":
+            warnings += _twice(study, name, section.dimensions)
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
-        turned = kind != "parameter" and moves[name][1] == "angle"
-        factor = study.units.angle_factor if turned else 1.0
+        factor = study.units.angle_factor if kind != "parameter" and moves[name][1] == "angle" else 1.0
         unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
-        scalars.append(Scalar(name, kind, _law(study, name, dimension, nominal, factor), moves, factor, unit))
+        law = _law(study, name, dimension, sizes.get(name, 0.0), factor)
+        scalars.append(Scalar(name, kind, law, moves, factor, unit))
     if together:
         parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
         words = f"{parameters} several dimensions together: {'; '.join(together)}"

@@ -106,16 +106,13 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
 
 def success(task: Task, results: Sequence[MethodResult]) -> Table:
     """Reliability of every pose by every method, and of the whole cycle."""
-    entries = []
-    length = task.poses.count // task.poses.designs
-    for design in range(task.poses.designs):
-        first = design * length
+    entries, length = [], task.poses.count // task.poses.designs
+    for design, first in enumerate(range(0, task.poses.count, length)):
         entries += [(pose, result, result.estimates.get(pose, _UNKNOWN), result.used.get(pose, result.method), False)
                     for pose in range(first, first + length) for result in results]  # fmt: skip
         cycles = [(result, result.cycles[design]) for result in results if result.cycles]
-        entries += [
-            (first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True) for result, cycle in cycles
-        ]
+        entries += [(first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True)
+                    for result, cycle in cycles]  # fmt: skip
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
     failure, low, high, error, samples, invalid, evaluations = (
