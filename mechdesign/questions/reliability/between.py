@@ -18,7 +18,7 @@ from mechdesign.questions.kinematics.corners import variables_of
 from mechdesign.questions.loads import coordinates_in, corners_in
 from mechdesign.questions.reliability.forces import pace
 from mechdesign.questions.reliability.methods.auto import FACTOR
-from mechdesign.questions.reliability.question import CoordinateChannel, ForceChannel, ReliabilityQuestion
+from mechdesign.questions.reliability.question import ReliabilityQuestion, columns_among
 from mechdesign.questions.reliability.task import Task
 from mechdesign.study import Study
 
@@ -47,9 +47,8 @@ def places_between(study: Study, question: ReliabilityQuestion, poses: Poses) ->
 def _smooth(study: Study, question: ReliabilityQuestion, poses: Poses) -> Curve:
     """The motion with pieces that end at the corners of the limited outputs and of loads."""
     channels = [question.channels[k] for k in question.limited_channels]
-    forced = any(isinstance(channel, ForceChannel) for channel in channels)
-    loads = study.dynamics.loads if forced and study.dynamics is not None else ()
-    coordinates = [channel.coordinate for channel in channels if isinstance(channel, CoordinateChannel)]
+    loads = study.dynamics.loads if columns_among(channels) and study.dynamics is not None else ()
+    coordinates = [channel.coordinate for channel in channels if channel.coordinate is not None]
     coordinates += coordinates_in(study, loads)
     curve = curve_with(study.motion(poses), coordinates)
     expressions = expressions_of(coordinates)

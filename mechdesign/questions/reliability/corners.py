@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from mechdesign.expressions import Expression
 from mechdesign.functions import Tabulated
@@ -18,7 +19,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 class Bend:
     """What is not smooth where all `arguments` have one of the levels at once; with a period (0: none)."""
 
-    arguments: tuple[Coordinate | Expression, ...]
+    arguments: tuple[Any, ...]  # coordinates, or expressions in the variables of loads
     levels: tuple[float, ...] = (0.0,)
     period: float = 0.0
 

@@ -90,17 +90,14 @@ def _simulated(result: MethodResult, task: Task) -> MethodResult:
 
 
 def _counted(settings: Sequence[Setting], sources: Sources, seed: int, samples: int, size: int, chunk: int) -> Ints:
-    return count_chunk(settings, sources, seed, chunk, min(size, samples - chunk * size))
-
-
-def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Ints:
-    """Draw `count` made mechanisms and move each through all poses, up to one at which it cannot be assembled.
+    """Draw the made mechanisms of a chunk and move each through all poses, up to one at which it cannot be assembled.
 
     Returns
     -------
     ndarray of int, shape (4,)
         Mechanisms that failed, those drawn, those that cannot be assembled at some pose, and poses solved.
     """
+    count = min(size, samples - chunk * size)
     drawn = sources.draw(generator(seed, chunk, 0, *_STREAM), count)
     within = np.ones(count, dtype=bool)
     evaluations = 0

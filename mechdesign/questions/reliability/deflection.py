@@ -20,7 +20,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.reliability.question import Channel, CoordinateChannel
+from mechdesign.questions.reliability.question import Channel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
@@ -89,7 +89,7 @@ class Elasticity:
 
     def knows(self, channel: Channel) -> bool:
         """Whether the stiffness model gives the deflection of a channel."""
-        return isinstance(channel, CoordinateChannel) and channel.order == 0 and self._knows(channel.coordinate)
+        return channel.order == 0 and channel.coordinate is not None and self._knows(channel.coordinate)
 
     def _knows(self, coordinate: Coordinate) -> bool:
         kind = coordinate.kind
@@ -109,7 +109,7 @@ class Elasticity:
         """
         flexibility = np.zeros((len(channels), 3, *configuration.shape))
         deflected = [(k, channel.coordinate) for k, channel in enumerate(channels)
-                     if isinstance(channel, CoordinateChannel) and self.knows(channel)]  # fmt: skip
+                     if channel.coordinate is not None and self.knows(channel)]  # fmt: skip
         assembled = np.flatnonzero(np.isfinite(configuration.point(self.question.given.at)))
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
@@ -198,7 +198,8 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
 
 def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
     """Warnings of channels whose deflection is not known, or whose name could mean two points or angles."""
-    positions = [c for c in channels if isinstance(c, CoordinateChannel) and c.order == 0]
+    positions = [(channel.name, channel.coordinate) for channel in channels
+                 if channel.order == 0 and channel.coordinate is not None]  # fmt: skip
     warnings = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]
     if lost:
@@ -209,7 +210,7 @@ def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> l
         ))  # fmt: skip
     graph, section = loaded.mechanism.graph, loaded.question.given
     for point, links in links_meant(study.reliability, section, graph).items():
-        about = [channel.name for channel in positions if ("", graph.node(point)) in channel.coordinate.ends]
+        about = [name for name, coordinate in positions if ("", graph.node(point)) in coordinate.ends]
         if about and len(links) > 1 and point in section.bearings and point != section.at:
             ends = " and ".join(f"{link}.{point}" for link in links)
             warnings.append(Caution(
@@ -218,8 +219,8 @@ def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> l
                 "of them where that is meant",
             ))  # fmt: skip
     for link in filter(section.elastic.__contains__, loaded.lines):
-        angles = [(channel.name, angles_of([channel.coordinate]).values()) for channel in positions]
-        about = [name for name, turns in angles if any(link in (turn.body, turn.reference) for turn in turns)]
+        about = [name for name, coordinate in positions
+                 if any(link in (turn.body, turn.reference) for turn in angles_of([coordinate]).values())]  # fmt: skip
         if about:
             ends = " to ".join(graph.nodes[node] for node in loaded.lines[link])
             words = f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}"

@@ -8,27 +8,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from mechdesign.expressions import Number
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.margins import closures
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import (
-    Band,
-    Channel,
-    CoordinateChannel,
-    Disc,
-    ForceChannel,
-    limits_at,
-)
+from mechdesign.questions.reliability.question import Band, Channel, Disc, columns_among, limits_at
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
 
@@ -49,18 +41,12 @@ class FirstOrder:
     components: Floats
     offset: Floats
 
-    @staticmethod
-    def unknown(sources: Sources, channels: int, poses: int) -> FirstOrder:
-        """A model with components of nan, to be filled in."""
-        count = sum(len(source.directions) for source in sources.all)
-        return FirstOrder(sources, np.full((channels, count, poses), np.nan), np.zeros((channels, poses)))
-
     @cached_property
     def owner(self) -> Ints:
         """Index of the source of each component, shape (components,)."""
         return np.repeat(np.arange(len(self.sources.all)), [len(source.directions) for source in self.sources.all])
 
-    def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
+    def take(self, poses: Sequence[int] | Ints) -> Self:
         """The model at these poses."""
         return replace(
             self, sources=self.sources.take(poses), components=self.components[:, :, poses],
@@ -190,29 +176,26 @@ def nominal_values(
     forces: ForceModel | None = None,
 ) -> list[Value]:
     """Values of the channels at solved configurations (radians, lengths, forces in the study's units)."""
-    orders = {channel.order for channel in channels if isinstance(channel, CoordinateChannel)}
-    columns = _columns(channels)
-    velocity = acceleration = None
+    linear, columns = mechanism.linearize(configuration), columns_among(channels)
     borne: Iterator[Value] = iter(())
-    if columns or orders - {0}:
-        linear = mechanism.linearize(configuration)
     if columns:
         assert forces is not None
         borne = iter(forces.values(columns, linear, rates))
-    if orders - {0}:
-        velocity = linear.velocity(rates.velocities)
-        acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
-    values = []
-    for channel in channels:
-        if isinstance(channel, ForceChannel):
-            values.append(next(borne))
-        elif velocity is None or channel.order == 0:
-            values.append(configuration.value(channel.coordinate))
-        elif acceleration is None or channel.order == 1:
-            values.append(first(configuration, channel.coordinate, velocity))
-        else:
-            values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
-    return values
+    highest = max((channel.order for channel in channels if channel.coordinate is not None), default=0)
+    velocity = linear.velocity(rates.velocities) if highest else None
+    acceleration = linear.acceleration(velocity, rates.accelerations) if velocity and highest > 1 else None
+
+    def value(channel: Channel) -> Value:
+        coordinate = channel.coordinate
+        if coordinate is None:
+            return next(borne)
+        if velocity is None or channel.order == 0:
+            return configuration.value(coordinate)
+        if acceleration is None or channel.order == 1:
+            return first(configuration, coordinate, velocity)
+        return second(configuration, coordinate, velocity, velocity, acceleration)
+
+    return [value(channel) for channel in channels]
 
 
 def derivatives(
@@ -238,79 +221,28 @@ def derivatives(
     if not rows:
         return slopes
     names = [names[row] for row in rows]
-    columns, moved = _columns(channels), [c for c in channels if isinstance(c, CoordinateChannel)]
-    coordinates = np.array([isinstance(channel, CoordinateChannel) for channel in channels])
+    columns = columns_among(channels)
+    moved = [(row, c.coordinate, c.order) for row, c in zip(slopes, channels, strict=True) if c.coordinate is not None]
     linear = mechanism.linearize(configuration)
     position = linear.sensitivity(names)
-    if any(channel.order for channel in moved):
+    if any(order for *_, order in moved):
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-    for row, channel in zip((slopes[k] for k in np.flatnonzero(coordinates)), moved, strict=True):
-        if channel.order == 0:
-            row[rows] = first(configuration, channel.coordinate, position)
-        elif channel.order == 1:
-            row[rows] = second(configuration, channel.coordinate, velocity, position, velocity_z)
+    for row, coordinate, order in moved:
+        if order == 0:
+            row[rows] = first(configuration, coordinate, position)
+        elif order == 1:
+            row[rows] = second(configuration, coordinate, velocity, position, velocity_z)
         else:
             row[rows] = acceleration_sensitivity(
-                configuration, channel.coordinate, velocity, acceleration, position, velocity_z, acceleration_z
+                configuration, coordinate, velocity, acceleration, position, velocity_z, acceleration_z
             )
     if columns:
         assert forces is not None
-        slopes[np.ix_(np.flatnonzero(~coordinates), np.array(rows))] = forces.slopes(
-            columns, mechanism, configuration, position, names, rates
-        )
+        own = np.flatnonzero([channel.coordinate is None for channel in channels])
+        slopes[np.ix_(own, np.array(rows))] = forces.slopes(columns, mechanism, configuration, position, names, rates)
     return slopes
-
-
-def _columns(channels: Sequence[Channel]) -> list[str]:
-    """The columns of dynamics among channels."""
-    return [channel.name for channel in channels if isinstance(channel, ForceChannel)]
-
-
-def linear_errors(
-    mechanism: Mechanism,
-    configuration: Configuration,
-    channels: Sequence[Channel],
-    sources: Sources,
-    rates: DriveRates,
-    elastic: Elastic | None = None,
-    forces: ForceModel | None = None,
-) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations with fixed drives."""
-    names, slopes = _directions(sources)
-    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic, forces)
-    offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
-    return FirstOrder(sources, _chained(slopes, by_name), offset)
-
-
-def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: Sources) -> FirstOrder:
-    """Linear model of the margins of assembly at a flat batch of nominal configurations with fixed drives.
-
-    A made mechanism with a negative margin cannot be assembled.
-    """
-    names, slopes = _directions(sources)
-    moved = [k for k, name in enumerate(names) if name not in LOADS]
-    margins, by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
-    return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
-
-
-def _directions(sources: Sources) -> tuple[list[str], Floats]:
-    """Names of places, drives and loads, and their derivatives by the sources' components, shape (components, names).
-
-    Of shape (components, names, poses) where poses differ in them.
-    """
-    directions = [direction for source in sources.all for direction in source.directions]
-    names = list(dict.fromkeys(name for direction in directions for name in direction))
-    slopes = np.stack(np.broadcast_arrays(*(direction.get(name, 0.0) for direction in directions for name in names)))
-    return names, slopes.reshape(len(directions), len(names), *slopes.shape[1:])
-
-
-def _chained(slopes: Floats, by_name: Floats) -> Floats:
-    """Derivatives by components from those by names, (channels, names, poses), and the slopes of `_directions`."""
-    if slopes.ndim == 2:
-        return np.asarray(slopes @ by_name)
-    return np.asarray(np.einsum("znp,cnp->czp", slopes, by_name))
 
 
 def _rows(values: Sequence[Number]) -> Floats:

@@ -46,9 +46,7 @@ class WithLengths(FirstOrder):
     sizes: Floats
 
     def take(self, poses: Sequence[int] | Ints) -> Self:
-        taken, vectors = super().take(poses), self.vectors.take(poses)
-        return replace(self, sources=taken.sources, components=taken.components, offset=taken.offset,
-                       vectors=vectors, sizes=self.sizes[:, poses])  # fmt: skip
+        return replace(super().take(poses), vectors=self.vectors.take(poses), sizes=self.sizes[:, poses])
 
     @cached_property
     def _vectors(self) -> FirstOrder:

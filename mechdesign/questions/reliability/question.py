@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
+from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
@@ -24,65 +25,66 @@ from mechdesign.questions.reliability.schema.section import ReliabilitySection, 
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 from mechdesign.study.text import fields
-from mechdesign.study.text.units import Units
 
 # Orders of channels, as tables name them.
 OF_DYNAMICS = "dynamics"
-ORDERS = ("position", "velocity", "acceleration")
+ORDERS = ("position", "velocity", "acceleration", OF_DYNAMICS)
 
 
 @dataclass(frozen=True)
-class CoordinateChannel:
-    """One quantity whose error is computed: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+class Channel:
+    """A quantity whose error is computed: a coordinate, its velocity or acceleration, or a column of dynamics.
 
-    coordinate: Coordinate
+    Parameters
+    ----------
+    order : int
+        Place in `ORDERS`.
+    kind : str
+        Kind of quantity of its unit in tables.
+    coordinate : Coordinate, optional
+        None of a column of dynamics, which is in the study's units.
+    vector : tuple of Channel
+        Components, one or two, of the vector whose length it is.
+    bends : tuple of Bend
+        Where it is not smooth, its arguments as channels; a length's are those of its vector.
+    """
+
+    output: str
     order: int
+    kind: str
+    coordinate: Coordinate | None = None
+    vector: tuple[Channel, ...] = ()
+    bends: tuple[Bend, ...] = ()
+
+    @classmethod
+    def of(cls, argument: Coordinate | Expression, order: int = 0, *, alone: bool = False) -> Channel:
+        """That of a coordinate, or of an expression that loads follow; `alone` without its vector and bends."""
+        if isinstance(argument, Expression):
+            return cls(argument_name(argument), ORDERS.index(OF_DYNAMICS), "none")
+        kind = QUANTITIES.get(argument.quantity, ("none",) * 3)[order]
+        if alone:
+            return cls(argument.name, order, kind, argument)
+        vector = vector_of(argument) if order == 0 else ()
+        own = _judged(dict.fromkeys(bend for part in vector or [argument] for bend in bends(part)))
+        return cls(argument.name, order, kind, argument, tuple(Channel.of(part, alone=True) for part in vector), own)
 
     @property
     def name(self) -> str:
         """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
-        return self.coordinate.name + SUFFIXES[self.order]
-
-    @property
-    def words(self) -> tuple[str, str]:
-        """Output and order, as tables name them."""
-        return self.coordinate.name, ORDERS[self.order]
+        return self.output + (*SUFFIXES, "")[self.order]
 
     @property
     def turns(self) -> bool:
         """Whether it is computed in radians."""
-        return self.coordinate.quantity == "angle"
-
-    def unit(self, units: Units) -> str:
-        """Its unit in tables."""
-        return units.label(QUANTITIES.get(self.coordinate.quantity, ("none",) * 3)[self.order])
+        return self.coordinate is not None and self.coordinate.quantity == "angle"
 
 
-@dataclass(frozen=True)
-class ForceChannel:
-    """A column of dynamics whose error is computed: an effort, a joint's force, an energy ..., in the study's units."""
-
-    name: str
-    kind: str
-    vector: tuple[str, ...] = ()  # columns of the components of a force whose size it is
-    bends: tuple[Bend, ...] = ()  # where the loads that it follows are not smooth
-
-    @property
-    def words(self) -> tuple[str, str]:
-        """Output and order, as tables name them."""
-        return self.name, OF_DYNAMICS
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is computed in radians."""
-        return False
-
-    def unit(self, units: Units) -> str:
-        """Its unit in tables."""
-        return units.label(self.kind)
-
-
-Channel = CoordinateChannel | ForceChannel
+def _judged(found: Iterable[Bend]) -> tuple[Bend, ...]:
+    """Bends with channels as their arguments."""
+    return tuple(
+        replace(bend, arguments=tuple(Channel.of(argument, alone=True) for argument in bend.arguments))
+        for bend in found
+    )
 
 
 @dataclass(frozen=True)
@@ -126,61 +128,34 @@ class ReliabilityQuestion:
     @property
     def coordinates(self) -> list[Coordinate]:
         """Coordinates of its channels."""
-        return [channel.coordinate for channel in self.channels if isinstance(channel, CoordinateChannel)]
+        return [channel.coordinate for channel in self.channels if channel.coordinate is not None]
 
     @property
     def columns(self) -> list[str]:
         """Columns of dynamics among its channels, which are the last of them."""
-        return [channel.name for channel in self.channels if isinstance(channel, ForceChannel)]
+        return columns_among(self.channels)
 
     @property
     def moving(self) -> bool:
         """Whether velocities count."""
-        return any(isinstance(channel, ForceChannel) or channel.order > 0 for channel in self.channels)
-
-    @cached_property
-    def _vectors(self) -> list[tuple[int, tuple[Channel, ...]]]:
-        """Channels that are the length of a vector, and its components."""
-        vectors: list[tuple[int, tuple[Channel, ...]]] = []
-        for k, channel in enumerate(self.channels):
-            if isinstance(channel, ForceChannel):
-                vectors.append((k, tuple(ForceChannel(name, channel.kind) for name in channel.vector)))
-            elif channel.order == 0:
-                vectors.append((k, tuple(CoordinateChannel(part, 0) for part in vector_of(channel.coordinate))))
-        return [(k, vector) for k, vector in vectors if vector]
-
-    @cached_property
-    def _bends(self) -> list[tuple[int, Bend]]:
-        """Channels with the places at which they are not smooth; a length's are those of its vector."""
-        vectors, places = dict(self._vectors), list[tuple[int, Bend]]()
-        for k, channel in enumerate(self.channels):
-            for part in vectors.get(k, (channel,)) if isinstance(channel, CoordinateChannel) else (channel,):
-                own = part.bends if isinstance(part, ForceChannel) else bends(part.coordinate)
-                places += [(k, bend) for bend in dict.fromkeys(own)]
-        return places
+        return any(channel.order > 0 for channel in self.channels)
 
     @cached_property
     def vectors(self) -> tuple[Channel, ...]:
         """The channels, and the components of those that are lengths."""
-        return (*self.channels, *(part for _, vector in self._vectors for part in vector))
+        return (*self.channels, *(part for channel in self.channels for part in channel.vector))
 
     @cached_property
     def whole(self) -> tuple[Channel, ...]:
         """The channels, the components of lengths, and the arguments by which corners are judged."""
-        arguments = (argument for _, bend in self._bends for argument in bend.arguments)
-        return (*self.vectors, *(
-            CoordinateChannel(argument, 0) if isinstance(argument, Coordinate)
-            else ForceChannel(argument_name(argument), "none") for argument in arguments
-        ))  # fmt: skip
+        return (*self.vectors, *(part for c in self.channels for bend in c.bends for part in bend.arguments))
 
     @cached_property
     def lengths(self) -> list[tuple[int, tuple[int, int]]]:
         """Channels that are lengths, with the places in `whole` of the components x and y; -1: always zero."""
-        place, lengths = len(self.channels), []
-        for k, vector in self._vectors:
-            lengths.append((k, (place, place + 1 if len(vector) > 1 else -1)))
-            place += len(vector)
-        return lengths
+        places = iter(range(len(self.channels), len(self.vectors)))
+        return [(k, (next(places), next(places) if len(channel.vector) > 1 else -1))
+                for k, channel in enumerate(self.channels) if channel.vector]  # fmt: skip
 
     @property
     def rows(self) -> list[int]:
@@ -188,13 +163,11 @@ class ReliabilityQuestion:
         return [*range(len(self.channels)), *(place for _, pair in self.lengths for place in pair)]
 
     @cached_property
-    def bends(self) -> list[tuple[int, range, Bend]]:
+    def bends(self) -> list[tuple[int, list[int], Bend]]:
         """Channels that are not smooth somewhere, the places in `whole` of the arguments, and where that is."""
-        place, judged = len(self.channels) + sum(len(vector) for _, vector in self._vectors), []
-        for k, bend in self._bends:
-            judged.append((k, range(place, place + len(bend.arguments)), bend))
-            place += len(bend.arguments)
-        return judged
+        places = iter(range(len(self.vectors), len(self.whole)))
+        return [(k, [next(places) for _ in bend.arguments], bend)
+                for k, channel in enumerate(self.channels) for bend in channel.bends]  # fmt: skip
 
     @property
     def limited(self) -> bool:
@@ -222,12 +195,7 @@ class ReliabilityQuestion:
 
     def _about(self, band: Band, value: Any) -> Band:
         channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
-        if (
-            isinstance(channel, CoordinateChannel)
-            and channel.order == 0
-            and channel.turns
-            and np.isfinite(middle).all()
-        ):
+        if channel.order == 0 and channel.turns and np.isfinite(middle).all():
             value = value - TURN * np.round((value - middle) / TURN)
         return Band(band.output, band.low - value, band.high - value)
 
@@ -281,6 +249,11 @@ class ReliabilityQuestion:
         return np.stack(gradients)
 
 
+def columns_among(channels: Sequence[Channel]) -> list[str]:
+    """The columns of dynamics among channels."""
+    return [channel.name for channel in channels if channel.coordinate is None]
+
+
 def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
     """The limits at one pose or some, by an index of the arrays of poses."""
     return (
@@ -291,9 +264,8 @@ def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
-    mechanism = study.mechanism
-    kinds = kinds_of_forces(study)
-    limits = [(name, 0, limit) if name in kinds else (*_limited(mechanism, name), limit)
+    mechanism, kinds, last = study.mechanism, kinds_of_forces(study), ORDERS.index(OF_DYNAMICS)
+    limits = [(name, last, limit) if name in kinds else (*_limited(mechanism, name), limit)
               for name, limit in section.limits.items()]  # fmt: skip
     limited = [
         part
@@ -305,40 +277,30 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     listed = [output.name for output in outputs]
     also = dict.fromkeys(name for name in limited if name not in listed and name not in kinds)
     outputs += expand_outputs(study, tuple(also))
-    orders = 3 if section.rated else 1
+    channels = [Channel.of(output, order) for order in range(3 if section.rated else 1) for output in outputs]
     forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
-    channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
     joints = study.dynamics.joints(mechanism).names if forces and study.dynamics is not None else ()
     axes = {"shaking": ("shaking.x", "shaking.y")} | {name: (f"{name}.fx", f"{name}.fy") for name in joints}
-    bent = tuple(load_bends(study)) if forces else ()
-    channels += [
-        ForceChannel(name, kinds[name], axes.get(name, ()), () if name.endswith("_energy") else bent) for name in forces
-    ]
-    places = {channel.words: k for k, channel in enumerate(channels)}
-
-    def place(base: str, order: int) -> int:
-        return places[base, OF_DYNAMICS if base in kinds else ORDERS[order]]
-
-    bands, discs = [], []
+    bent = _judged(load_bends(study)) if forces else ()
+    for name in forces:
+        vector = tuple(Channel(part, last, kinds[name]) for part in axes.get(name, ()))
+        channels.append(Channel(name, last, kinds[name], None, vector, () if name.endswith("_energy") else bent))
+    places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
+    bands, discs = list[Band](), list[Disc]()
     for base, order, limit in limits:
         if limit.radius is not None:
-            discs.append(Disc(place(f"{base}.x", order), place(f"{base}.y", order), limit.radius))
-        else:
-            turns = channels[place(base, order)].turns
-            low, high = (
-                (value * study.units.angle_factor if turns else value) if value is not None else bound
-                for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
-            )
-            bands.append(Band(place(base, order), low, high, limit.absolute))
-    pair: tuple[int, int] | None = None
-    if len(bands) == 2 and not discs:
-        pair = (bands[0].output, bands[1].output)
-    elif len(discs) == 1 and not bands:
-        pair = (discs[0].x, discs[0].y)
-    elif not limited and len(outputs) + len(forces) == 2:
-        one, other = (place(name, 0) for name in [output.name for output in outputs] + forces)
-        pair = (one, other)
-    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), pair)
+            discs.append(Disc(places[f"{base}.x", order], places[f"{base}.y", order], limit.radius))
+            continue
+        output = places[base, order]
+        factor = study.units.angle_factor if channels[output].turns else 1.0
+        low, high = (bound if value is None else value * factor
+                     for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True))  # fmt: skip
+        bands.append(Band(output, low, high, limit.absolute))
+    pair = [band.output for band in bands] if not discs else [discs[0].x, discs[0].y] if not bands else []
+    if not limited:
+        pair = [k for k, channel in enumerate(channels) if channel.order in (0, last)]
+    alone = len(pair) == 2 and len(discs) < 2
+    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), (pair[0], pair[1]) if alone else None)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
@@ -360,8 +322,7 @@ def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Cautio
     warnings = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         plain = ("", study.mechanism.graph.node(point))
-        positions = [c for c in question.channels if isinstance(c, CoordinateChannel) and not c.order]
-        about = [c.name for c in positions if plain in c.coordinate.ends]
+        about = [c.name for c in question.channels if c.order == 0 and c.coordinate and plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
             warnings.append(Caution(
@@ -380,12 +341,10 @@ def _named(name: str, point: str) -> bool:
 def holders(study: Study, channel: Channel) -> str:
     """Names of the links whose points a channel uses, for points with a clearance or an elastic bearing."""
     graph = study.mechanism.graph
-    coordinates = [channel.coordinate] if isinstance(channel, CoordinateChannel) else []
     names = [
         link or " ".join(links)
         for point, links in links_meant(study.reliability, study.stiffness, graph).items()
-        for coordinate in coordinates
-        for link, node in coordinate.ends
+        for link, node in (channel.coordinate.ends if channel.coordinate is not None else ())
         if node == graph.node(point)
     ]
     return " ".join(dict.fromkeys(names))

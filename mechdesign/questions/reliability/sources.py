@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mechdesign.expressions import Number
 from mechdesign.mechanism.algebra import times
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED
@@ -54,6 +56,12 @@ class Scalar:
         """Lowest and highest deviation: the tolerance."""
         return self.law.low, self.law.high
 
+    @property
+    def reaches(self) -> list[tuple[str, Number]]:
+        """Largest deviation of each place, drive or load, with its quantity."""
+        return [(quantity, np.maximum(*(np.abs(slope * end) for end in self.ends)))
+                for slope, quantity in self.moves.values()]  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Pin:
@@ -74,7 +82,7 @@ class Pin:
     sampled: str
     kind: str
     directions: tuple[Mapping[str, Number], ...]
-    quantity: Literal["length", "angle"] = "length"
+    quantity: Quantity = "length"
 
     def take(self, rows: Sequence[int] | Ints) -> Pin:
         """At some of many poses."""
@@ -112,6 +120,11 @@ class Pin:
         largest = self.radius + (0.0 if self.law is None else self.law.high)
         return -largest, largest
 
+    @property
+    def reaches(self) -> list[tuple[str, Number]]:
+        """The largest clearance, with its quantity."""
+        return [(self.quantity, self.ends[1])]
+
 
 class Made(NamedTuple):
     """Made mechanisms: varying places (radians, lengths), errors of drives and of loads, by name, shape (count,).
@@ -142,6 +155,17 @@ class Sources:
     def all(self) -> tuple[Scalar | Pin, ...]:
         """Scalars, then pins, in the order of components."""
         return *self.scalars, *self.pins
+
+    @cached_property
+    def directions(self) -> tuple[list[str], Floats]:
+        """Names of places, drives and loads, and their derivatives by the components, shape (components, names).
+
+        Of shape (components, names, poses) where poses differ in them.
+        """
+        directions = [direction for source in self.all for direction in source.directions]
+        names = list(dict.fromkeys(name for direction in directions for name in direction))
+        slopes = np.stack(np.broadcast_arrays(*(part.get(name, 0.0) for part in directions for name in names)))
+        return names, slopes.reshape(len(directions), len(names), *slopes.shape[1:])
 
     @property
     def owners(self) -> list[str]:
@@ -246,20 +270,22 @@ class Sources:
         for scalar, deviation in zip(self.scalars, drawn, strict=False):
             by_kind[scalar.kind][scalar.name] = deviation
         changed = {name: study.parameters.nominal[name] + value for name, value in by_kind["parameter"].items()}
-        places: dict[str, Floats] = {
-            name: np.asarray(value, dtype=float) for name, value in geometric(study.parameters.places(changed)).items()
-        }
+        values = geometric(study.parameters.places(changed))
+        places: dict[str, Any] = {name: np.asarray(value, dtype=float) for name, value in values.items()}
+
+        def shift(direction: Mapping[str, Number], deviation: Floats) -> None:
+            for name, slope in direction.items():
+                places[name] = places.get(name, nominal.get(name, 0.0)) + times(slope, deviation)
+
         for name, deviation in by_kind["place"].items():
-            places[name] = places.get(name, nominal[name]) + deviation
+            shift({name: 1.0}, deviation)
         for pin, (radius, x, y) in zip(self.pins, self._by_pin(drawn), strict=True):
-            parts = radius * x, radius * y
             if pin.kind == "length":
                 (name,) = pin.directions[0]
-                places[name] = np.sqrt((places.get(name, nominal[name]) + parts[0]) ** 2 + parts[1] ** 2)
+                places[name] = np.sqrt((places.get(name, nominal[name]) + radius * x) ** 2 + (radius * y) ** 2)
                 continue
-            for direction, part in zip(pin.directions, parts, strict=False):
-                for name, slope in direction.items():
-                    places[name] = places.get(name, nominal.get(name, 0.0)) + times(slope, part)
+            for direction, part in zip(pin.directions, (x, y), strict=False):
+                shift(direction, radius * part)
         parameters = {f"{FOLLOWED}{name}": value for name, value in by_kind["parameter"].items()}
         followed = {name for scalar in self.scalars for name in scalar.moves}
         parameters = {name: value for name, value in parameters.items() if name in followed}

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
-from typing import Literal
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -13,12 +11,13 @@ from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.couplings import MEASURED, play
+from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.joints import AnyJoint, Prismatic
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
-from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw, fit_law
+from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
@@ -51,13 +50,11 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
     poses = poses or NOWHERE
     section = poses.section(section)
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
-    scalars = []
-    slopes: dict[str, Number]
-    warnings: list[Caution] = []
-    together: list[str] = []
+    scalars, warnings, together = list[Scalar](), list[Caution](), list[str]()
     counting = followed(study)
     for name, dimension in section.dimensions.items():
-        nominal = sizes.get(name, 0.0)
+        kind = "load" if name in LOADS else "drive" if name in mechanism.drives else "place"
+        slopes: dict[str, Number] = {name: 1.0}
         if name in study.parameters.nominal:
             kind = "parameter"
             slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.own.changed))
@@ -65,19 +62,16 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
             moved = [place for place, slope in slopes.items() if np.any(slope)]
             dimensions = [place for place in moved if not place.startswith((MEASURED, FOLLOWED))]
             if not moved:
-                idle = f"parameter '{name}' changes no dimension of the mechanism"
-                warnings.append(Caution("ignored", idle))
+                warnings.append(Caution("ignored", f"parameter '{name}' changes no dimension of the mechanism"))
             elif len(dimensions) > 1:
                 together.append(f"'{name}' {', '.join(dimensions)}")
-        else:
-            kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
-            if kind == "place":
-                warnings += _twice(study, name, section.dimensions)
+        elif kind == "place":
+            warnings += _twice(study, name, section.dimensions)
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
-        turned = kind != "parameter" and moves[name][1] == "angle"
-        factor = study.units.angle_factor if turned else 1.0
+        factor = study.units.angle_factor if kind != "parameter" and moves[name][1] == "angle" else 1.0
         unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
-        scalars.append(Scalar(name, kind, _law(study, name, dimension, nominal, factor), moves, factor, unit))
+        law = _law(study, name, dimension, sizes.get(name, 0.0), factor)
+        scalars.append(Scalar(name, kind, law, moves, factor, unit))
     if together:
         parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
         words = f"{parameters} several dimensions together: {'; '.join(together)}"
@@ -118,31 +112,24 @@ def _check_sizes(sources: Sources) -> None:
         "angle": (MAX_DEVIATION, "a million radians"),
         "length": (MAX_DEVIATION * size, "a million times the size of the mechanism"),
     }
-    for scalar in sources.scalars:
-        for slope, quantity in scalar.moves.values():
+    for source in sources.all:
+        for quantity, reach in source.reaches:
             allowed, words = most.get(quantity, (MAX_LOAD, "1e100"))
-            if not max(np.max(np.abs(slope * end)) for end in scalar.ends) <= allowed:
-                message = f"varies by more than {words}; look at its unit"
-                raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
-    for pin in sources.pins:
-        allowed, words = most[pin.quantity]
-        if not np.max(pin.ends[1]) <= allowed:
-            message = f"is more than {words}; look at its unit"
-            raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
+            if not np.max(reach) <= allowed:
+                key, verb = ("clearances", "is") if isinstance(source, Pin) else ("dimensions", "varies by")
+                message = f"{verb} more than {words}; look at its unit"
+                raise StudyError((study.problem(message, "reliability", key, source.name),))
 
 
 def _twice(study: Study, place: str, varying: Collection[str]) -> list[Caution]:
     """A warning for each varying parameter that also sets a place with a tolerance of its own."""
     both = [name for name in study.parameters.nominal
             if name in varying and study.parameters.derivatives(name).get(place)]  # fmt: skip
-    return [
-        Caution(
-            "assumed",
-            f"'{place}' varies by its own tolerance, and with parameter '{name}': both count, as independent errors "
-            "that add up; leave one of them out if they are the same error",
-        )
-        for name in both
-    ]
+    words = (
+        f"'{place}' varies by its own tolerance, and with parameter '{{}}': both count, as independent errors that add "
+        "up; leave one of them out if they are the same error"
+    )
+    return [Caution("assumed", words.format(name)) for name in both]
 
 
 def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Correlation | None:
@@ -156,38 +143,30 @@ def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Corr
 def _pin(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pin:
     if flaw := clearance.flaw():
         raise StudyError((study.problem(flaw, "reliability", "clearances", name),))
-    joints, spread, radius = study.mechanism.description.joints, clearance.radius_spread, clearance.radius
-    law = None if spread is None else spread.law(radius)
-    if clearance.fit is not None:
-        law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
+    mechanism, joint = study.mechanism, study.mechanism.description.joints.get(name)
+    kind = "slide" if joint is not None or clearance.backlash is not None else clearance.effect
+    quantity: Quantity = "length"
+    slope: Number
+    directions: Sequence[Mapping[str, Number]]
     if clearance.backlash is not None:
-        return _backlash(study, name, clearance, poses)
-    kind = "slide" if name in joints else clearance.effect
-    pin = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
-    if kind == "slide":
-        return replace(pin, directions=_slider(joints[name], clearance.length))
-    if clearance.link is None:
+        # Half of it lies to each side of the coupling's function.
+        moved = mechanism.description.places[play(name)]
+        quantity, slope = "angle" if moved.quantity == "angle" else "length", 1.0
+        if quantity == "angle" and kind_of(ReliabilitySection.of(study).clearances[name].backlash) == "length":
+            radius = mechanism.pitch_radius(name, poses.places)
+            assert radius is not None
+            quantity, slope = "length", np.asarray(1.0 / radius, dtype=float)
+        directions = [{moved.name: slope}]
+    elif joint is not None:
+        directions = _slider(joint, clearance.length)
+    elif clearance.link is None:
         raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
-    moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
-    return replace(pin, directions=tuple({place: 1.0} for place in moved))
-
-
-def _backlash(study: Study, name: str, clearance: Clearance, poses: Poses) -> Pin:
-    """The play of a coupling, half its backlash to each side of its function."""
-    mechanism, section = study.mechanism, study.reliability
-    assert section is not None
-    moved = mechanism.description.places[play(name)]
-    slope: Number = 1.0
-    quantity: Literal["length", "angle"] = "angle" if moved.quantity == "angle" else "length"
-    if quantity == "angle" and kind_of(section.clearances[name].backlash) == "length":
-        radius = mechanism.pitch_radius(name, poses.places)
-        assert radius is not None
-        quantity, slope = "length", np.asarray(1.0 / radius, dtype=float)
-    factor = study.units.angle_factor if quantity == "angle" else 1.0
-    spread, size = clearance.radius_spread, factor * clearance.radius
-    law = None if spread is None else spread.law(size, factor)
-    laws = clearance.pin.analytic, clearance.pin.monte_carlo
-    return Pin(name, size, law, *laws, "slide", ({moved.name: slope},), quantity)
+    else:
+        length = (f"{clearance.link}.length",)
+        directions = [{place: 1.0} for place in (length if kind == "length" else offset_names(clearance.link, name))]
+    factor, pin = study.units.angle_factor if quantity == "angle" else 1.0, clearance.pin
+    size, law = factor * clearance.radius, clearance.law(factor)
+    return Pin(name, size, law, pin.analytic, pin.monte_carlo, kind, tuple(directions), quantity)
 
 
 def _slider(joint: AnyJoint, length: Number | None) -> tuple[dict[str, Number], ...]:

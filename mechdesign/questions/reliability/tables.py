@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -67,6 +68,21 @@ def _lost(results: Sequence[MethodResult], pose: Ints, method: Ints) -> Strings:
     return np.array([pairs[pair] for pair in zip(pose.tolist(), method.tolist(), strict=True)], dtype=str)
 
 
+def judged(
+    task: Task,
+    results: Sequence[MethodResult],
+    indices: Mapping[int, SobolIndices],
+    names: Collection[str] | None = None,
+) -> Iterator[Table]:
+    """Tables of what the methods say, or some of them; of limits only where there are any."""
+    makers = {
+        "moments": partial(moments, task, results), "reliability": partial(success, task, results),
+        "capability": partial(capability, task, results), "contributions": partial(contributions, task, indices),
+    }  # fmt: skip
+    limits = () if task.question.limited else ("reliability", "capability")
+    return (make() for name, make in makers.items() if name not in limits and (names is None or name in names))
+
+
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
     results = _with_moments(task, results)
@@ -90,16 +106,13 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
 
 def success(task: Task, results: Sequence[MethodResult]) -> Table:
     """Reliability of every pose by every method, and of the whole cycle."""
-    entries = []
-    length = task.poses.count // task.poses.designs
-    for design in range(task.poses.designs):
-        first = design * length
+    entries, length = [], task.poses.count // task.poses.designs
+    for design, first in enumerate(range(0, task.poses.count, length)):
         entries += [(pose, result, result.estimates.get(pose, _UNKNOWN), result.used.get(pose, result.method), False)
                     for pose in range(first, first + length) for result in results]  # fmt: skip
         cycles = [(result, result.cycles[design]) for result in results if result.cycles]
-        entries += [
-            (first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True) for result, cycle in cycles
-        ]
+        entries += [(first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True)
+                    for result, cycle in cycles]  # fmt: skip
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
     failure, low, high, error, samples, invalid, evaluations = (

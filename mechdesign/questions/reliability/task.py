@@ -18,7 +18,7 @@ from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate
 from mechdesign.questions.reliability.first_order import FirstOrder
-from mechdesign.questions.reliability.question import ReliabilityQuestion
+from mechdesign.questions.reliability.question import ORDERS, ReliabilityQuestion
 from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.simulation import Setting, Sums
 from mechdesign.questions.reliability.sources import Sources
@@ -89,9 +89,10 @@ class Task:
     @cached_property
     def labels(self) -> tuple[Strings, Strings, Strings]:
         """Output, order and unit of each channel."""
-        channels = self.question.channels
-        outputs, orders = zip(*(channel.words for channel in channels), strict=True)
-        return np.array(outputs), np.array(orders), np.array([channel.unit(self.study.units) for channel in channels])
+        units = self.study.units
+        parts = [(c.output, ORDERS[c.order], units.label(c.kind)) for c in self.question.channels]
+        outputs, orders, labels = (np.array(part) for part in zip(*parts, strict=True))
+        return outputs, orders, labels
 
     def where(self, pose: int) -> str:
         """A pose in words."""

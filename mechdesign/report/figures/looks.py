@@ -4,53 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.question import OF_DYNAMICS, ORDERS
 from mechdesign.questions.reliability.schema.limits import SUFFIXES as ORDER_SUFFIXES
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
-from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True)) | {OF_DYNAMICS: ""}
+SUFFIXES = dict(zip(ORDERS, (*ORDER_SUFFIXES, ""), strict=True))
 
 
 def look(name: str) -> Method:
     """A method with its colour as Matplotlib knows it; what is sampled is drawn as dots, without a line."""
     return replace(METHODS[name], color=getattr(style, METHODS[name].color))
-
-
-class Sampled(NamedTuple):
-    """What the pictures of samples show: the tables of a method, and its samples at one of the poses."""
-
-    study: Study
-    tables: Mapping[str, Table]
-    method: str
-    samples: Samples
-    poses: Poses
-
-    @property
-    def where(self) -> str:
-        """The pose in words, and among several why it is shown."""
-        limited = self.samples.bands or self.samples.discs
-        in_words = followed_in_words if limited else pose_in_words
-        return f"at {in_words(self.study, self.poses, self.samples.pose)}"
-
-    def rows(self, table: str) -> Flags:
-        """Rows of a table that are about this pose."""
-        matching = np.ones(len(self.tables[table]), dtype=bool)
-        for name, values in self.poses.values.items():
-            column, value = self.tables[table][name], values[self.samples.pose]
-            matching &= (column == value) | (np.isnan(column) & np.isnan(value))
-        return matching
 
 
 def followed_in_words(study: Study, poses: Poses, pose: int) -> str:

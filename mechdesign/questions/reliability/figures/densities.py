@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patches import Patch
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.figures.view import ErrorsView
+from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
-from mechdesign.report.figures.looks import Sampled, heading, look
+from mechdesign.report.figures.looks import heading, look
 from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.shapes import lighter
@@ -37,18 +38,21 @@ Ends = tuple[float, float]
 @picture(ErrorsView, "density_contours", order=80)
 def density_picture(view: ErrorsView) -> Picture | None:
     """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
-    sampled = view.sampled("density")
-    if sampled is None:
+    samples = view.sampled("density")
+    if samples is None or samples.pair is None:
         return None
-    samples = sampled.samples
-    assert samples.pair is not None
     pair = list(samples.pair)
     errors, units, failed = samples.errors[pair], samples.units[pair], ~samples.kept
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
-    limits, alike = _Limits.of(sampled, ellipses[-1]), bool(units[0] == units[1])
-    ends = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near])
-    marks: list[PanelMark] = [Own(lambda axes: limits.draw(axes, *ends), label=limits.words)]
-    region, method = smoothed(errors), look(sampled.method).words
+    reach = np.abs(ellipses[-1]).max(axis=1, keepdims=True)
+    (outline, limits, far), alike = _limits(samples, reach.ravel()), bool(units[0] == units[1])
+    near = np.where(np.abs(outline) < _FAR_FROM_ERRORS * reach, outline, 0.0)
+    ends, marks = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], near]), list[PanelMark]()
+    if near.any():
+        marks.append(Own(partial(_tinted, outline)))
+        edge = {"color": style.VERMILION, "linewidth": 1.8, "zorder": 2.6}
+        marks.append(Trace(*outline, label=limits, look=edge))
+    region, method = smoothed(errors), look(view.method).words
     if region is not None:
         colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
         levels = [*region.levels[::-1], 1.01 * region.density.max()]
@@ -69,14 +73,14 @@ def density_picture(view: ErrorsView) -> Picture | None:
         Dots(*places[:, :MAX_MARKS], label=words, look=own) for words, (places, own) in shown.items() if places.size
     ]
     count = f"{samples.errors.shape[1]:,} samples"
-    if limits.words:
+    if limits:
         count += f", {(number := int(failed.sum())):,} of them fail" + f" ({MAX_MARKS} marked)" * (number > MAX_MARKS)
     note = f"{method}: {count}" + (f", smoothed over {region.width:.2f} of their deviation" if region else "")
-    note += "; " * bool(limits.far) + limits.far
+    note += "; " * bool(far) + far
     x, y = (Axis(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k], ends=end)
             for k, end in zip(pair, ends, strict=True))  # fmt: skip
     panel = Panel(marks, x, y, equal=alike, legend="beside")
-    return Picture(f"Two errors of made mechanisms {sampled.where}", [panel], (note,))
+    return Picture(f"Two errors of made mechanisms {view.where}", [panel], (note,))
 
 
 def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
@@ -126,62 +130,34 @@ def smoothed(errors: Floats) -> Region | None:
     return Region(x, y, density, levels, at < levels[-1], width)
 
 
-class _Limits(NamedTuple):
-    """The limits of two errors: a circle or a band for each; what of them is near enough to be drawn, and in words."""
+def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
+    """Outline within which two errors keep their limits, (2, points), its words, and in words what is far off.
 
-    radius: float | None
-    bands: tuple[Ends, Ends]
-    near: Floats
-    words: str
-    far: str
+    It is a circle, or a rectangle that leaves the picture where a side is open or far; `reach` are the largest errors.
+    """
+    assert samples.pair is not None
+    if samples.discs:
+        radius = samples.discs[0][2]
+        words = f"limit: {radius:g} {samples.units[samples.pair[0]]}".rstrip() + " from no error"
+        if radius >= _FAR_FROM_ERRORS * reach.max():
+            return np.zeros((2, 0)), words, f"{words}, outside"
+        turn = np.linspace(0.0, 2 * np.pi, 181)
+        return radius * np.stack([np.cos(turn), np.sin(turn)]), words, ""
+    limits, sides, far = {channel: ends for channel, *ends in samples.bands}, list[list[float]](), list[str]()
+    for channel, size in zip(samples.pair, _FAR_FROM_ERRORS * reach, strict=True):
+        ends = limits.get(channel, [-np.inf, np.inf])
+        sides.append([end if abs(end) < size else float(10.0 * np.copysign(size, end)) for end in ends])
+        far += [f"{end:+g} {samples.units[channel]} of {samples.outputs[channel]}" for end in ends
+                if np.isfinite(end) and abs(end) >= size]  # fmt: skip
+    (left, right), (low, high) = sides
+    outline = np.array([[left, right, right, left, left], [low, low, high, high, low]])
+    return outline, "limits" * bool(limits), f"limits outside: {', '.join(far)}" if far else ""
 
-    @classmethod
-    def of(cls, sampled: Sampled, outermost: Floats) -> _Limits:
-        samples = sampled.samples
-        assert samples.pair is not None
-        pair = samples.pair
-        unit = samples.units[pair[0]]
-        reach = np.abs(outermost).max(axis=1)
-        if samples.discs:
-            radius = samples.discs[0][2]
-            words, shown = (
-                f"limit: {radius:g} {unit}".rstrip() + " from no error",
-                radius < _FAR_FROM_ERRORS * reach.max(),
-            )
-            near = radius * np.array([[-1, 1], [-1, 1]]) if shown else np.empty((2, 0))
-            return cls(radius, ((-np.inf, np.inf),) * 2, near, words, "" if shown else f"{words}, outside")
-        limits = {channel: (low, high) for channel, low, high in samples.bands}
-        bands = tuple(limits.get(channel, (-np.inf, np.inf)) for channel in pair)
-        near, far = np.zeros((2, 4)), []
-        for k, (ends, channel) in enumerate(zip(bands, pair, strict=True)):
-            for place, end in enumerate(ends):
-                if np.isfinite(end) and abs(end) < _FAR_FROM_ERRORS * reach[k]:
-                    near[k, 2 * k + place] = end
-                elif np.isfinite(end):
-                    far.append(f"{end:+g} {samples.units[channel]} of {samples.outputs[channel]}")
-        return cls(None, (bands[0], bands[1]), near, "limits" if limits else "",
-                   f"limits outside: {', '.join(far)}" if far else "")  # fmt: skip
 
-    def draw(self, axes: Axes, across: Ends, up: Ends) -> Patch | None:
-        """Draw the limit as a line, and tint what lies beyond it; returns it."""
-        if not self.near.any():
-            return None
-        axes.set_facecolor(_BEYOND)
-        # The sides of what is open, or far, lie outside the picture.
-        (left, right), (low, high) = (
-            np.clip(ends, 2 * span[0] - span[1], 2 * span[1] - span[0]).tolist()
-            for ends, span in zip(self.bands, (across, up), strict=True)
-        )
-        looks: tuple[dict[str, Any], ...] = (
-            {"facecolor": "white", "zorder": 0.4},
-            {"fill": False, "edgecolor": style.VERMILION, "linewidth": 1.8, "zorder": 2.6},
-        )
-        *_, line = (
-            axes.add_patch(Rectangle((left, low), right - left, high - low, **drawn)
-                           if self.radius is None else Circle((0.0, 0.0), self.radius, **drawn))
-            for drawn in looks
-        )  # fmt: skip
-        return line
+def _tinted(outline: Floats, axes: Axes) -> None:
+    """Tint what lies beyond the limits."""
+    axes.set_facecolor(_BEYOND)
+    axes.fill(*outline, color="white", zorder=0.4)
 
 
 def _ends(parts: Sequence[Floats]) -> tuple[Ends, Ends]:

@@ -99,19 +99,16 @@ def _deviations(moments: Table, swept: Along) -> Picture:
                      for method in shown}  # fmt: skip
             apart = ", ".join(_apart(sigma[method], sigma[reference]) for method in compared)
             named = f"{output} ({apart})" if apart else output
+            first = f"{order} of {named}" if order != "position" else named
             for method, values in sigma.items():
                 own = {"markersize": 3.2} | _line(look(method)) | ({} if single else {"color": color})
                 if not single and not look(method).sampled:
                     own |= {"marker": mark, "markersize": 6, "markevery": max(len(swept.values) // 8, 1)}
-                words = f"{order} of {named}" if order != "position" else named
-                first = method == shown[0]
-                marks.append(Trace(swept.values, values, label="" if single or not first else words, look=own))
+                words = look(method).words if single else first * (method == shown[0])
+                marks.append(Trace(swept.values, values, label=words, look=own))
         if not single:
             marks += [Trace([], [], label=look(method).words, look=_line(look(method)) | {"color": style.INK})
                       for method in shown]  # fmt: skip
-        else:
-            marks = [Trace(mark.x, mark.y, label=look(method).words, look=mark.look)  # type: ignore[attr-defined]
-                     for mark, method in zip(marks, shown, strict=True)]  # fmt: skip
         panels.append(Panel(marks, swept.axis, Axis(order, unit, ends=(0.0, None)), named if single else ""))
     note = f"in brackets: difference from {look(reference).words} on average" if compared else ""
     return Picture("Standard deviation of made mechanisms", panels, (note,), share="x")

@@ -12,10 +12,11 @@ from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import fitting_panels
-from mechdesign.report.figures.looks import Sampled, apart, channels, heading, look, methods
+from mechdesign.report.figures.looks import apart, channels, heading, look, methods
 from mechdesign.report.figures.marks import Area, Axis, Lines, Panel, PanelMark, Picture, Steps, Trace, Zone
 from mechdesign.report.figures.panels import MAX_PANELS, number
 from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6
@@ -41,26 +42,24 @@ class _Histogram(NamedTuple):
 @picture(ErrorsView, "histogram", order=40)
 def histogram_picture(view: ErrorsView) -> Picture | None:
     """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
-    sampled = view.sampled("histogram")
-    if sampled is None:
+    samples = view.sampled("histogram")
+    if samples is None:
         return None
-    shown = _histograms(sampled)
+    shown = _histograms(samples, view.result.tables["histogram"])
     columns = min(len(shown), 2 if len(shown) == 4 else 3, fitting_panels())
     panels: list[Panel | None] = []
     for k in range(0, len(shown), columns):
         blank = [None] * (columns - len(shown[k : k + columns]))
         for logarithmic in (False, True):
             panels += [*(_panel(one, logarithmic=logarithmic) for one in shown[k : k + columns]), *blank]
-    kept, samples = sampled.samples.kept, sampled.samples.errors.shape[1]
-    note = f"{look(sampled.method).words}, {samples:,} samples"
-    note += f", {int((~kept).sum()):,} of them fail" if sampled.samples.bands or sampled.samples.discs else ""
-    return Picture(f"Errors of made mechanisms {sampled.where}", panels,
+    note = f"{look(view.method).words}, {samples.errors.shape[1]:,} samples"
+    note += f", {int((~samples.kept).sum()):,} of them fail" if samples.bands or samples.discs else ""
+    return Picture(f"Errors of made mechanisms {view.where}", panels,
                    (f"{note}; below: the same on a logarithmic axis",), columns)  # fmt: skip
 
 
-def _histograms(sampled: Sampled) -> list[_Histogram]:
+def _histograms(samples: Samples, table: Table) -> list[_Histogram]:
     """Distances that a circle limits, then the errors that vary."""
-    samples, table = sampled.samples, sampled.tables["histogram"]
     histograms = []
     for x, y, radius in samples.discs:
         distance = np.hypot(samples.errors[x], samples.errors[y])
@@ -125,42 +124,41 @@ def convergence_picture(view: ErrorsView) -> Picture | None:
 
     Not the mean itself: beside large dimensions its changes are lost.
     """
-    sampled = view.sampled("convergence")
-    if sampled is None:
+    samples = view.sampled("convergence")
+    if samples is None:
         return None
-    table, moments, panels = sampled.tables["convergence"], sampled.tables["moments"], []
+    table, moments, panels = view.result.tables["convergence"], view.result.tables["moments"], []
     for output, order, unit in channels(table)[:MAX_PANELS]:
         rows = table.where(output=output, order=order, unit=unit)
-        row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=sampled.method))[
-            sampled.samples.pose
-        ]
-        samples, mean = table["samples"][rows], table["mean"][rows] - moments["nominal"][row]
-        band = 3.0 * moments["sigma"][row] / np.sqrt(samples)
+        same = moments.where(output=output, order=order, unit=unit, method=view.method)
+        row = np.flatnonzero(same)[samples.pose]
+        count, mean = table["samples"][rows], table["mean"][rows] - moments["nominal"][row]
+        band = 3.0 * moments["sigma"][row] / np.sqrt(count)
         final = moments["mean"][row] - moments["nominal"][row]
         marks = [
-            Area(samples, final - band, final + band, label="three standard errors",
+            Area(count, final - band, final + band, label="three standard errors",
                  look={"color": style.SKY, "alpha": 0.3}),
-            Trace(samples, mean, label="mean", look={"color": style.BLUE, "marker": "." if len(samples) == 1 else ""}),
+            Trace(count, mean, label="mean", look={"color": style.BLUE, "marker": "." if len(count) == 1 else ""}),
             Lines([0.0], label="no error", look={"color": style.INK, "linestyle": "--", "linewidth": 1.0}),
         ]  # fmt: skip
         name = output if order == "position" else f"{output} {order}"
         panels.append(Panel(marks, _sample_axis(table["samples"]), Axis(name, unit)))
-    note = f"{sampled.where}; {look(sampled.method).words}"
+    note = f"{view.where}; {look(view.method).words}"
     return Picture("Mean error of made mechanisms as samples are added", panels, (note,), share="x")
 
 
 @picture(ErrorsView, "estimate", order=70)
 def trend_picture(view: ErrorsView) -> Picture | None:
     """Failure probability against the number of samples with its interval, beside what other methods say."""
-    sampled = view.sampled("estimate")
-    if sampled is None:
+    shown = view.sampled("estimate")
+    if shown is None:
         return None
-    table, reliability = sampled.tables["estimate"], sampled.tables["reliability"]
+    table, reliability = view.result.tables["estimate"], view.result.tables["reliability"]
     samples, value, low, high = (table[name] for name in ("samples", "failure", "failure_low", "failure_high"))
     late = len(samples) // 20
     ends, lines = [low[late:].min(), value[-1], high[late:].max()], list[PanelMark]()
     for method in (method for method in methods(reliability) if method != "monte_carlo"):
-        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[sampled.samples.pose]
+        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[shown.pose]
         failure = float(reliability["failure"][row])
         if np.isfinite(failure):
             drawn, used = look(method), str(reliability["used"][row])
@@ -180,7 +178,7 @@ def trend_picture(view: ErrorsView) -> Picture | None:
         Trace(samples, value, label=f"plain samples: {number(float(value[-1]))}", look=plain),
     ]  # fmt: skip
     return Picture("Failure probability as samples are added", [Panel([*marks, *lines], _sample_axis(samples), axis)],
-                   (sampled.where,))  # fmt: skip
+                   (view.where,))  # fmt: skip
 
 
 def _sample_axis(samples: np.ndarray) -> Axis:

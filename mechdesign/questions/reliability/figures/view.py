@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 
 from mechdesign.motion.rows import Poses
-from mechdesign.questions.reliability.tables import DrawnErrors
-from mechdesign.report.figures.looks import Sampled, look
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.tables import DrawnErrors, Samples
+from mechdesign.report.figures.looks import followed_in_words, look
 from mechdesign.report.figures.pictures import PosesView
 
 
@@ -23,10 +24,19 @@ class ErrorsView(PosesView):
         """The poses of the tables."""
         return self.drawn.poses
 
-    def sampled(self, table: str) -> Sampled | None:
-        """The samples with the tables of the first sampling method; None without samples or a table of this name."""
-        tables, samples = self.result.tables, self.drawn.samples
-        if samples is None or table not in tables:
-            return None
-        method = next(name for name in tables["moments"]["method"].tolist() if look(name).sampled)
-        return Sampled(self.study, tables, method, samples, self.poses)
+    def sampled(self, table: str) -> Samples | None:
+        """The samples; None without any, or without a table of this name."""
+        return self.drawn.samples if table in self.result.tables else None
+
+    @property
+    def method(self) -> str:
+        """The first method that samples."""
+        return next(name for name in map(str, self.result.tables["moments"]["method"]) if look(name).sampled)
+
+    @property
+    def where(self) -> str:
+        """The pose of the samples in words, and among several why it is shown."""
+        samples = self.drawn.samples
+        assert samples is not None
+        in_words = followed_in_words if samples.bands or samples.discs else pose_in_words
+        return f"at {in_words(self.study, self.poses, samples.pose)}"

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from mechdesign.mechanism.elements.couplings import play
-from mechdesign.questions.reliability.laws import FITS, LAWS
+from mechdesign.questions.reliability.laws import FITS, LAWS, Marginal, fit_law
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.schema.variation import Dimension, Tolerance, millimetre
@@ -148,6 +148,13 @@ class Clearance(fields.Model):
         factor = 1.0 if self.radial is not None else 0.5
         low, high = (factor * end for end in self.tolerance)
         return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
+
+    def law(self, factor: float = 1.0) -> Marginal | None:
+        """Law of the radial clearance about its mean, where `factor` of the core's units are one of the study."""
+        if self.fit is not None:
+            return fit_law(self.distribution, self.fit.hole, self.fit.shaft, self.radius)
+        spread = self.radius_spread
+        return None if spread is None else spread.law(factor * self.radius, factor)
 
     def flaw(self) -> str:
         """The mistake in its numbers, of one design or several; empty if there is none."""

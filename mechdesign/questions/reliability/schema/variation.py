@@ -53,15 +53,16 @@ class ToleranceClass:
     millimetre: float
     degree: float
 
-    def of_length(self, size: Number) -> tuple[Number, Number]:
-        """Lowest and highest deviation of a length; raises as `deviations`."""
+    def ends(self, size: Number, leg: Number | None = None) -> tuple[Number, Number]:
+        """Lowest and highest deviation of a length, or of an angle whose shorter leg is so long.
+
+        Raises as `deviations`.
+        """
+        if leg is not None:
+            low, high = angle_deviations(self.text, leg / self.millimetre)
+            return low * self.degree, high * self.degree
         low, high = deviations(self.text, np.abs(size) / self.millimetre)
         return low * self.millimetre, high * self.millimetre
-
-    def of_angle(self, leg: Number) -> tuple[Number, Number]:
-        """Lowest and highest deviation of an angle whose shorter leg is so long; raises as `angle_deviations`."""
-        low, high = angle_deviations(self.text, leg / self.millimetre)
-        return low * self.degree, high * self.degree
 
 
 def _tolerance_or_class(raw: Any, context: Context) -> tuple[float, float] | ToleranceClass:
@@ -145,7 +146,7 @@ class Dimension(Distribution, _Width):
         """
         if not isinstance(self.tolerance, ToleranceClass):
             return self.tolerance or (0.0, 0.0)
-        return self.tolerance.of_length(nominal) if self.leg is None else self.tolerance.of_angle(self.leg)
+        return self.tolerance.ends(nominal, self.leg)
 
     def varies(self, nominal: Number) -> bool:
         """Whether it has a tolerance above 0; see `ends`."""
@@ -255,7 +256,7 @@ def _check_class(checker: Checker, name: str, tolerance: object, leg: float | No
     if kinds == {"length"} and leg is not None:
         raise ToleranceClassError("the leg is that of an angle; a length has its own size")
     if kinds == {"angle"} and leg is None:
-        tolerance.of_angle(tolerance.millimetre)
+        tolerance.ends(0.0, tolerance.millimetre)
         raise ToleranceClassError(
             f"{tolerance.text} of an angle goes by the length of its shorter leg; say which: "
             f"{{tolerance: {tolerance.text}, leg: 50}}"

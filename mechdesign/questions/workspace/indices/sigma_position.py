@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,20 +18,18 @@ if TYPE_CHECKING:
 
 def prepare(study: Study) -> Evaluate:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
+    from mechdesign.motion.rows import Poses
     from mechdesign.questions.kinematics.rates import DriveRates
-    from mechdesign.questions.reliability.deflection import elasticity
-    from mechdesign.questions.reliability.first_order import linear_errors
-    from mechdesign.questions.reliability.question import CoordinateChannel
-    from mechdesign.questions.reliability.study_sources import find_sources
+    from mechdesign.questions.reliability.errors import Errors
+    from mechdesign.questions.reliability.question import Channel, ReliabilityQuestion
 
-    mechanism, point = study.mechanism, WorkspaceSection.of(study).point
-    channels = tuple(CoordinateChannel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
-    sources, bent = find_sources(study)[0], elasticity(study)[0]
+    point = WorkspaceSection.of(study).point
+    channels = tuple(Channel.of(study.mechanism.coordinate(f"{point}.{axis}")) for axis in "xy")
+    errors = replace(Errors.of(study, Poses.single({})), question=ReliabilityQuestion(channels, (), (), None))
 
     def evaluate(configuration: Configuration) -> Floats:
-        elastic = None if bent is None else bent.at(configuration, channels)
-        linear = linear_errors(mechanism, configuration, channels, sources, DriveRates((), ()), elastic)
-        return np.asarray(np.sqrt((linear.deviation() ** 2).sum(axis=0)))
+        linear = errors.linearized(configuration, DriveRates((), ()))[1]
+        return np.asarray(np.sqrt((linear.deviation()[:2] ** 2).sum(axis=0)))
 
     return of_configurations(evaluate)
 

@@ -1,0 +1,147 @@
+"""What is asked of errors at solved poses: nominal values, and to the first order errors and margins of assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.margins import closures
+from mechdesign.motion.motion import Motion, SolvedPoses
+from mechdesign.motion.question import PoseQuestion, evaluate
+from mechdesign.motion.rows import Poses
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
+from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cautions, elasticity
+from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values
+from mechdesign.questions.reliability.forces import ForceModel, force_model, pace
+from mechdesign.questions.reliability.lengths import model_of
+from mechdesign.questions.reliability.question import ReliabilityQuestion, ask
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
+from mechdesign.questions.reliability.schema.variation import LOADS
+from mechdesign.questions.reliability.sources import Sources
+from mechdesign.questions.reliability.study_sources import find_sources
+from mechdesign.questions.reliability.task import Task
+from mechdesign.study import Study
+
+
+@dataclass(frozen=True, eq=False)
+class Errors(PoseQuestion):
+    """The errors of a mechanism made within its tolerances; `doubts` are warnings about what the study says of them."""
+
+    study: Study
+    motion: Motion
+    question: ReliabilityQuestion
+    sources: Sources
+    elasticity: Elasticity | None
+    forces: ForceModel | None
+    watched: Sequence[Coordinate]
+    doubts: Sequence[Caution]
+
+    together = 2048
+    curve = None  # poses alone count: solving makes the motion between them where angles have turns
+
+    @classmethod
+    def of(cls, study: Study, poses: Poses) -> Self:
+        """Read what a study asks at some poses of one or several designs.
+
+        Raises
+        ------
+        StudyError
+            If nothing varies.
+        """
+        sources, doubts = find_sources(study, poses)
+        question = ask(study, poses.section(ReliabilitySection.of(study)))
+        bent, notes = elasticity(study, poses)
+        if bent is not None:
+            notes += cautions(study, bent, question.channels)
+        forces = force_model(study, poses)
+        watched = [*question.coordinates, *(forces.coordinates if forces is not None else ())]
+        return cls(study, study.motion(poses), question, sources, bent, forces, watched, [*doubts, *notes])
+
+    def at(self, poses: Poses) -> Self:
+        return type(self).of(self.study, poses)
+
+    def rates(self, part: SolvedPoses) -> DriveRates:
+        """Rates of the drives, where velocities count: those of made mechanisms, too."""
+        if not self.question.moving:
+            return DriveRates((), ())
+        return drive_rates(pace(self.study), part, self.study.mechanism.linearize(part.configuration))
+
+    def unknown(self) -> Mapping[str, Any]:
+        channels = len(self.question.whole)
+        parts = {"nominal": (channels,), "components": (channels, len(self.sources.directions[1]))}
+        if self.elasticity is not None:
+            parts["flexibility"] = (channels, 3)
+        return {name: np.zeros((0, *shape)) for name, shape in parts.items()}
+
+    def values(self, part: SolvedPoses) -> Mapping[str, Any]:
+        nominal, linear, closing, elastic = self.linearized(part.configuration, self.rates(part), part.rows)
+        arrays = {
+            "nominal": nominal, "components": linear.components, "closing": closing.components,
+            "margins": closing.offset,
+        } | ({} if elastic is None else {"flexibility": elastic.flexibility})  # fmt: skip
+        return {name: np.moveaxis(values, -1, 0) for name, values in arrays.items()}
+
+    def linearized(
+        self, configuration: Configuration, rates: DriveRates, rows: Ints | None = None
+    ) -> tuple[Floats, FirstOrder, FirstOrder, Elastic | None]:
+        """Values of all that is judged, shape (channels, n), the linear models of its errors and of the margins.
+
+        With them the deflections. A made mechanism with a negative margin cannot be assembled. The drives are held.
+        `rows` are those of a flat batch of configurations among the poses, where designs differ.
+        """
+        mechanism, channels, sources, forces = self.study.mechanism, self.question.whole, self.sources, self.forces
+        if rows is not None:
+            sources, forces = sources.take(rows), None if forces is None else forces.take(rows)
+        elastic = None if self.elasticity is None else self.elasticity.at(configuration, channels, rows)
+        names, slopes = sources.directions
+        by_name = derivatives(mechanism, configuration, channels, names, rates, elastic, forces)
+        offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
+        nominal = nominal_values(mechanism, configuration, channels, rates, forces)
+        moved = [k for k, name in enumerate(names) if name not in LOADS]
+        margins, margins_by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
+        return (
+            np.stack(np.broadcast_arrays(*nominal, offset[0])[:-1]),
+            FirstOrder(sources, _chained(slopes, by_name), offset),
+            FirstOrder(sources, _chained(slopes[:, moved], margins_by_name), margins), elastic,
+        )  # fmt: skip
+
+
+def _chained(slopes: Floats, by_name: Floats) -> Floats:
+    """Derivatives by components from those by names, (channels, names, poses), and the slopes of the sources."""
+    if slopes.ndim == 2:
+        return np.asarray(slopes @ by_name)
+    return np.asarray(np.einsum("znp,cnp->czp", slopes, by_name))
+
+
+def first_order(errors: Errors, also: Callable[[SolvedPoses], object] = lambda part: None) -> Task:
+    """The nominal mechanism and its linear error model at every pose, nan where it is not assembled.
+
+    Poses that do not hold the study's load, or of whose forces some are asked and not finite, are `NOT_HELD`. `also` is
+    called with the solved poses, part by part.
+    """
+    question, count, found = errors.question, errors.poses.count, evaluate(errors, also=also)
+    arrays = {name: np.ascontiguousarray(np.moveaxis(values, 0, -1)) for name, values in found.arrays.items()}
+    nominal, components = arrays["nominal"], arrays["components"]
+    offset, elastic, held = np.zeros(nominal.shape), None, np.ones(count, dtype=bool)
+    if errors.elasticity is not None:
+        elastic = Elastic(arrays["flexibility"], errors.elasticity.load)
+        offset, held = elastic.offset, elastic.held
+    channels = len(question.channels)
+    held &= np.isfinite(nominal[channels - len(question.columns) : channels]).all(axis=0)
+    assembled = np.isin(found.reason, (Reason.OK, Reason.LIMIT))
+    reason = np.where(assembled & ~held, np.int8(Reason.NOT_HELD), found.reason)
+    components[:, :, ~np.isin(reason, (Reason.OK, Reason.LIMIT))] = np.nan
+    model = model_of(question, FirstOrder(errors.sources, components, offset), nominal)
+    closing = FirstOrder(
+        errors.sources, arrays.get("closing", components[:0]), arrays.get("margins", np.zeros((0, count)))
+    )
+    return Task(
+        errors.study, errors.poses, question, errors.sources, reason, nominal[:channels], model, closing, elastic
+    )  # fmt: skip
