@@ -182,7 +182,9 @@ class GivenRows(Rows):
 
     @property
     def grid(self) -> tuple[int, ...]:
-        return (*self.lines, next(iter(self.values.values()), np.empty((1, 0))).shape[1])
+        # Listed poses of a structure give nothing.
+        columns = iter(self.values.values())
+        return (*self.lines, next(columns, np.zeros((1, 0 if self.number is None else len(self.number)))).shape[1])
 
     @property
     def names(self) -> tuple[str, ...]:
