@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,14 +31,14 @@ NOTABLE_MOMENT = 0.01
 # against inertia, friction holds every mechanism.
 OFTEN = 0.5
 _MOMENT = "moment without length"
-# What is said of poses by these columns: a kind of warning, words about a joint, and the least part of the poses.
+# What is said of poses by these columns of a joint, whose name stands for `JOINT`.
 _REMARKS = (
-    (_JAMS, "jammed", "friction in {} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
-     "forces are nan; a longer guide, a smaller offset or coefficient frees it", 0.0),
-    (_HOLDS, "self_locking", "friction holds what the loads would move, most of it in {}: the mechanism is "
-     "self-locking there, and the drives must push in either direction", OFTEN),
-    (_MOMENT, "incomplete", "{} bears a moment, which presses on both ends of its guide, and its friction counts the "
-     "force across alone; give its 'length'", 0.0),
+    (_JAMS, Remark("jammed", "in {number} of {count} poses friction in JOINT jams the mechanism: no effort of the drives "
+     "moves it on, and efforts and joint forces are nan; a longer guide, a smaller offset or coefficient frees it")),
+    (_HOLDS, Remark("self_locking", "in {number} of {count} poses friction holds what the loads would move, most of it "
+     "in JOINT: the mechanism is self-locking there, and the drives must push in either direction", least=OFTEN)),
+    (_MOMENT, Remark("incomplete", "in {number} of {count} poses JOINT bears a moment, which presses on both ends of "
+     "its guide, and its friction counts the force across alone; give its 'length'")),
 )  # fmt: skip
 
 
@@ -116,11 +116,9 @@ class JointFriction:
     def marks(self, arrays: Mapping[str, Floats]) -> dict[Remark, Flags]:
         """Poses of which something is to be said."""
         return {
-            Remark(kind, f"in {{number}} of {{count}} poses {text.format(name)}", least=least): np.equal(
-                arrays[what], k
-            )
+            replace(remark, words=remark.words.replace("JOINT", name)): np.equal(arrays[what], k)
             for k, name in enumerate(self.names, 1)
-            for what, kind, text, least in _REMARKS
+            for what, remark in _REMARKS
         }
 
     def jammed(self, arrays: Mapping[str, Floats]) -> Flags:

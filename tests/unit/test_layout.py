@@ -116,7 +116,8 @@ def calls() -> list[ast.Call]:
     """Every warning that the package makes, of a pose too."""
     trees = (ast.parse(path.read_text(encoding="utf-8")) for path in ROOT.rglob("*.py"))
     nodes = (node for tree in trees for node in ast.walk(tree))
-    return [node for node in nodes if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("Caution", "Remark")]
+    makers = {"Caution", "Remark"}
+    return [node for node in nodes if isinstance(node, ast.Call) and getattr(node.func, "id", "") in makers]
 
 
 def test_every_warning_is_of_a_declared_kind_and_every_kind_has_a_warning_and_a_page():
