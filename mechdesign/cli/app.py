@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from copy import copy
 from importlib import import_module
-from inspect import Parameter, Signature
-from pathlib import Path
+from inspect import Signature
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from mechdesign.cli import options as given
 from mechdesign.cli import process
-from mechdesign.cli.options import Options
+from mechdesign.cli.options import Options, parameters, with_kinds
 from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted, StudyError
 
-_OPTIONS = {field.name for field in dataclasses.fields(Options)}
 # Typer brings its own Click, or is built on the one that is installed.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
@@ -118,22 +114,22 @@ class _Command(TyperCommand):
     """A command whose `--report` may stand without a kind."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        return super().parse_args(ctx, given.with_kinds(args))
+        return super().parse_args(ctx, with_kinds(args))
 
 
-def _add(name: str, action: str, takes: Sequence[Parameter], short: str, long: str) -> None:
-    """Add a command: its function, ``module.function`` of this package, its arguments and options, and its help."""
+def _add(name: str, action: str, takes: str, short: str, long: str) -> None:
+    """Add a command: its function, ``module.function`` of this package, what it takes, and its help."""
     module, _, function = action.partition(".")
 
     def command(**said: Any) -> None:
         with _guard():
-            options = Options(command=name, **{key: said.pop(key) for key in list(said) if key in _OPTIONS})
+            options = Options(name, **said)
             with _placed(options):
-                answer: Callable[..., int] = getattr(import_module(f"mechdesign.cli.{module}"), function)
-                raise typer.Exit(answer(options, **said))
+                answer: Callable[[Options], int] = getattr(import_module(f"mechdesign.cli.{module}"), function)
+                raise typer.Exit(answer(options))
 
-    command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
-    app.command(name, cls=_Command, short_help=short, help=long)(command)
+    command.__signature__ = Signature([*parameters(name, takes)])  # type: ignore[attr-defined]
+    app.command(name, cls=_Command, short_help=short or None, help=long)(command)
 
 
 def _placed(options: Options) -> AbstractContextManager[None]:
@@ -146,131 +142,68 @@ def _placed(options: Options) -> AbstractContextManager[None]:
     return on(named(options.executor, options.jobs))
 
 
+_LOOKS = "no_plots formats style"
+_COMMON = f"overrides seed jobs json quiet strict {_LOOKS} allow_files report"
+_ALONE = f"path out {_COMMON}"
+_MANY = f"paths out {_COMMON} animate junit fail_fast"
+_OWN = {
+    "kinematics": "animate all_modes before",
+    "workspace": "before",
+    "optimize": "resume executor",
+    "reliability": "executor",
+    "sensitivities": "executor",
+}
 for _name, _question in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
-    _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
+    _takes = f"{_ALONE} {_OWN.get(_name, '')}"
     _add(_name, "execution.question", _takes, _question.question, f"{_question.question} {_question.answer}")
 _add(
-    SWEEP.name,
-    "sweep.sweep",
-    (
-        *given.COMMON[:2], *given.MATRIX, *given.COMMON[2:],
-        given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
-    ),
-    SWEEP.question,
-    f"{SWEEP.question} {SWEEP.answer}",
+    SWEEP.name, "sweep.sweep",
+    f"path out vary method samples cases results maximize minimize sort {_COMMON} junit resume executor shard",
+    SWEEP.question, f"{SWEEP.question} {SWEEP.answer}",
 )  # fmt: skip
 _add(
-    "run",
-    "batch.run",
-    (
-        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME, given.VERIFY, given.EXECUTOR, given.SHARD,
-    ),
+    "run", "batch.run", f"{_MANY} resume verify executor shard",
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
 )  # fmt: skip
 _add(
-    MERGE,
-    "batch.run",
-    (
-        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.EXECUTOR,
-    ),
+    MERGE, "batch.run", f"{_MANY} executor",
     "Put together what runs with --shard computed.",
     "Put together what runs with --shard computed: what a run without it gives, byte by byte. What they changed, "
     "such as by --set and --seed, is kept with them; --out is given again.",
 )  # fmt: skip
 _add(
-    "check",
-    "check.check",
-    (
-        given.STUDIES,
-        given.OUT_DRAWINGS,
-        given.OVERRIDES,
-        given.QUIET,
-        given.STRICT,
-        given.NO_PLOTS,
-        given.FORMAT,
-        given.STYLE,
-        given.ALLOW_FILES,
-    ),
+    "check", "check.check", f"paths out overrides quiet strict {_LOOKS} allow_files",
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
-)
+)  # fmt: skip
 _add(
-    "export",
-    "export.export",
-    (
-        given.STUDY,
-        given.TO,
-        given.AT,
-        given.RATE,
-        given.PAPER,
-        given.OUT_EXPORT,
-        given.OVERRIDES,
-        given.QUIET,
-        given.STRICT,
-        given.ALLOW_FILES,
-    ),
+    "export", "export.export", "path to! at rate paper out overrides quiet strict allow_files",
     "Write a file for other tools: parts to cut, a drawing, a simulator's model.",
     "Write a file for other tools: every link as a part to cut at 1:1, the mechanism as a drawing, the layers in which "
-    "nothing meets, a drawing sheet, a model for MuJoCo, curves, the motion for a controller, the study as "
-    "JSON.",
-)
+    "nothing meets, a drawing sheet, a model for MuJoCo, curves, the motion for a controller, the study as JSON.",
+)  # fmt: skip
 _add(
-    "watch",
-    "watch.watch",
-    (
-        given.FILE, given.COMMANDS, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET, given.STRICT,
-        given.NO_PLOTS, given.FORMAT, given.STYLE, given.REPORT, given.ANIMATE, given.ALLOW_FILES,
-    ),
+    "watch", "watch.watch",
+    f"path! commands out overrides seed jobs quiet strict {_LOOKS} report animate allow_files",
     "Answer a study's questions again whenever it is saved.",
     "Answer a study's questions, or only some, now and whenever it or a file that it names is saved. Mistakes are "
     "told, and it goes on until Ctrl-C.",
 )  # fmt: skip
 _add(
-    "compare",
-    "compare.compare",
-    (
-        given.OLD, given.NEW, given.RTOL, given.ATOL, given.JUNIT, given.JSON, given.QUIET,
-    ),
+    "compare", "compare.compare", "old! new! rtol atol junit json quiet",
     "Say what moved between two folders of results.",
     "Say what moved between two folders of results, of one command, a study or many: rows are matched by their poses "
     "and keys, folders by their paths. Exit codes: 0 equal within the tolerance, 1 something moved, is missing or is "
     "new, 2 there is nothing to compare.",
 )  # fmt: skip
-
-
-@app.command("new")
-def new(
-    template: Annotated[
-        str | None,
-        given.TEMPLATE,
-    ] = None,
-) -> None:
-    """Print a commented study to start from."""
-    with _guard():
-        from mechdesign.cli.terminal import emit
-        from mechdesign.study import template as template_text
-
-        emit(template_text(template) if template else template_text())
-
-
-@app.command("import", short_help="Make a study of another tool's file or share address.")
-def import_(
-    source: Annotated[str, given.SOURCE],
-    out: Annotated[Path | None, given.OUT_STUDY] = None,
-    drive: Annotated[list[str] | None, given.DRIVE] = None,
-    unit: Annotated[str | None, given.UNIT] = None,
-    scale: Annotated[float | None, given.SCALE] = None,
-) -> None:
-    """Make a commented study that runs of a mechanism that PMKS+, Linkage or pylinkage has saved, of tables of joints
-    and links, or of a DXF sketch. Nothing is fetched: a share address holds the whole mechanism.
-    """
-    with _guard():
-        from mechdesign.cli.importing import import_study
-
-        import_study(source, out, drive or (), unit, scale)
+_add("new", "importing.new", "template", "", "Print a commented study to start from.")
+_add(
+    "import", "importing.import_study", "source! out drive unit scale",
+    "Make a study of another tool's file or share address.",
+    "Make a commented study that runs of a mechanism that PMKS+, Linkage or pylinkage has saved, of tables of joints "
+    "and links, or of a DXF sketch. Nothing is fetched: a share address holds the whole mechanism.",
+)  # fmt: skip
 
 
 def _words(incomplete: str) -> list[str]:

@@ -99,13 +99,13 @@ def source_of(path: Path | None, options: Options) -> StudySource:
     return source(path, options)
 
 
-def run(options: Options, paths: Sequence[Path] | None) -> int:
+def run(options: Options) -> int:
     """Answer every question of the studies, or repeat what manifests say; returns the exit code."""
     if options.verify is None:
-        return answer_all(paths, options)
+        return answer_all(options.paths, options)
     from mechdesign.cli.compare import verify
 
-    return verify(paths, options)
+    return verify(options)
 
 
 @one_thread()
@@ -187,7 +187,7 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
         if isinstance(changes, list) and isinstance(seed, int):
             if changes:
                 terminal.say(f"{label}: as its shards, with {', '.join(map(str, changes))}", quiet=options.quiet)
-            return replace(options, overrides=tuple(map(str, changes)), seed=seed)
+            return replace(options, overrides=[*map(str, changes)], seed=seed)
     return options
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -28,11 +28,11 @@ from mechdesign.work.threads import one_thread
 
 
 @one_thread()
-def check(options: Options, paths: Sequence[Path] | None) -> int:
+def check(options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     worst = 0
     owners: dict[str, Path | None] = {}
-    files = study_files(paths)
+    files = study_files(options.paths)
     for path in files:
         try:
             study = load_source(source_of(path, options), options)

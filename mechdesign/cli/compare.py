@@ -34,7 +34,7 @@ _SHOWN = 12  # digits of a hash
 _EXACTLY = Allowance(0.0, 0.0)
 
 
-def compare(options: Options, old: Path, new: Path, rtol: float, atol: float | None) -> int:
+def compare(options: Options) -> int:
     """Compare two folders of results; returns 1 where something moved beyond its tolerance, is missing or new, else 0.
 
     Raises
@@ -44,15 +44,16 @@ def compare(options: Options, old: Path, new: Path, rtol: float, atol: float | N
     OutputError
         If a file cannot be written.
     """
+    rtol, atol = options.rtol, options.atol
     if not (math.isfinite(rtol) and math.isfinite(atol or 0)):
         raise StudyError("--rtol and --atol take numbers from 0 on")
     if options.junit is not None:
         check_replaceable(options.junit)
-    return _tell(comparison.compare(old, new, Allowance(rtol, atol)), "compare", options)
+    return _tell(comparison.compare(options.old, options.new, Allowance(rtol, atol)), "compare", options)
 
 
 @one_thread()
-def verify(studies: Sequence[Path] | None, options: Options) -> int:
+def verify(options: Options) -> int:
     """Repeat the computations of manifests, compare the tables and judge them; the exit code is 1 if one differs.
 
     It is that of the run as well, where a requirement is not met or a pose cannot be assembled.
@@ -67,7 +68,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     path = options.verify
     beside = {name: getattr(options, name) for name in ("command", "jobs", "json", "quiet", "junit", "allow_files")}
     alone = Options(verify=path, **beside)
-    if studies or dataclasses.replace(options, overrides=options.overrides or ()) != alone:
+    if dataclasses.replace(options, paths=options.paths or None, overrides=options.overrides or None) != alone:
         raise StudyError(
             "--verify repeats what a manifest says; beside it stand no studies, and no options but --jobs, --junit, "
             "--json, --quiet and --allow-files"

@@ -346,17 +346,17 @@ def drawing_ahead(options: Options) -> AbstractContextManager[None]:
     return ahead.importing(PICTURES, worker_count(options.jobs))
 
 
-def question(options: Options, path: Path | None) -> int:
+def question(options: Options) -> int:
     """Answer one question of a study; returns the exit code."""
-    return ask(path, options).exit_code
+    return ask(options).exit_code
 
 
 @one_thread()
-def ask(path: Path | None, options: Options) -> Outcome:
+def ask(options: Options) -> Outcome:
     """Load a study, answer the question that is the command, write and show the result."""
     command = options.command
     with drawing_ahead(options):
-        study = load_study(path, options)
+        study = load_study(options.path, options)
         directory = place(folder(study, command, options), options)
         with owned(directory):
             try:

@@ -20,18 +20,16 @@ from mechdesign.work.threads import one_thread
 
 
 @one_thread()
-def export(
-    options: Options, path: Path | None, to: str, at: str | None, rate: str | None, paper: str | None
-) -> int:  # fmt: skip
+def export(options: Options) -> int:
     """Write one file of a study in a pose, with a rate or on a paper (see `PosedStudy`); returns the exit code."""
-    declared = export_named(to)
-    study = load_study(path, options)
+    to, declared = options.to, export_named(options.to)
+    study = load_study(options.path, options)
     target = options.out or RESULTS / study.label / "export"
     if options.out is None or target.is_dir() or target.suffix != Path(to).suffix:
         target /= to
     check_writable(target.parent)
     check_replaceable(target, read_by(study))
-    view = PosedStudy(study, at, rate, paper)
+    view = PosedStudy(study, options.at, options.rate, options.paper)
     content = declared.make(view)
     warnings = content.warnings + declared.ignored(view)
     for warning in warnings:

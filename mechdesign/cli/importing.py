@@ -1,20 +1,24 @@
-"""The command `import`: a study of another tool's file, on stdout or in a file."""
+"""Studies to begin with: `new` prints a template, `import` makes one of another tool's file."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from pathlib import Path
 
+from mechdesign.cli.options import Options
 from mechdesign.cli.terminal import emit, emit_words, say
 from mechdesign.errors import OutputError, StudyError
 from mechdesign.files import replace
 from mechdesign.importing.conversion import conversion
+from mechdesign.study import template
 
 
-def import_study(
-    source: str, out: Path | None, drives: Sequence[str], unit: str | None, scale: float | None
-) -> None:  # fmt: skip
+def new(options: Options) -> int:
+    """Print a commented study to start from."""
+    emit(template(options.template) if options.template else template())
+    return 0
+
+
+def import_study(options: Options) -> int:
     """Convert a source; a study that is there already is kept.
 
     Raises
@@ -24,17 +28,19 @@ def import_study(
     OutputError
         If it cannot be written.
     """
+    out = options.out
     if out is not None and os.path.lexists(out):
         raise StudyError(f"{out} is there already; give --out another name")
-    text, undecided = conversion(source, drives=drives, unit=unit, scale=scale)
+    text, undecided = conversion(options.source, drives=options.drive or (), unit=options.unit, scale=options.scale)
     for reason in undecided:
         say(f"to move before it runs: {reason}")
     if out is None:
         emit(text)
-        return
+        return 0
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         replace(out, [text.encode()])
     except OSError as error:
         raise OutputError(f"{out}: could not be written: {error.strerror or error}") from error
     emit_words(f"{out}: written{'' if undecided else f'; mechdesign kinematics {out} runs it'}\n")
+    return 0

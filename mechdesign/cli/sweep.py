@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,7 @@ from mechdesign.report.writer import write_file
 from mechdesign.study.text.document import in_yaml, read
 
 
-def _overrides(
-    study: Path | None, *, vary: Sequence[str] | None, method: str | None, samples: int | None, cases: Path | None,
-    results: Sequence[str] | None, maximize: Sequence[str] | None, minimize: Sequence[str] | None, sort: bool,
-) -> Iterator[str]:  # fmt: skip
+def _overrides(options: Options) -> Iterator[str]:
     """The options that make the cases as overrides of the section ``matrix``; those left out are the study's.
 
     New cases replace the study's whole design of cases.
@@ -34,6 +31,7 @@ def _overrides(
     StudyError
         If a text is no entry with its values, or both entries and a file are given.
     """
+    study, vary, cases = options.path, options.vary, options.cases
     if vary and cases is not None:
         raise StudyError("--vary and --cases contradict each other: the cases of a file are as they are")
     if vary or cases is not None:
@@ -51,10 +49,12 @@ def _overrides(
         # The built-in study lies elsewhere.
         file = os.path.relpath(cases, beside) if here else os.path.abspath(cases)
         yield f"matrix.cases={in_yaml(file)}"
-    if maximize or minimize:
+    if options.maximize or options.minimize:
         yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
-    lists = {"results": results, "best.maximize": maximize, "best.minimize": minimize}
-    values: dict[str, Any] = {"method": method, "samples": samples, "best.sort": sort or None}
+    lists = {"results": options.results, "best.maximize": options.maximize, "best.minimize": options.minimize}
+    values: dict[str, Any] = {
+        "method": options.method, "samples": options.samples, "best.sort": options.sort or None
+    }  # fmt: skip
     values |= {
         key: [name.strip() for text in texts for name in text.split(",")] for key, texts in lists.items() if texts
     }
@@ -82,14 +82,13 @@ def _as_typed(error: StudyError) -> StudyError:
     return StudyError([replace(problem, file=written.sub(r"--\1", problem.file)) for problem in error.problems])
 
 
-def sweep(options: Options, path: Path | None, **matrix: Any) -> int:
+def sweep(options: Options) -> int:
     """Answer the cases that a study and options make; returns the highest exit code of them."""
-    outcome, label = None, name_of(path)
+    outcome, label = None, name_of(options.path)
     if options.junit is not None:
         check_replaceable(options.junit)
     try:
-        changes = (*(options.overrides or ()), *_overrides(path, **matrix))
-        outcome = ask(path, replace(options, overrides=changes))
+        outcome = ask(replace(options, overrides=[*(options.overrides or ()), *_overrides(options)]))
         return outcome.exit_code
     except KeyboardInterrupt as stop:
         words = str(stop) or "interrupted"

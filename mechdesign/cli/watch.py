@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +21,7 @@ _LOOK = 0.2  # seconds between two checks of the files
 _NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\b")
 
 
-def watch(options: Options, path: Path, commands: Sequence[str] | None) -> int:
+def watch(options: Options) -> int:
     """Answer a study's questions, or only some of them, now and after every change, until an interrupt.
 
     Mistakes are told, and end nothing. Returns 0, or 130 if it was computing when it was interrupted; a
@@ -32,7 +32,9 @@ def watch(options: Options, path: Path, commands: Sequence[str] | None) -> int:
     StudyError
         If there is no such question, or the study is no file.
     """
-    for command in commands or ():
+    path, commands = options.path, options.commands or ()
+    assert path is not None
+    for command in commands:
         if command not in QUESTIONS:
             listed = ", ".join(QUESTIONS)
             raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {listed}")
@@ -45,7 +47,7 @@ def watch(options: Options, path: Path, commands: Sequence[str] | None) -> int:
     with suppress(KeyboardInterrupt):
         while True:
             contents = _contents(files)
-            if batch.answer_all([path], options, commands or ()) == Interrupted.exit_code:
+            if batch.answer_all([path], options, commands) == Interrupted.exit_code:
                 return Interrupted.exit_code
             files = {path, *_named(path, options)}
             contents = _contents(files - contents.keys()) | {file: contents[file] for file in files & contents.keys()}

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign import study as studies
 from mechdesign.errors import AssemblyError, MechdesignError, StudyError, cut
 from mechdesign.importing.draft import Draft
 from mechdesign.importing.formats import FORMATS
@@ -16,6 +15,7 @@ from mechdesign.importing.sketch import FileDrive, FileSketch
 from mechdesign.importing.source import ImportedText
 from mechdesign.importing.writer import STEPS, Writer
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.study.loading import load_bytes
 
 # Most links that move against each other.
 MOST_LINKS = 200
@@ -163,7 +163,7 @@ def _settled(draft: Draft, source: str) -> tuple[str, tuple[str, ...]]:
     writer, spans = Writer(draft), {name: draft.span(name) for name in draft.drives}
     text = writer.text(source, spans)
     try:
-        study = studies.load(None, (), None, text=text)
+        study = load_bytes(text.encode(errors="surrogateescape"), None)
     except StudyError as error:
         reasons = tuple(f"{problem.key}: {problem.message}" for problem in error.problems[:3])
         if all(problem.key == "mechanism.sketch" for problem in error.problems):

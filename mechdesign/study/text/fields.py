@@ -6,15 +6,13 @@ reader gets a `Context` and raises with a message for a designer; its JSON Schem
 
 from __future__ import annotations
 
-import ast
-import inspect
 import math
 import re
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import islice, pairwise
+from itertools import islice
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -23,6 +21,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from mechdesign.docstrings import docstrings
 from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.notation import ExpressionError
@@ -425,21 +424,12 @@ _EXAMPLE = " Example: "
 
 @cache
 def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
-    """Docstrings under the attributes of a module's models, by class and attribute; ``|NAME|`` is a constant of it.
-
-    They are read where a reference or a JSON Schema is asked for only: pydantic would read them at every start.
-    """
+    """What a module says of the keys of its models, by class and attribute; ``|NAME|`` is a constant of it."""
     texts = {}
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
-    for holder in (node for node in tree.body if isinstance(node, ast.ClassDef)):
-        for key, below in pairwise(holder.body):
-            if not isinstance(key, ast.AnnAssign) or not isinstance(key.target, ast.Name):
-                continue
-            if not isinstance(below, ast.Expr) or not isinstance(below.value, ast.Constant):
-                continue
-            text, *examples = " ".join(str(below.value.value).split()).split(_EXAMPLE)
-            text = _CONSTANT.sub(lambda name: str(getattr(sys.modules[module], name[1])), text)
-            texts[holder.name, key.target.id] = KeyText(quoted(text), tuple(examples))
+    for place, docstring in docstrings(module).items():
+        text, *examples = docstring.split(_EXAMPLE)
+        text = _CONSTANT.sub(lambda name: str(getattr(sys.modules[module], name[1])), text)
+        texts[place] = KeyText(quoted(text), tuple(examples))
     return texts
 
 
