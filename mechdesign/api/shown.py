@@ -19,7 +19,7 @@ from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import Verdict, requirements
 from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.study.text.fields import shown
+from mechdesign.study.text.reading import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -164,24 +164,17 @@ def _tell(total: Comparison, command: str, options: Options) -> int:
 
 def _junit(total: Comparison, command: str) -> str:
     """JUnit XML: a suite for each folder, with a case for each table and one for all other differences."""
-    from junitparser import Failure, JUnitXml, TestCase, TestSuite
+    from junitparser import Failure, TestCase
 
-    report = JUnitXml("mechdesign")
-    moved = [(difference.folder, difference.table) for difference in total.differences]
-    cases = dict.fromkeys([*total.cases, *moved])
-    for folder in dict.fromkeys(folder for folder, _ in cases):
-        suite = TestSuite(folder)
-        for table in [name for where, name in cases if where == folder]:
-            case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
-            wrong = [
-                difference
-                for difference in total.differences
-                if (difference.folder, difference.table) == (folder, table)
-            ]
-            if wrong:
-                failure = Failure(str(wrong[0]), type_="difference")
-                failure.text = "\n".join(map(str, wrong))
-                case.result = [failure]
-            suite.add_testcase(case)
-        report.add_testsuite(suite)
-    return junit_text(report)
+    wrong: dict[tuple[str, str], list[Difference]] = {place: [] for place in total.cases}
+    for difference in total.differences:
+        wrong.setdefault((difference.folder, difference.table), []).append(difference)
+    suites: dict[str, list[TestCase]] = {}
+    for (folder, table), differences in wrong.items():
+        case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
+        if differences:
+            failure = Failure(str(differences[0]), type_="difference")
+            failure.text = "\n".join(map(str, differences))
+            case.result = [failure]
+        suites.setdefault(folder, []).append(case)
+    return junit_text(suites)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Rows
     from rich.progress import TaskID
 
+_GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
 _OFTEN = 0.1  # seconds between two progress notes, and between two updates of the table
 _LAST = 5  # number of questions shown that were answered last
 _WIDTH = 16  # of a bar, in characters
@@ -34,7 +35,8 @@ class ProgressNote:
     @property
     def announcement(self) -> str:
         """What is said of a long stage when it begins, even without a terminal; else empty."""
-        return terminal.announced(self.total, self.stage) if not self.done else ""
+        great = self.total >= _GREAT and not self.done
+        return f"{self.total} {self.stage} to compute; Ctrl-C ends it" * great
 
 
 class Reported(Progress):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from mechdesign.commands import MAX_JOBS, MERGE, QUESTIONS, SWEEP
-from mechdesign.docstrings import docstrings
+from mechdesign.docstrings import key_texts
 from mechdesign.errors import StudyError
 from mechdesign.files import FORMATS, formats_of
 
@@ -240,12 +240,12 @@ _METAVARS = {"export": {"out": "PATH"}, "import": {"out": "FILE"}}
 def parameters(command: str, names: str) -> Iterator[Parameter]:
     """What a command takes: fields of `Options`, one behind the other; ``!`` follows those that may not be left out."""
     fields = {field.name: field for field in dataclasses.fields(Options)}
-    texts, own = docstrings(__name__), _MEANINGS.get(command, {})
+    texts, own = key_texts(__name__), _MEANINGS.get(command, {})
     for word in names.split():
         name = word.rstrip("!")
         field, flag = fields[name], _FLAGS.get(name, f"--{name.replace('_', '-')}")
         kind, describe = get_args(field.type) or (field.type, _flag())
-        described = describe(flag, own.get(name, texts["Options", name]))
+        described = describe(flag, own.get(name, texts["Options", name].text))
         described.metavar = _METAVARS.get(command, {}).get(name, described.metavar)
         default = Parameter.empty if word != name else field.default
         annotated: Any = Annotated

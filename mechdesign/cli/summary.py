@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from itertools import groupby
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mechdesign.cli.outcome import Outcome
@@ -13,7 +12,7 @@ from mechdesign.experiments.columns import SUMMARY
 from mechdesign.results import Table
 
 if TYPE_CHECKING:
-    from junitparser import JUnitXml
+    from junitparser import TestCase
 
 _SKIPPED = re.compile(r'(?<=") skipped="\d+"')
 
@@ -45,35 +44,41 @@ def junit(outcomes: Sequence[Outcome]) -> str:
 
     A requirement that is not met is a failure, a command without a result an error, a command not reached skipped.
     """
-    from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+    from junitparser import Error, Failure, Skipped, TestCase
+
+    suites: dict[str, list[TestCase]] = {}
+    for outcome in outcomes:
+        study = printable(outcome.study)
+        name, cases = f"mechdesign.{study}".rstrip("."), suites.setdefault(study or "mechdesign", [])
+        case = TestCase(outcome.command or "run", classname=name, time=round(outcome.seconds, 3))
+        if outcome.exit_code > 1:
+            failed = printable_lines(outcome.failed)
+            error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {outcome.exit_code}")
+            error.text = failed
+            case.result = [error]
+        if outcome.left:
+            case.result = [Skipped("the run ended before it")]
+        if outcome.warnings:
+            case.system_out = "\n".join(f"warning: {printable(str(warning))}" for warning in outcome.warnings)
+        cases.append(case)
+        for verdict in outcome.verdicts:
+            case = TestCase(f"{outcome.command}: {printable(verdict.requirement)}", classname=name, time=0)
+            if not verdict.met:
+                case.result = [Failure(printable(str(verdict)), type_="requirement")]
+            cases.append(case)
+    return junit_text(suites)
+
+
+def junit_text(suites: Mapping[str, Sequence[TestCase]]) -> str:
+    """The text of a JUnit report of some suites, with its counts."""
+    from junitparser import JUnitXml, TestSuite
 
     report = JUnitXml("mechdesign")
-    for study, group in groupby(outcomes, key=lambda outcome: outcome.study):
-        study = printable(study)
-        suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
-        for outcome in group:
-            case = TestCase(outcome.command or "run", classname=name, time=round(outcome.seconds, 3))
-            if outcome.exit_code > 1:
-                failed = printable_lines(outcome.failed)
-                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {outcome.exit_code}")
-                error.text = failed
-                case.result = [error]
-            if outcome.left:
-                case.result = [Skipped("the run ended before it")]
-            if outcome.warnings:
-                case.system_out = "\n".join(f"warning: {printable(str(warning))}" for warning in outcome.warnings)
+    for name, cases in suites.items():
+        suite = TestSuite(name)
+        for case in cases:
             suite.add_testcase(case)
-            for verdict in outcome.verdicts:
-                case = TestCase(f"{outcome.command}: {printable(verdict.requirement)}", classname=name, time=0)
-                if not verdict.met:
-                    case.result = [Failure(printable(str(verdict)), type_="requirement")]
-                suite.add_testcase(case)
         report.add_testsuite(suite)
-    return junit_text(report)
-
-
-def junit_text(report: JUnitXml) -> str:
-    """The text of a JUnit report, with its counts."""
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
     # Jenkins' schema (junit-10.xsd of its xunit plugin) allows this attribute in suites only.

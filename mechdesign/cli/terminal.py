@@ -25,7 +25,6 @@ _PIECE = 1 << 20  # characters copied at a time from a file
 _NAMES = 6  # most names listed of columns that do not fit
 _HEAD = 18  # characters in a line of a column's head, unless a word is longer
 _WORDS = re.compile(r"(?<= )(?=[^ ])|(?<=\.)(?=[^\W\d])")  # where the words of a column's name begin
-_GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
 _VERDICT = re.compile(r"(?<=:)(\s+)(met|NOT\s+MET)(?=,\s+worst\s)")
 _GREEN, _RED = "\x1b[32m", "\x1b[1;31m"
 _PLAIN = "\x1b[0m"
@@ -173,8 +172,3 @@ def lively() -> bool:
     """Whether stderr is a terminal that can show a live display, and not the log of a CI server."""
     ci = os.environ.get("CI", "").lower() not in ("", "0", "false")
     return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
-
-
-def announced(total: int, noun: str) -> str:
-    """Announcement of a stage of `_GREAT` steps or more; empty for smaller ones."""
-    return f"{total} {noun} to compute; Ctrl-C ends it" if total >= _GREAT else ""

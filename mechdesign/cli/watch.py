@@ -60,29 +60,14 @@ def watch(options: Options) -> int:
 
 
 def _await_change(contents: dict[Path, bytes | None]) -> None:
-    """Return when a file has changed and then stays the same for two checks: an editor may still be writing."""
-    stamps = _stamps(contents)
-    changed = _contents(contents) != contents
+    """Return when a file has changed and is the same at the next look: an editor may still be writing."""
+    now = contents
     while True:
         time.sleep(_LOOK)
         interrupts.check()
-        now = _stamps(contents)
-        if now == stamps and changed:
+        before, now = now, _contents(contents)
+        if now == before != contents:
             return
-        if now != stamps:
-            stamps, changed = now, _contents(contents) != contents
-
-
-def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
-    """Inode, size and time of each file, which show a change without reading it; None if it is missing."""
-    stamps: list[tuple[int, int, int] | None] = []
-    for file in files:
-        try:
-            status = file.stat()
-            stamps.append((status.st_ino, status.st_size, status.st_mtime_ns))
-        except OSError:
-            stamps.append(None)
-    return stamps
 
 
 def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:

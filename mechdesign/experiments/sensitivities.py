@@ -24,7 +24,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted, value_at
-from mechdesign.study.text.fields import Context, read_number, shown
+from mechdesign.study.text.reading import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
 from mechdesign.study.variants import Changes, entry_unit
 from mechdesign.work.threads import one_thread

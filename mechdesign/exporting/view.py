@@ -22,7 +22,7 @@ from mechdesign.questions.kinematics.question import KinematicQuestion
 from mechdesign.questions.kinematics.values import KinematicValues
 from mechdesign.questions.poses import pose_in_words, study_poses
 from mechdesign.study import Study
-from mechdesign.study.text.fields import Context, read_number
+from mechdesign.study.text.reading import Context, read_number
 
 # Width of links of a study without plates, as a part of the mechanism's size.
 WIDTH = 0.08

@@ -22,7 +22,7 @@ from mechdesign.study import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import Document, dotted, plain
-from mechdesign.study.text.fields import shown
+from mechdesign.study.text.reading import shown
 from mechdesign.work.threads import one_thread
 
 # Most families that are kept.

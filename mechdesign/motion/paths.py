@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.text.fields import MIN_NUMBER
+from mechdesign.study.text.reading import MIN_NUMBER
 
 # Pieces of a spline between two of its points whose lengths are added up.
 SPLINE_PIECES = 64

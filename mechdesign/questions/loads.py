@@ -16,7 +16,7 @@ from mechdesign.motion.motion import in_study_units
 from mechdesign.motion.rows import TIME, PoseNumbers
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
-from mechdesign.study.text.fields import MAX_NUMBER
+from mechdesign.study.text.reading import MAX_NUMBER
 from mechdesign.study.text.units import Amount
 
 

@@ -7,6 +7,7 @@ from importlib import import_module
 from inspect import getdoc
 from itertools import chain
 
+from mechdesign.docstrings import quoted
 from mechdesign.errors import EXIT_CODES
 from mechdesign.functions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
@@ -14,7 +15,6 @@ from mechdesign.mechanism.configuration import REASONS
 from mechdesign.reference import keys, synonyms, tables
 from mechdesign.reference.entries import Entry
 from mechdesign.statistics import STATISTICS as WORDS
-from mechdesign.study.text.fields import quoted
 from mechdesign.study.text.forms import TERMS
 from mechdesign.study.text.unit_table import listed
 

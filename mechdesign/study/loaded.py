@@ -22,8 +22,8 @@ from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.schema.study_file import override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.text.document import Document, KeyPath, read
-from mechdesign.study.text.fields import shown
 from mechdesign.study.text.inputs import Folder, files
+from mechdesign.study.text.reading import shown
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units
 

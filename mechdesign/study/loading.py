@@ -33,9 +33,10 @@ from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.study_file import annotation_of, keys_at, model_of, override
 from mechdesign.study.text.document import MAX_BYTES, Document, plain, read
-from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
+from mechdesign.study.text.fields import NAME
 from mechdesign.study.text.given import override_texts, plain_data
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import LOST, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread

@@ -17,8 +17,8 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
 from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, Sweep
 from mechdesign.study.text.csv_files import read_table
-from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import APART
 from mechdesign.study.text.tables import table_of
 from mechdesign.study.timed import number_of_instants, program
 

@@ -12,8 +12,8 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.text.csv_files import read_table
-from mechdesign.study.text.fields import APART
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import APART
 from mechdesign.study.text.tables import table_of
 
 # Part of the whole time below which that of a segment is a slip.

@@ -11,8 +11,8 @@ from mechdesign.reference.keys import Key, keys
 from mechdesign.region import regions
 from mechdesign.study.schema.study_file import schema
 from mechdesign.study.text.document import read
-from mechdesign.study.text.fields import Context
 from mechdesign.study.text.forms import properties
+from mechdesign.study.text.reading import Context
 
 ENTRIES = entries()
 NAMES = dict.fromkeys(("r", "l", "l_min", "R", "r1"), 1.0)

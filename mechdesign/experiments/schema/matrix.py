@@ -19,8 +19,8 @@ from mechdesign.study.schema.variable import LIST_FORM, plainly, read_values
 from mechdesign.study.text import fields
 from mechdesign.study.text.csv_files import read_cells
 from mechdesign.study.text.document import KeyPath, read
-from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 
 # The column of a file of cases that names them.
 LABEL = "label"

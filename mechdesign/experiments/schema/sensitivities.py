@@ -10,11 +10,12 @@ from mechdesign.experiments.schema.matrix import Results
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import check_result
 from mechdesign.study.text import fields
+from mechdesign.study.text.reading import Context, failure, shown
 
 
-def _name(raw: Any, _context: fields.Context) -> str:
+def _name(raw: Any, _context: Context) -> str:
     if not isinstance(raw, str):
-        raise fields.failure(f"expected a parameter's name, such as r or stiffness.loads.P.0, not {fields.shown(raw)}")
+        raise failure(f"expected a parameter's name, such as r or stiffness.loads.P.0, not {shown(raw)}")
     return raw
 
 
@@ -43,7 +44,7 @@ class SensitivitiesSection(fields.Model):
     def _something(self) -> Self:
         for key, example in (("results", "kinematics.mu.min"), ("parameters", "r")):
             if not getattr(self, key):
-                raise fields.failure(f"{key!r} names nothing; name what there is, e.g. {key}: [{example}]")
+                raise failure(f"{key!r} names nothing; name what there is, e.g. {key}: [{example}]")
         return self
 
     def checked(self, checker: Checker) -> Self:

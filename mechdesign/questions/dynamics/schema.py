@@ -25,7 +25,7 @@ from mechdesign.study.schema.motions import Time
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 from mechdesign.study.text.units import Amount
 
 # Columns of a mechanism with friction, without units.

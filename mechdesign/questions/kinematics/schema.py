@@ -15,7 +15,7 @@ from mechdesign.study.schema.loads import Load, check_friction, check_loads
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 
 # Drawn where they are asked for.
 PICTURES = {"polygons": "velocity and acceleration polygons of a few poses, or of the listed ones"}

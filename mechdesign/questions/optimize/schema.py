@@ -16,7 +16,7 @@ from mechdesign.study.schema.conditions import Condition, Judged, check_result
 from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure, shown
+from mechdesign.study.text.reading import failure, shown
 from mechdesign.study.text.units import Amount
 
 _METHODS = {

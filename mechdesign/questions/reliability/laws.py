@@ -21,7 +21,7 @@ from pydantic import model_validator
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 
 # Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].
 SIGMAS = 3.0

@@ -16,7 +16,7 @@ from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, read_number
+from mechdesign.study.text.reading import Context, failure, read_number
 from mechdesign.study.text.units import Amount
 
 # Keys of each form of cross-section.

@@ -12,7 +12,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6

@@ -17,8 +17,8 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.elements import Keys, Written
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import Context
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Amount, kind_of
 

@@ -26,7 +26,7 @@ from mechdesign.study.building.elements import Written
 from mechdesign.study.building.joints import WrongJoint, check_named, line_of, refuse
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import APART
+from mechdesign.study.text.reading import APART
 from mechdesign.study.text.units import Amount
 
 # Rows from which a cubic spline is told.

@@ -14,7 +14,7 @@ from mechdesign.mechanism.elements.declared import Choice, Element, Notation, Si
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.study.building import notations
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 from mechdesign.study.text.units import Amount
 
 E = TypeVar("E", bound=Element)

@@ -8,8 +8,8 @@ from pydantic import BeforeValidator
 
 from mechdesign.errors import suggestion
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_rows, shown
 from mechdesign.study.text.inputs import file_of
+from mechdesign.study.text.reading import Context, failure, read_rows, shown
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod", "width", "layer")
 LINK_SHORT: tuple[fields.Form, ...] = (

@@ -28,8 +28,8 @@ from mechdesign.notation import ExpressionError
 from mechdesign.study.building import notations
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.inputs import file_of
+from mechdesign.study.text.reading import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.units import QuantityError, check_unit
 
 _BRANCHES = {

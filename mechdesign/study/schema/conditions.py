@@ -20,7 +20,7 @@ from mechdesign.statistics import Interval
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
 from mechdesign.terms import command_of, sum_of
 

@@ -12,7 +12,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import shown
+from mechdesign.study.text.reading import shown
 
 if TYPE_CHECKING:
     from mechdesign.experiments.schema.matrix import MatrixSection

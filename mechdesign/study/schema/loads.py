@@ -16,7 +16,7 @@ from mechdesign.motion.rows import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, read_expression, read_number
+from mechdesign.study.text.reading import Context, failure, read_expression, read_number, shown
 from mechdesign.study.text.units import Amount
 
 # Ending of a coordinate's name that stands for its velocity in an expression.
@@ -37,7 +37,7 @@ def read_quantity(raw: Any, context: Context) -> Quantity:
 def _read_force(raw: Any, context: Context) -> tuple[Quantity, ...]:
     parts = raw if isinstance(raw, list) else [raw]
     if not 1 <= len(parts) <= 2 or (isinstance(raw, list) and len(parts) == 1):
-        raise failure(f"a force is [fx, fy], or between two points one number, not {fields.shown(raw)}")
+        raise failure(f"a force is [fx, fy], or between two points one number, not {shown(raw)}")
     return tuple(read_quantity(part, context) for part in parts)
 
 

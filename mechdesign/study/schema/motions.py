@@ -12,8 +12,8 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.motion_laws import LAWS
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
 from mechdesign.study.text.inputs import file_of
+from mechdesign.study.text.reading import failure
 
 # More are no study that a person reads: a file holds them.
 MAX_SEGMENTS = 10_000

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_number, read_rows
 from mechdesign.study.text.inputs import file_of
+from mechdesign.study.text.reading import Context, failure, read_number, read_rows
 from mechdesign.study.text.units import Amount
 
 # Default numbers of poses: of a circle (steps of 5 deg); of a line or an arc, both ends included.

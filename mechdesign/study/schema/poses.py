@@ -15,7 +15,7 @@ from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.reading import failure
 
 # Default number of poses of a motion over time.
 INSTANTS = 181

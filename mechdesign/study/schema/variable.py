@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import in_yaml
-from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY
 
 LIST_FORM: fields.Form = {"type": "array", "items": {"title": "value"}}

@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.text.fields import MIN_NUMBER, Context, read_number
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import MIN_NUMBER, Context, read_number
 
 _PLAIN = Context()
 

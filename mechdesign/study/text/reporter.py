@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
-from mechdesign.study.text.fields import LOST, MAX_NAMED, Model, shown
+from mechdesign.study.text.fields import Model
+from mechdesign.study.text.reading import LOST, MAX_NAMED, shown
 from mechdesign.study.text.units import QuantityError, measure, text_of
 
 # Expected values by the types of pydantic's errors.

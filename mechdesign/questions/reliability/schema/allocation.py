@@ -17,7 +17,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, shown
+from mechdesign.study.text.reading import Context, failure, shown
 from mechdesign.study.text.units import QuantityError
 
 # Grades used by default, and the largest grade.

@@ -15,7 +15,7 @@ from mechdesign.questions.reliability.schema.variation import Dimension, Toleran
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, shown
+from mechdesign.study.text.reading import Context, failure, shown
 from mechdesign.study.text.units import kind_of
 
 PIN_MODELS = {

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationInfo, model_validator
 
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 from mechdesign.study.text.units import Amount
 
 # Endings of the names of positions, velocities and accelerations.

@@ -29,7 +29,7 @@ from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.poses import MotionSection, source_of
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 
 # Names as those of columns of dynamics.
 _LIKE_A_COLUMN = re.compile(r"_(effort|power|energy|force(_on_\w+)?)$|^shaking")

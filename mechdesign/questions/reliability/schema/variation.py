@@ -27,8 +27,8 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.csv_files import read_column
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
+from mechdesign.study.text.reading import Context, failure, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError
 
 # Components of a random load, and their kinds of quantity.
