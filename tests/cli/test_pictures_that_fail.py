@@ -22,7 +22,7 @@ def failing(*arguments, **options):
     ("module", "function", "lost", "name"),
     [
         ("questions.kinematics.figures.curves", "motion_curves", "motion.png", "motion"),
-        ("questions.kinematics.figures.paths", "paths_figure", "paths.png", "paths"),
+        ("questions.kinematics.figures.paths", "paths_panel", "paths.png", "paths"),
         ("report.figures.mechanism", "mechanism_picture", "mechanism.png", "mechanism.png"),
         ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
     ],

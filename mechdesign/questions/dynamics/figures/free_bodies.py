@@ -14,8 +14,8 @@ from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.report.figures import shapes, style
-from mechdesign.report.figures.callouts import arc, arrow
 from mechdesign.report.figures.arrows import RATES, Arrows
+from mechdesign.report.figures.callouts import arc, arrow
 from mechdesign.report.figures.drawing import draw, write
 from mechdesign.report.figures.framing import extent, fitting_windows
 from mechdesign.report.figures.joints import NOTHING
