@@ -210,7 +210,7 @@ class Answer(Result):
     def _drawn(self, name: str | None = None) -> Gallery:
         """All its pictures, and last the mechanism, or that of one name; none of an interrupted computation."""
         from mechdesign.report.figures import style
-        from mechdesign.report.figures.mechanism import mechanism_figure
+        from mechdesign.report.figures.mechanism import mechanism_picture
         from mechdesign.report.figures.pictures import figures
         from mechdesign.report.figures.rendering import Gallery
 
@@ -219,7 +219,7 @@ class Answer(Result):
         with style.context():
             drawn = figures(self.study, self, name=name)
             if name in (None, MECHANISM):
-                drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
+                drawn.add(MECHANISM, mechanism_picture, self.study, self.seen)
         return drawn
 
 

@@ -11,7 +11,7 @@ from mechdesign.exporting.drawing import Drawing, DrawnCircle, Path, Shape, Text
 from mechdesign.exporting.exports import drawings
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.plates import joined
-from mechdesign.report.figures.scene import ranks
+from mechdesign.report.figures.sweep import ranks
 
 # Height of letters as a part of the mechanism's size, and the least one (mm).
 LETTERS, SMALLEST = 0.04, 1.0

@@ -78,5 +78,5 @@ def paint(mechanism: Mechanism) -> dict[str, str]:
     """The colour of each link as red, green, blue and opacity, from 0 to 1."""
     return {
         link: " ".join(f"{int(color[k : k + 2], 16) / 255:.3g}" for k in (1, 3, 5)) + " 1"
-        for link, color in link_colors(mechanism).items()
+        for link, color in link_colors(mechanism.description).items()
     }

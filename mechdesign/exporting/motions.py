@@ -23,7 +23,7 @@ from mechdesign.questions.dynamics.schema import MAX_ROWS
 from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import pose_in_words, study_poses
-from mechdesign.report.figures.scene import ranks
+from mechdesign.report.figures.sweep import ranks
 from mechdesign.report.tables import to_csv
 from mechdesign.results import Table
 from mechdesign.study import Study

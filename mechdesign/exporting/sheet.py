@@ -26,7 +26,7 @@ from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.report.figures import style
 from mechdesign.report.figures.dimensions import draw_dimensions, table_rows
 from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.scene import Scene, pose
+from mechdesign.report.figures.scene import Still, pose
 from mechdesign.report.requirements import requirements
 from mechdesign.results import Result
 
@@ -85,7 +85,7 @@ def _motion(view: PosedStudy) -> tuple[Result | None, tuple[Caution, ...]]:
         return None, (Caution("incomplete", f"numbers of the motion are not on the sheet: {error}"),)
 
 
-def _tables(view: PosedStudy, scene: Scene, result: Result | None) -> Iterator[tuple[str, Rows]]:
+def _tables(view: PosedStudy, scene: Still, result: Result | None) -> Iterator[tuple[str, Rows]]:
     """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
     study, label = view.study, view.study.units.label
     scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
@@ -158,7 +158,7 @@ class PaperSheet:
     scale: float
 
     @classmethod
-    def of(cls, view: PosedStudy, scene: Scene, tables: float) -> PaperSheet:
+    def of(cls, view: PosedStudy, scene: Still, tables: float) -> PaperSheet:
         """The paper that is asked for, or the smallest with room, and the largest standard scale on it.
 
         `tables` is the height of the tables (mm).
@@ -180,17 +180,17 @@ class PaperSheet:
         fits = sheets["A4"].region[3] >= LEAST
         if view.paper == "A4" and not fits:
             raise StudyError("the tables leave no room for the drawing on A4: ask for --paper A3")
-        _, across, up = extent(scene.places({}))
+        _, across, up = extent(scene.places)
         area = across * up * (sheets["A4"].scale * view.millimetres) ** 2
         crowded = area < CROWDED * len(scene.points)
         return sheets[view.paper or ("A4" if fits and not crowded else "A3")]
 
     @classmethod
     def _scaled(
-        cls, paper: str, region: tuple[float, float, float, float], view: PosedStudy, scene: Scene
+        cls, paper: str, region: tuple[float, float, float, float], view: PosedStudy, scene: Still
     ) -> PaperSheet:
         """A sheet at the largest standard scale at which the mechanism fits into the region."""
-        _, across, up = extent(scene.places({}))
+        _, across, up = extent(scene.places)
         most = min((region[2] - 2 * PAD) / across, (region[3] - 2 * PAD) / up) / view.millimetres
         return cls(paper, region, next((scale for scale in SCALES if scale <= most), SCALES[-1]))
 
@@ -199,7 +199,7 @@ class PaperSheet:
         """The scale as ISO 5455 writes it."""
         return f"{self.scale:g} : 1" if self.scale >= 1 else f"1 : {1 / self.scale:g}"
 
-    def draw(self, view: PosedStudy, scene: Scene, bands: Sequence[TableColumns]) -> Figure:
+    def draw(self, view: PosedStudy, scene: Still, bands: Sequence[TableColumns]) -> Figure:
         """The whole sheet."""
         wide, tall = PAPERS[self.paper]
         figure = Figure(figsize=(wide / INCH, tall / INCH))
@@ -225,16 +225,16 @@ class PaperSheet:
                     y -= _height(rows)
         return figure
 
-    def _mechanism(self, figure: Figure, page: Axes, view: PosedStudy, scene: Scene) -> None:
+    def _mechanism(self, figure: Figure, page: Axes, view: PosedStudy, scene: Still) -> None:
         wide, tall = PAPERS[self.paper]
         left, low, across, up = self.region
         axes = figure.add_axes((left / wide, low / tall, across / wide, up / tall))
         axes.axis("off")
-        middle, _, _ = extent(scene.places({}))
+        middle, _, _ = extent(scene.places)
         half = complex(across, up) / 2 / self.scale / view.millimetres
         axes.set_xlim(middle.real - half.real, middle.real + half.real)
         axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
-        draw_dimensions(axes, view.mechanism, view.pose, scene)
+        draw_dimensions(scene, axes)
         _keep_inside(axes)
         unit = view.study.units.label("length")
         words = f"Dimensions{f' in {unit}' if unit else ''}, at {view.posed}"

@@ -33,8 +33,9 @@ OFTEN = 0.5
 _MOMENT = "moment without length"
 # What is said of poses by these columns of a joint, whose name stands for `JOINT`.
 _REMARKS = (
-    (_JAMS, Remark("jammed", "in {number} of {count} poses friction in JOINT jams the mechanism: no effort of the drives "
-     "moves it on, and efforts and joint forces are nan; a longer guide, a smaller offset or coefficient frees it")),
+    (_JAMS, Remark("jammed", "in {number} of {count} poses friction in JOINT jams the mechanism: no effort of the "
+     "drives moves it on, and efforts and joint forces are nan; a longer guide, a smaller offset or coefficient "
+     "frees it")),
     (_HOLDS, Remark("self_locking", "in {number} of {count} poses friction holds what the loads would move, most of it "
      "in JOINT: the mechanism is self-locking there, and the drives must push in either direction", least=OFTEN)),
     (_MOMENT, Remark("incomplete", "in {number} of {count} poses JOINT bears a moment, which presses on both ends of "

@@ -166,17 +166,18 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
     """
     check_writable(directory)
     from mechdesign.report.figures import style
-    from mechdesign.report.figures.dimensions import dimensions_figure
-    from mechdesign.report.figures.mechanism import sketch_figure
+    from mechdesign.report.figures.dimensions import dimensions_picture
+    from mechdesign.report.figures.layout import draw
+    from mechdesign.report.figures.mechanism import sketch_picture
 
     kinds, messages = output.formats.split(","), []
-    drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
-                (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
+    drawings = ((MECHANISM, "the sketch as understood is", sketch_picture),
+                (DIMENSIONS, "its dimensions are", dimensions_picture))  # fmt: skip
     for name, sentence, make in drawings:
         paths = [directory / f"{name}.{kind}" for kind in kinds]
         try:
             with style.context(output.style):
-                figure = make(study)
+                figure = draw(make(study))
                 drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
         except Exception as error:
             messages.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
@@ -190,10 +191,11 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
 def sketch(study: Study) -> bytes:
     """The sketch as it is assembled, as a PNG."""
     from mechdesign.report.figures import style
-    from mechdesign.report.figures.mechanism import sketch_figure
+    from mechdesign.report.figures.layout import draw
+    from mechdesign.report.figures.mechanism import sketch_picture
 
     with style.context():
-        return style.encoded(sketch_figure(study), "png")
+        return style.encoded(draw(sketch_picture(study)), "png")
 
 
 def pictures(
@@ -204,7 +206,8 @@ def pictures(
     For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
     """
     from mechdesign.report.figures import style
-    from mechdesign.report.figures.mechanism import mechanism_figure
+    from mechdesign.report.figures.layout import draw
+    from mechdesign.report.figures.mechanism import mechanism_picture
     from mechdesign.report.figures.pictures import figures
     from mechdesign.report.figures.rendering import Drawing, render
     from mechdesign.report.page import vector
@@ -226,7 +229,8 @@ def pictures(
         drawings: dict[str, Drawing] = {
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
-        drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
+        mechanism = f"{MECHANISM}.{formats[0]}"
+        drawings[mechanism] = partial(files, MECHANISM, lambda: draw(mechanism_picture(study, result)))
         if output.animate:
             from mechdesign.questions.kinematics.drawn import DrawnMotion
             from mechdesign.questions.kinematics.figures.animation import animation

@@ -67,7 +67,7 @@ def test_a_picture_that_cannot_be_drawn_is_a_warning_too(folder, analysis, invok
     def fails(*_):
         raise RuntimeError("no ink")
 
-    monkeypatch.setattr(mechanism, "mechanism_figure", fails)
+    monkeypatch.setattr(mechanism, "mechanism_picture", fails)
     done = invoke("kinematics", "slider.yaml", "--set", "fail_on=undrawn")
     assert done.exit_code == 1
     assert "picture mechanism.png could not be drawn" in done.stderr

@@ -22,8 +22,8 @@ def failing(*arguments, **options):
     ("module", "function", "lost", "name"),
     [
         ("questions.kinematics.figures.curves", "motion_curves", "motion.png", "motion"),
-        ("questions.kinematics.figures.paths", "paths_figure", "paths.png", "paths"),
-        ("report.figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
+        ("questions.kinematics.figures.paths", "paths_panel", "paths.png", "paths"),
+        ("report.figures.mechanism", "mechanism_picture", "mechanism.png", "mechanism.png"),
         ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
     ],
 )
@@ -74,7 +74,7 @@ def test_every_picture_fails(folder, invoke, monkeypatch):
 def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
     from mechdesign.report.figures import mechanism
 
-    monkeypatch.setattr(mechanism, "sketch_figure", failing)
+    monkeypatch.setattr(mechanism, "sketch_picture", failing)
     done = invoke("check", STUDY)
     assert done.exit_code == 0
     assert "warning: picture mechanism.png could not be drawn: internal error: RuntimeError" in done.stderr

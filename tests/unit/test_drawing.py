@@ -9,11 +9,12 @@ from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.drawing import Posed
 from mechdesign.report.figures.labels import Label, paper, place_labels, positions
-from mechdesign.report.figures.mechanism import mechanism_figure
+from mechdesign.report.figures.layout import draw
+from mechdesign.report.figures.mechanism import mechanism_picture
 from mechdesign.report.figures.scene import hull, pose
-from mechdesign.report.figures.shapes import BAR, Line, Symbol, link_colors, mechanism_shapes
+from mechdesign.report.figures.shapes import BAR, Line, Symbol, mechanism_shapes
 from mechdesign.results import Result
 
 SLIDER = """
@@ -38,7 +39,7 @@ def study(tmp_path):
 
 def drawn(study):
     with style.context():
-        figure = mechanism_figure(study, Result("workspace", {}))
+        figure = draw(mechanism_picture(study, Result("workspace", {})))
         return figure, style.encoded(figure)
 
 
@@ -82,7 +83,7 @@ def test_joints_stand_where_the_mechanism_has_them(study):
     axes = figure.add_subplot()
     axes.set(xlim=(-60, 180), ylim=(-80, 80))
     configuration = study.mechanism.plan(("theta",)).solve([np.radians(60.0)])
-    draw_mechanism(axes, study.mechanism, configuration)
+    Posed(pose(study.mechanism, configuration)).draw(axes)
     shown = [patch.get_window_extent() for patch in axes.findobj(PathPatch)]
     for point in "OAB":
         place = complex(configuration.point(point))
@@ -94,7 +95,7 @@ def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
     figure = style.new_figure(5, layout=None)
     axes = figure.add_subplot()
     configuration = study.mechanism.plan(("B.x",)).solve([1000.0])
-    draw_mechanism(axes, study.mechanism, configuration)
+    Posed(pose(study.mechanism, configuration)).draw(axes)
     assert not axes.lines
     assert not axes.texts
     assert pose(study.mechanism, configuration) is None
@@ -103,7 +104,7 @@ def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
 def test_pins_lie_on_bars_and_bars_on_the_ground_and_sizes_are_those_of_paper(study):
     mechanism = study.mechanism
     configuration = mechanism.plan(("theta",)).solve([np.radians(90.0)])
-    shapes = mechanism_shapes(pose(mechanism, configuration), link_colors(mechanism), {})
+    shapes = mechanism_shapes(pose(mechanism, configuration))
     pins = [shape for shape in shapes if isinstance(shape, Symbol) and shape.fill == "white"]
     bars = [shape for shape in shapes if isinstance(shape, Line) and shape.width == BAR and not shape.filled]
     ground = [shape for shape in shapes if isinstance(shape, Symbol) and not shape.point and shape.place == 0]

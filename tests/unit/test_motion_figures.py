@@ -14,16 +14,17 @@ from mechdesign.questions.kinematics.figures.animation import _frames as frames_
 from mechdesign.questions.kinematics.figures.animation import in_order
 from mechdesign.questions.kinematics.figures.centrodes import centrodes
 from mechdesign.questions.kinematics.figures.curves import motion_curves
-from mechdesign.questions.kinematics.figures.paths import draw_paths, path_looks
+from mechdesign.questions.kinematics.figures.paths import path_looks, path_marks
 from mechdesign.questions.kinematics.figures.polygons import centripetal, images
 from mechdesign.questions.kinematics.figures.poses import place_of
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.mechanism import sketch_figure
+from mechdesign.report.figures.marks import Picture
+from mechdesign.report.figures.mechanism import sketch_picture
+from mechdesign.report.figures.panels import drawn_plane
 from mechdesign.report.figures.pictures import figures
-from mechdesign.report.figures.scene import Sweep, ranks
+from mechdesign.report.figures.sweep import Sweep, ranks
 
 FOUR_BAR = """
 mechanism:
@@ -237,17 +238,18 @@ def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
     figure = drawn(study, "poses")
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert sum(title.endswith("rocker reverses") for title in titles) == 2
-    key = {line.get_label(): line for line in figure.artists}
-    words = {text.get_text().split(" ")[0]: text.get_text() for text in figure.texts}
+    (legend,) = figure.legends
+    words = {text.get_text().split(" ")[0]: text.get_text() for text in legend.get_texts()}
+    key = dict(zip(words, legend.legend_handles, strict=True))
     for name, size, heading in (("velocity", 30, 1j), ("acceleration", 30, -1)):
         # A turns about O at 1 rad/s.
         for axes in figure.axes:
-            (line,) = [line for line in axes.lines if line.get_label() == f"{name} of A"]
+            (line,) = [line for line in axes.lines if line.get_label() == name]
             base, tip = line.get_xydata() @ [1, 1j]
             assert abs(tip - base) > 0
             np.testing.assert_allclose((tip - base) / abs(tip - base), heading * base / 30, atol=1e-9)
             pixels = np.hypot(*np.diff(axes.transData.transform(line.get_xydata()), axis=0)[0])
-            length = np.diff(key[name].get_xdata())[0] * figure.dpi
+            length = np.diff(key[name].get_xdata())[0] * figure.dpi / 72
             assert pixels / length == pytest.approx(size / float(words[name].split(" ")[1]))
     assert key["velocity"].get_linestyle() == "-"
     assert key["acceleration"].get_linestyle() == "--"
@@ -292,17 +294,17 @@ def test_special_poses_of_one_configuration_are_shown_once():
 
 @pytest.mark.nightly
 def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
-    (axes,) = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"), "paths").axes
-    (ticks,) = axes.collections
+    figure = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"), "paths")
+    (ticks,) = figure.axes[0].collections
     middles = np.array([path.vertices.mean(axis=0) @ [1, 1j] for path in ticks.get_paths()])
     path = sweep_of(study_of(FOUR_BAR)).places["C"]
     np.testing.assert_allclose(middles, path[:-1:3], atol=1e-9)
-    legend = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert legend == ["four-bar O A B D: crank-rocker", "ticks every 0.0417 s (15 deg of theta); numbers: theta"]
+    assert [text.get_text() for text in figure.texts][1:] == ["four-bar O A B D: crank-rocker"]
+    (ticks,) = figure.legends[0].get_texts()
+    assert ticks.get_text() == "ticks every 0.0417 s (15 deg of theta); numbers: theta"
     # Of what speeds up equal steps are not equal times.
     faster = study_of(FOUR_BAR, "kinematics.rates={theta: 6}", "kinematics.accelerations={theta: 1}")
-    (axes,) = drawn(faster, "paths").axes
-    assert axes.get_legend().get_texts()[-1].get_text() == "ticks every 15 deg of theta; numbers: theta"
+    assert drawn(faster, "paths").legends[0].get_texts()[-1].get_text() == "ticks every 15 deg of theta; numbers: theta"
 
 
 @pytest.mark.nightly
@@ -464,11 +466,12 @@ def test_every_assembly_has_a_panel_on_one_scale():
 def test_a_rough_sketch_is_shown_beside_the_assembled_one(place, crosses):
     study = study_of(FOUR_BAR.replace("[75, 55]", place))
     with style.context():
-        figure = sketch_figure(study)
+        picture = sketch_picture(study)
+        figure = draw(picture)
     (axes,) = figure.axes
     marks = [line for line in axes.lines if line.get_marker() == "x"]
     assert sum(len(line.get_xdata()) for line in marks) == crosses
-    assert ("crosses" in axes.get_title(loc="left")) == bool(crosses)
+    assert ("crosses" in picture.title) == bool(crosses)
     if crosses:
         assert (marks[0].get_xdata()[0], marks[0].get_ydata()[0]) == (90, 75)
 
@@ -540,9 +543,9 @@ def test_in_a_moving_picture_paths_are_seen_over_moving_plates():
     sweep = sweep_of(study_of(FOUR_BAR))
     look = next(look for look in path_looks(sweep) if look.point == "C")
     with style.context():
-        figure, axes = framed(sweep.extent, "", height=4.0)
-        draw_paths(axes, sweep)
-        shown = frames_of(figure, axes, sweep, sweep.valid[::9])
+        figure = draw(Picture("", [drawn_plane(path_marks(sweep), sweep.extent, sweep.study, "a pose")]))
+        (axes,) = figure.axes
+        shown = frames_of(figure, sweep, sweep.valid[::9])
         across, up = axes.transData.transform(np.column_stack([look.path.real, look.path.imag])).round().astype(int).T
     color = 255 * np.array(to_rgb(look.color))
     for picture in shown:

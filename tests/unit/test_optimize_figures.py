@@ -273,5 +273,5 @@ def test_the_optimum_at_listed_poses_shows_places_wanted_and_the_worst_pose() ->
     # Between the poses the rocker's end runs on its circle.
     assert np.hypot(*(lines["path of B"] - [100, 0]).T) == pytest.approx(60.0)
     worst = motion["crank"][np.argmax(np.abs(motion["B.y_error"]))]
-    title = axes.get_title(loc="left").replace("\n", " ").replace("\N{NO-BREAK SPACE}", " ")
+    title = figure.texts[0].get_text().replace("\n", " ").replace("\N{NO-BREAK SPACE}", " ")
     assert title.endswith(f"drawn at the worst pose, crank = {worst:g} deg")

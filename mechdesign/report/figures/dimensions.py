@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
-from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
 from mechdesign.questions.stiffness.schema import CrossSection
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, framed
+from mechdesign.report.figures.callouts import link_labels, point_labels
+from mechdesign.report.figures.drawing import Posed
 from mechdesign.report.figures.labels import covered, paper, place_labels
-from mechdesign.report.figures.scene import Scene, hull, pose
-from mechdesign.report.figures.shapes import link_colors, link_labels, point_labels
+from mechdesign.report.figures.marks import Late, LateMark, Panel, Picture
+from mechdesign.report.figures.panels import drawn_plane
+from mechdesign.report.figures.scene import Still, hull, sketched
 from mechdesign.study import Study
 
-_HEIGHT = 4.6  # inches
-_TITLE = 0.42
 _SIZE = 8.5  # points, of numbers
 # Points between a link and its dimension line: beside it, farther out, or along the link itself.
 _AWAY = (16.0, -16.0, 26.0, -26.0, 38.0, -38.0, 52.0, -52.0, 70.0, -70.0, 0.0)
@@ -43,32 +41,25 @@ _NET = 4.0  # points between two places of a line that others keep off
 _ORDER = 6.0
 _NONE = 1e-9  # part of the size of the mechanism that is no distance
 _HALO = 1.5  # points about a number
-# Inches, of the table.
-_ROW = 0.19
-_COLUMN_GAP = 0.2
-_ABOVE = 0.22
+_COLUMN_GAP = 14.0  # points, between columns of the table
+_AROUND = 0.12  # of the mechanism's size, for dimension lines beside it
 
 
-def dimensions_figure(study: Study) -> Figure:
+def dimensions_picture(study: Study) -> Picture:
     """The sketch, assembled, with the lengths of its links, and a table of them; use inside `style.context`."""
-    mechanism, unit = study.mechanism, study.units.label("length")
-    scene = pose(mechanism, mechanism.sketch_configuration)
-    assert scene is not None
+    scene, unit = sketched(study.mechanism), study.units.label("length")
     title = f"Dimensions{f' in {unit}' if unit else ''}, in the sketch pose"
     title += "; lengths of guides are not to scale" * bool(scene.guides)
-    title = style.folded(title, 11.0, style.width() - LEFT - RIGHT)
-    above = _TITLE + style.line(11.0) * title.count("\n")
-    figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=above, pad=0.75)
+    drawing = Late(partial(draw_dimensions, scene))
+    around = scene.places + _AROUND * scene.span * np.array([[1], [-1], [1j], [-1j]])
+    panels, rows = [drawn_plane([drawing], around.ravel(), study)], table_rows(study, scene)
+    return Picture(title, [*panels, *([Panel([WrittenRows(rows)], bare=True)] if rows else [])])
+
+
+def draw_dimensions(scene: Still, axes: Axes) -> None:
+    """Draw a mechanism in a pose, with dimension lines and the names of points and links."""
     axes.grid(visible=False)
-    axes.set_title(title, loc="left")
-    draw_dimensions(axes, mechanism, mechanism.sketch_configuration, scene)
-    _table(figure, study, scene)
-    return figure
-
-
-def draw_dimensions(axes: Axes, mechanism: Mechanism, configuration: Configuration, scene: Scene) -> None:
-    """Draw a mechanism in a pose, its scene, with dimension lines and the names of points and links."""
-    draw_mechanism(axes, mechanism, configuration, labels=False, drives=False)
+    Posed(scene, names=False, drives=False).draw(axes)
     net = covered(axes)
     boxes: list[Floats] = []
     # The shortest nearest to their links.
@@ -77,7 +68,7 @@ def draw_dimensions(axes: Axes, mechanism: Mechanism, configuration: Configurati
         net = _dimension(axes, ends, _number(value, angle), net, boxes, on_link=name != GROUND)
     for box in boxes:
         net = np.concatenate([net, _inside(box)])
-    place_labels(axes, [*point_labels(scene), *link_labels(scene, link_colors(mechanism))], net, order=_ORDER + 1)
+    place_labels(axes, [*point_labels(scene), *link_labels(scene)], net, order=_ORDER + 1)
 
 
 def _number(value: float, angle: float) -> str:
@@ -85,7 +76,7 @@ def _number(value: float, angle: float) -> str:
     return f"{value:.5g}" + f" \N{ANGLE} {angle:.3g}\N{DEGREE SIGN}" * inclined
 
 
-def _lengths(scene: Scene) -> Iterator[tuple[str, str, str, float, float]]:
+def _lengths(scene: Still) -> Iterator[tuple[str, str, str, float, float]]:
     """Link, two of its points, their distance, and of the ground the angle of their line (degrees)."""
     for name, link in scene.description.links.items():
         if link.telescopic:
@@ -207,7 +198,7 @@ def _over(box: Floats, other: Floats) -> bool:
     return bool((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all())
 
 
-def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
+def table_rows(study: Study, scene: Still) -> list[tuple[str, ...]]:
     """Link, its points, length, tolerance and section; then what else varies. Without columns that hold nothing.
 
     Points without a length have a row with their place in the frame of the link, unless they are its origin.
@@ -243,7 +234,7 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
     return [tuple(row[k] for k in kept) for row in rows] if kept else []
 
 
-def _guides(scene: Scene) -> Iterator[tuple[str, ...]]:
+def _guides(scene: Still) -> Iterator[tuple[str, ...]]:
     """Lines of the ground on which something slides: how far they pass a pivot, and their angle."""
     for guide in scene.guides:
         if guide.owner == GROUND and (pivots := scene.pivots()):
@@ -253,7 +244,7 @@ def _guides(scene: Scene) -> Iterator[tuple[str, ...]]:
             yield guide.joint, f"{pivots[0]} to its line", offset, "", ""
 
 
-def _place(place: complex, scene: Scene) -> str:
+def _place(place: complex, scene: Still) -> str:
     x, y = (0.0 if abs(value) < _NONE * scene.span else value for value in (place.real, place.imag))
     return f"({x:.5g}, {y:.5g})"
 
@@ -294,20 +285,22 @@ def _size(profile: CrossSection) -> str:
     return f" {profile.width:g} x {profile.height:g}" if profile.width and profile.height else ""
 
 
-def _table(figure: Figure, study: Study, scene: Scene) -> None:
-    """The rows below the drawing, for which the page is made higher."""
-    rows = table_rows(study, scene)
-    if not rows:
-        return
-    height = _ROW * len(rows) + _ABOVE
-    style.grow(figure, below=height)
-    widths = [max(2 * float(_half(row[k])[0]) / 72 for row in rows) for k in range(len(rows[0]))]
-    room = style.width() - 0.3
-    share = min(1.0, room / (sum(widths) + _COLUMN_GAP * (len(widths) - 1)))
-    starts = 0.15 + share * np.concatenate([[0.0], np.cumsum(np.array(widths[:-1]) + _COLUMN_GAP)])
-    total = figure.get_figheight()
-    for number, row in enumerate(rows):
-        up = (height - _ABOVE / 2 - (number + 0.5) * _ROW) / total
-        for left, words in zip(starts, row, strict=True):
-            figure.text(left / style.width(), up, words, fontsize=_SIZE * share, va="center",
-                        fontweight="bold" if number == 0 else "normal")  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class WrittenRows(LateMark):
+    """A table in print, its head first; columns are as wide as what they hold, and smaller where there is no room."""
+
+    rows: Sequence[Sequence[str]]
+
+    @property
+    def height(self) -> float:
+        return 1.6 * style.line(_SIZE) * len(self.rows)
+
+    def draw(self, axes: Axes) -> None:
+        widths = [max(2 * _half(row[k])[0] + _COLUMN_GAP for row in self.rows) for k in range(len(self.rows[0]))]
+        room = 72 * axes.bbox.width / style.dots()
+        share = min(1.0, room / sum(widths))
+        for number, row in enumerate(self.rows):
+            for left, words in zip(np.cumsum([0.0, *widths[:-1]]) * share / room, row, strict=True):
+                axes.text(float(left), 1 - (number + 0.5) / len(self.rows), words,
+                          transform=axes.transAxes, fontsize=_SIZE * share, va="center",
+                          fontweight="bold" if number == 0 else "normal")  # fmt: skip

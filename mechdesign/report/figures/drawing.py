@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,75 +14,76 @@ from matplotlib.path import Path
 from matplotlib.patheffects import Normal, TickedStroke
 from matplotlib.transforms import Affine2D, Affine2DBase, ScaledTranslation, Transform
 
-from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Floats
-from mechdesign.report.figures import shapes
+from mechdesign.report.figures import callouts, shapes, style
 from mechdesign.report.figures.labels import Label, covered, place_labels, rows
-from mechdesign.report.figures.scene import pose
-from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol, Travel
+from mechdesign.report.figures.marks import LateMark
+from mechdesign.report.figures.scene import Still
+from mechdesign.report.figures.shapes import Line, Shape, Strut, Symbol
+
+_WIDE, _SMALL = 0.6, 0.7  # part of the page below which a panel has smaller symbols, and their size
 
 
-def draw_mechanism(
-    axes: Axes,
-    mechanism: Mechanism,
-    configuration: Configuration,
-    index: int = 0,
-    *,
-    faint: bool = False,
-    labels: bool = True,
-    drives: bool = True,
-    travel: Travel | None = None,
-    size: float = 1.0,
-    more: Sequence[Label] = (),
-) -> None:
-    """Draw a mechanism in one pose of a batch; a pose that cannot be assembled draws nothing.
+@dataclass(frozen=True, eq=False)
+class Posed(LateMark):
+    """A mechanism in a pose; one that cannot be assembled draws nothing.
 
-    Sizes of symbols are in points on paper, so that limits may change after drawing; only labels need final limits.
-    They keep off what is drawn before.
+    Sizes of symbols are in points on paper; names keep off what is drawn before.
 
     Parameters
     ----------
-    index : int
-        Pose in the flattened batch.
     faint : bool
-        Pale and below what is drawn otherwise, without labels and drives: for further poses.
-    travel : mapping, optional
-        Range of each slide (lengths from the line's origin), which its guide should cover.
-    size : float
-        Of the symbols; 1 for a drawing as wide as the page.
+        Pale and below what is drawn otherwise, without names and drives: for further poses.
+    ghost : bool
+        As thin grey lines below the paths.
+    names, drives : bool
+        Whether they are drawn.
     more : sequence of Label
         What else is written, where the mechanism's own names leave room.
     """
-    scene = pose(mechanism, configuration, index)
-    if scene is None:
-        return
-    colors = shapes.link_colors(mechanism)
-    drawn = shapes.mechanism_shapes(scene, colors, travel or {})
-    if faint:
-        draw(axes, drawn, order=2.0, alpha=0.22, size=size)
-        return
-    arrows, named = shapes.drive_shapes(scene) if drives else ([], [])
-    draw(axes, [*drawn, *arrows], size=size)
-    if labels:
-        # The most important first.
-        named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene), *shapes.spring_labels(scene)]
-        named += [*more, *shapes.link_labels(scene, colors)]
-        place_labels(axes, named, covered(axes), order=5.0)
+
+    scene: Still | None
+    faint: bool = False
+    ghost: bool = False
+    names: bool = True
+    drives: bool = True
+    more: Sequence[Label] = ()
+
+    def draw(self, axes: Axes) -> None:
+        scene = self.scene
+        if scene is None:
+            return
+        if self.ghost:
+            draw(axes, shapes.ghost_shapes(scene, self.look.get("linestyle", "-")), order=2.0,
+                 alpha=self.look.get("alpha", 0.4))  # fmt: skip
+            return
+        drawn = shapes.mechanism_shapes(scene)
+        if self.faint:
+            draw(axes, drawn, order=2.0, alpha=0.22)
+            return
+        arrows, named = callouts.drive_shapes(scene) if self.drives else ([], [])
+        draw(axes, [*drawn, *arrows])
+        if self.names:
+            # The most important first.
+            named = [*callouts.point_labels(scene), *named, *callouts.slide_labels(scene)]
+            write(axes, [*named, *callouts.spring_labels(scene), *self.more, *callouts.link_labels(scene)])
 
 
-def draw_ghost(
-    axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, dashes: Dashes = "-",
-    alpha: float = 0.4,
-) -> None:  # fmt: skip
-    """Draw another pose as thin grey lines below the paths."""
-    scene = pose(mechanism, configuration, index)
-    if scene is not None:
-        draw(axes, shapes.ghost_shapes(scene, dashes), order=2.0, alpha=alpha)
+def write(axes: Axes, labels: Sequence[Label]) -> None:
+    """Write labels where they cover least of what is drawn."""
+    place_labels(axes, labels, covered(axes), order=6.0)
 
 
-def draw(axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0, size: float = 1.0) -> None:
-    """Draw shapes; `order` lifts them above drawings of lower order, `size` enlarges symbols and widths of lines."""
+def _size(axes: Axes) -> float:
+    """Size of symbols, smaller in a narrow panel."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return 1.0 if axes.bbox.width > _WIDE * style.width() * figure.dpi else _SMALL
+
+
+def draw(axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0) -> None:
+    """Draw shapes; `order` lifts them above drawings of lower order."""
+    size = _size(axes)
     for shape in drawn:
         if isinstance(shape, Symbol):
             axes.add_artist(

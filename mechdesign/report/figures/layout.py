@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis as Drawn
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import highest, window_of
+from mechdesign.report.figures.legends import page_legend, panel_legend
 from mechdesign.report.figures.marks import Axis, Coloured, Lines, Own, Panel, Picture
 from mechdesign.report.figures.ticks import DIGIT, LABEL, NAMES, PAD, folded_names, tick
 
@@ -25,12 +26,13 @@ _TITLE, _NOTE, _HEADING, _ASIDE = 11.0, 8.5, 9.5, 8.5  # points
 # Inches: at the edges of a page, between what is separate.
 _EDGE, _GAP = 0.1, 0.14
 # Inches: the least width of panels by their kind, and the room beside them at first.
-_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "plane": 2.1, "grid": 1.2, "": 2.0}
+_NARROWEST = {"bars": 1.9, "map": 3.3, "equal": 2.6, "plane": 1.6, "grid": 1.2, "": 2.0}
 _BESIDE = 0.9
 # Inches: the height of a panel that stands alone, among up to so many below each other, among more, and the least.
 _ALONE, _SOME, _MORE, _MOST, _LOWEST = 2.6, 1.75, 1.5, 1.2, 0.7
 _MOST_SOME, _MOST_MORE = 4, 7
 _HIGHEST_MAP, _HIGHEST_OF_TWO, _HIGHEST_PAGE = 6.0, 3.8, 7.6  # of one of equal axes, of others, of all together
+_BESIDE_SHARE = 0.85  # exponent: drawings that stand beside each other may be so much smaller
 _MAP = 0.8  # height over width of a map whose axes are not equal
 _STILL = 1e-6  # of its size, by which a curve changes that stands still
 _SLIVER = 0.45  # least height over width of axes of one scale
@@ -38,11 +40,6 @@ _MARGIN = 0.08  # of the range, beyond curves from a given end
 _BAR, _ONE_OF_SEVERAL = 0.24, 0.16  # inches of a name with one bar, and of each of several
 _AROUND_ROWS = 1.2  # inches of legend and axis of a page
 _AROUND_BARS, _ABOUT_BARS = 1.6, 2.5  # inches of title and legend; names for which title and axis of a panel take room
-_LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
-_LEGEND_DOT, _LEGEND_MARK = 8.0, 6.0  # points
-_BESIDE_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-_ABOVE_LEGEND: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
-_INSIDE_LEGEND: dict[str, Any] = {"frameon": True, "framealpha": 0.85, "edgecolor": "none"}
 
 
 @dataclass(eq=False)
@@ -65,8 +62,9 @@ class _Cell:
     @property
     def drawn_axes(self) -> Iterator[tuple[Drawn, Axis, bool]]:
         """Both axes as drawn and as declared, and whether numbers and name stand at them."""
-        yield self.axes.xaxis, self.panel.x, self.outer_x
-        yield self.axes.yaxis, self.panel.y, self.outer_y
+        if not self.panel.bare:
+            yield self.axes.xaxis, self.panel.x, self.outer_x
+            yield self.axes.yaxis, self.panel.y, self.outer_y
 
 
 def draw(picture: Picture) -> Figure:
@@ -85,11 +83,13 @@ def draw(picture: Picture) -> Figure:
         _fill(cell, entries, several, alone=len(cells) == 1)
     for cell in cells:
         _end(cell)
-    legend = _legend(figure, entries) if entries else None
-    wide = style.width() / columns - _BESIDE
+    symbol = max((mark.symbol for mark in picture.marks()), default=0.0)
+    legend = page_legend(figure, entries, symbol) if entries else None
+    wide, planes = style.width() / columns - _BESIDE, sum(cell.panel.shows is not None for cell in cells)
+    plane = highest(columns, -(-planes // columns))
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     for cell in cells:
-        cell.tall = _height(cell, wide, rows)
+        cell.tall = _height(cell, wide, rows, plane)
         _size(cell, wide)
     bars = [bar for cell in cells for bar in cell.axes.child_axes if isinstance(bar, Axes)]
     style.name_powers([*(cell.axes for cell in cells), *bars])
@@ -99,7 +99,7 @@ def draw(picture: Picture) -> Figure:
                    for side in ("left", "right"))  # fmt: skip
     wide = (style.width() - sum(left) - sum(right) - _GAP * (columns - 1) - 0.5 * _EDGE) / columns
     for cell in cells:
-        cell.tall = _height(cell, wide, rows)
+        cell.tall = _height(cell, wide, rows, plane)
         _name(cell, cell.span * wide)
     heading, top = _heading(picture)
     bottom = legend.get_window_extent(renderer).height / figure.dpi + _GAP if legend is not None else _EDGE
@@ -118,10 +118,17 @@ def draw(picture: Picture) -> Figure:
         cell.tall = max(lower * cell.tall, _LOWEST) if cell.panel.bars else tall[cell.row]
         left_below = x / style.width(), (y - cell.tall) / height
         cell.axes.set_position((*left_below, own / style.width(), cell.tall / height))
+        if cell.panel.shows is not None:
+            _frame(cell, own)
         _place(cell, left[cell.column])
         for mark in cell.panel.marks:
-            if isinstance(mark, Own) and mark.late:
+            if mark.late:
                 mark.draw(cell.axes)
+            if legend is not None and mark.label in entries:
+                which = [*entries].index(mark.label)
+                inches = cell.axes.bbox.width / style.dots() / float(np.ptp(cell.axes.get_xlim()))
+                if handle := legend.legend_handles[which]:
+                    mark.size_symbol(handle, legend.get_texts()[which], inches)
     for words, size, down in heading:
         figure.text(_EDGE / style.width(), 1 - down / height, words, va="top", fontsize=size)
     return figure
@@ -139,7 +146,18 @@ def _columns(picture: Picture) -> int:
     names = first.y.words if first.kind == "bars" else ()
     if picture.share == "grid":
         return picture.across
-    return max(1, min(picture.across, len(picture.panels), fitting_panels(first.kind, names)))
+    most = max(1, min(picture.across, len(picture.panels), fitting_panels(first.kind, names)))
+    if first.shows is None:
+        return most
+
+    def size(columns: int) -> float:
+        wide = (style.width() - _BESIDE) / columns - _GAP
+        rows = -(-len(picture.panels) // columns)
+        full = len(picture.panels) / (rows * columns)
+        scale = full * window_of(first, wide, highest(columns, rows)).scale
+        return float(scale * columns**_BESIDE_SHARE)
+
+    return max(range(1, most + 1), key=size)
 
 
 def fitting_panels(kind: str = "", names: Sequence[str] = ()) -> int:
@@ -162,6 +180,7 @@ def fitting_names(names: Sequence[str], rows: int, bars: int) -> float:
 def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
     """The panels in rows, with the axes that they share."""
     by_x, by_y = dict[int, Axes](), dict[int, Axes]()
+    planes = [panel.shows for panel in picture.panels if panel is not None and panel.shows is not None]
     everywhere, grid = picture.share != "grid", picture.share == "grid"
     for k, panel in enumerate(picture.panels):
         if panel is None:
@@ -183,7 +202,9 @@ def _cells(figure: Figure, picture: Picture, columns: int) -> Iterator[_Cell]:
         outer_y = not same_y or not any(picture.panels[row * columns : k])
         # One that is left over is as wide as the page, unless it shares its axis or is a map.
         alone = k + 1 == len(picture.panels) and not (column or same_x or same_y or panel.kind == "map" or panel.equal)
-        yield _Cell(replace(panel, marks=marks), axes, row, column, columns if alone else 1, outer_x, outer_y)
+        shows = np.concatenate(planes) if planes and picture.share == "xy" else panel.shows
+        own = replace(panel, marks=marks, shows=shows)
+        yield _Cell(own, axes, row, column, columns if alone else 1, outer_x, outer_y)
 
 
 def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, alone: bool) -> None:
@@ -197,27 +218,21 @@ def _fill(cell: _Cell, entries: dict[str, Any], several: Mapping[int, int], *, a
     # A narrow page has no room beside a panel that stands alone: it has the legend of the page.
     own = dict[str, Any]() if panel.legend and not (alone and style.narrow() and panel.legend == "beside") else entries
     for mark in panel.marks:
-        if isinstance(mark, Own) and mark.late:
-            continue
-        handle = mark.draw(axes)
+        handle = Line2D([], [], **mark.look) if mark.late else mark.draw(axes)
         if mark.label and handle is not None:
             # A straight line is no curve, also not among those that `lost_curves` of the tests looks at.
             handle.set_label("_" if isinstance(mark, Lines) else mark.label)
             (entries if several[id(mark)] > 1 else own).setdefault(mark.label, handle)
     if own and own is not entries:
-        outside = (
-            _ABOVE_LEGEND | {"ncols": fitting([*own], style.width() - _BESIDE)} if style.narrow() else _BESIDE_LEGEND
-        )
-        place = outside if panel.legend == "beside" else _INSIDE_LEGEND | {"loc": panel.legend}
-        heading: dict[str, Any] = {"title": panel.heading or None, "title_fontsize": 9, "alignment": "left"}
-        _enlarge_dots(axes.legend(own.values(), own.keys(), **place, **heading))
+        panel_legend(axes, panel, own, style.width() - _BESIDE)
 
 
 def _end(cell: _Cell) -> None:
     """The ends of the axes of a panel, once all is drawn that shares them."""
     axes, panel = cell.axes, cell.panel
-    if panel.plane:
-        axes.grid(visible=False)
+    if panel.bare:
+        axes.set_axis_off()
+        axes.set(xticks=[], yticks=[])
     if panel.bars or panel.y.words:
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
@@ -254,21 +269,33 @@ def _widen(axes: Axes) -> None:
     axes.set(xlim=(left - more, right + more), ylim=(low - above, high + above))
 
 
-def _height(cell: _Cell, wide: float, rows: int) -> float:
-    """Inches of a panel of a width."""
-    panel, axes, highest = cell.panel, cell.axes, _HIGHEST_OF_TWO
-    if panel.equal and panel.kind in ("map", "plane"):
-        highest = _HIGHEST_MAP if rows == 1 else _HIGHEST_PAGE / rows
+def _height(cell: _Cell, wide: float, rows: int, plane: float) -> float:
+    """Inches of a panel of a width; `plane` those of a drawing at most."""
+    panel, axes, most = cell.panel, cell.axes, _HIGHEST_OF_TWO
+    if needed := max((mark.height for mark in panel.marks), default=0.0):
+        return needed
+    if panel.shows is not None:
+        return window_of(panel, wide, plane).height
+    if panel.equal and panel.kind == "map":
+        most = _HIGHEST_MAP if rows == 1 else _HIGHEST_PAGE / rows
     if panel.bars:
         return (0.15 + len(panel.bars[0].values)) * _bar_height(panel.y.words, panel.bars[0].count)
     if panel.equal:
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-        return min(highest, panel.equal * wide * abs((high - low) / (right - left)))
+        return min(most, panel.equal * wide * abs((high - low) / (right - left)))
     if panel.kind == "map":
-        return min(highest, _MAP * wide)
+        return min(most, _MAP * wide)
     if rows == 1:
         return _ALONE
     return panel.size * (_SOME if rows <= _MOST_SOME else _MORE if rows <= _MOST_MORE else _MOST)
+
+
+def _frame(cell: _Cell, wide: float) -> None:
+    """Ends of the axes of a plane of a width."""
+    window = window_of(cell.panel, wide, cell.tall)
+    middle, half = window.middle, complex(wide, cell.tall / cell.panel.equal) / 2 / window.scale
+    cell.axes.set_xlim(middle.real - half.real, middle.real + half.real)
+    cell.axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
 
 
 def _bar_height(names: Sequence[str], bars: int) -> float:
@@ -282,6 +309,8 @@ def _size(cell: _Cell, wide: float) -> None:
     figure = cell.axes.get_figure(root=True)
     assert figure is not None
     cell.axes.set_position((0.2, 0.2, wide / style.width(), cell.tall / figure.get_figheight()))
+    if cell.panel.shows is not None:
+        _frame(cell, wide)
     for axis, declared, outer in cell.drawn_axes:
         # What axes share is set at one of them.
         if outer:
@@ -301,6 +330,10 @@ def _measure(cell: _Cell, renderer: Any) -> None:
     box, dots = axes.bbox, style.dots()
     cell.left, cell.right = (max(0.0, side) / dots for side in (box.x0 - tight.x0, tight.x1 - box.x1))
     cell.below, cell.above = (max(0.0, side) / dots for side in (box.y0 - tight.y0, tight.y1 - box.y1))
+    if cell.outer_x and cell.panel.x.numbers and not cell.panel.x.words and not cell.panel.bare:
+        # In its final width its last number may stand at its end.
+        numbers = axes.xaxis.get_major_formatter().format_ticks(axes.xaxis.get_majorticklocs().tolist())
+        cell.right = max(cell.right, 0.5 * DIGIT * max(map(len, numbers), default=0) - 0.5 * _EDGE)
     label = axes.yaxis.label
     label.set_text(style.folded(label.get_text(), LABEL, cell.tall))
     cell.left += _lines(label.get_text(), LABEL) + 2 * PAD
@@ -332,22 +365,10 @@ def _place(cell: _Cell, left: float) -> None:
         if outer and not (declared.words or len(declared.ticks)):
             tick(axis, declared, width if axis is axes.xaxis else height)
         axis.label.set_visible(True)
-    _keep_on_page(axes)
     axes.yaxis.set_label_coords((PAD - left) / width, 0.5)
     axes.yaxis.label.set_verticalalignment("top")
     axes.xaxis.set_label_coords(0.5, -cell.below / height)
     axes.xaxis.label.set_verticalalignment("bottom")
-
-
-def _keep_on_page(axes: Axes) -> None:
-    """A number below the right end of a panel ends where the page does."""
-    axis, page = axes.xaxis, style.width() * style.dots()
-    places: list[float] = axis.get_majorticklocs().tolist()
-    numbers = axis.get_major_formatter().format_ticks(places)
-    for tick_there, place, number in zip(axis.get_major_ticks(), places, numbers, strict=False):
-        end = axes.transData.transform((place, axes.get_ylim()[0]))[0]
-        if end + 0.5 * DIGIT * len(number) * style.dots() > page >= end:
-            tick_there.label1.set_horizontalalignment("right")
 
 
 def _lines(text: str, size: float) -> float:
@@ -363,24 +384,3 @@ def _heading(picture: Picture) -> tuple[list[tuple[str, float, float]], float]:
             lines.append((style.folded(words, size, style.width() - 2 * _EDGE), size, down))
             down += _lines(lines[-1][0], size)
     return lines, down + PAD
-
-
-def _legend(figure: Figure, entries: Mapping[str, Any]) -> Legend:
-    """One legend at the bottom of a page, in as many columns as the width holds."""
-    labels = [style.folded(label, 9.0, style.width() - _LEGEND_SYMBOL) for label in entries]
-    return _enlarge_dots(figure.legend([*entries.values()], labels, loc="lower center", ncols=fitting(labels),
-                                       borderaxespad=0.2))  # fmt: skip
-
-
-def fitting(labels: Sequence[str], width: float | None = None) -> int:
-    """Columns of a legend that a width (inches) holds, that of the page if none is given."""
-    letters = int(_LEGEND_LETTERS * (width or style.width()))
-    return max(1, min(len(labels), letters // (8 + max(map(len, "\n".join(labels).split("\n"))))))
-
-
-def _enlarge_dots(legend: Legend) -> Legend:
-    """Dots of a legend as large as can be seen: one alone is lost where thousands are drawn."""
-    for handle in legend.legend_handles:
-        if isinstance(handle, Line2D) and handle.get_linestyle() == "None" and handle.get_markersize() < _LEGEND_DOT:
-            handle.set(markersize=_LEGEND_DOT if handle.get_marker() == "." else _LEGEND_MARK, alpha=1.0)
-    return legend

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import BoundaryNorm
+from matplotlib.text import Text
 from numpy.typing import ArrayLike
 
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -35,9 +37,35 @@ class PanelMark:
     label: str = ""
     look: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def late(self) -> bool:
+        """Whether it needs the final size of the panel, such as symbols and names of a size on paper."""
+        return False
+
+    @property
+    def height(self) -> float:
+        """Inches that it needs; 0 where the panel has the height of its kind."""
+        return 0.0
+
+    @property
+    def symbol(self) -> float:
+        """Length of its symbol in a legend, in font sizes; 0 for the usual one."""
+        return 0.0
+
     def draw(self, axes: Axes) -> Any:
         """Draw it; returns what a legend shows of it."""
         raise NotImplementedError
+
+    def size_symbol(self, handle: Artist, words: Text, inches: float) -> None:
+        """Fit its symbol and words in a legend to the scale of the panel, in which a length of one has some inches."""
+
+
+class LateMark(PanelMark):
+    """A mark that needs the final size of the panel; a legend shows a line in its look."""
+
+    @property
+    def late(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,13 +221,19 @@ class Contours(PanelMark):
 
 @dataclass(frozen=True, eq=False)
 class Own(PanelMark):
-    """What a function draws into the axes; it returns what a legend shows.
-
-    It is drawn `late` where it needs the final size of the panel, such as symbols and names of a size on paper.
-    """
+    """What a function draws into the axes; it returns what a legend shows."""
 
     function: Callable[[Axes], Any]
-    late: bool = field(default=False, kw_only=True)
+
+    def draw(self, axes: Axes) -> Any:
+        return self.function(axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Late(LateMark):
+    """What a function draws into the axes at last."""
+
+    function: Callable[[Axes], Any]
 
     def draw(self, axes: Axes) -> Any:
         return self.function(axes)
@@ -272,8 +306,12 @@ class Panel:
         Words at the right of the title.
     equal : float
         How many times longer lengths are drawn along y than along x; 0 where the axes have scales of their own.
+    shows : ndarray of complex, optional
+        Places of a plane in which a mechanism is drawn: the axes show all of them, and room for its symbols and names.
     plane : bool
-        Whether it shows places: a page marks points in it as the mechanism moves.
+        Whether a page marks points in it as the mechanism moves.
+    bare : bool
+        Whether it is drawn without its axes.
     legend : str
         Where its marks are named: in the legend of the picture, in one beside it (on a narrow page above), or inside.
     size : float
@@ -286,7 +324,9 @@ class Panel:
     title: str = ""
     aside: str = ""
     equal: float = 0.0
+    shows: Complexes | None = None
     plane: bool = False
+    bare: bool = False
     legend: Literal["", "beside", "best", "upper right", "lower right"] = ""
     heading: str = ""  # of a legend of its own
     size: float = 1.0
@@ -299,7 +339,7 @@ class Panel:
     @property
     def kind(self) -> Literal["bars", "map", "plane", "equal", ""]:
         """By which panels have room side by side."""
-        if self.plane:
+        if self.shows is not None:
             return "plane"
         if any(isinstance(mark, Contours | Coloured) for mark in self.marks):
             return "map"

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.motion.rows import TIME, Path, Poses, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Contours, Panel, Picture
+from mechdesign.report.figures.marks import Axis, Contours, Panel, PanelMark, Picture
 from mechdesign.study import Study
 
 # More of them in one picture cannot be told apart.
@@ -67,6 +67,15 @@ def times(poses: Poses, rows: Floats, speed: float) -> Floats:
     """When a point that passes its path at a speed is at places of it, in rows; in the study's units."""
     assert isinstance(poses.rule, Path)
     return poses.rule.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
+
+
+def drawn_plane(
+    marks: Sequence[PanelMark], shows: Complexes, study: Study, title: str = "", *, stretch: float = 1.0,
+    followed: bool = False,
+) -> Panel:  # fmt: skip
+    """A panel of the plane in which a mechanism is drawn, which shows some places; a page may follow it."""
+    unit = study.units.label("length")
+    return Panel(marks, Axis("x", unit), Axis("y", unit), title, equal=stretch, shows=shows, plane=followed)
 
 
 def moving_names(poses: Poses) -> list[str]:

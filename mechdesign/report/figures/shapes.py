@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Description
 from mechdesign.report.figures import style
-from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.scene import CamPair, Guide, Scene, Wheels, hull, spring_points
+from mechdesign.report.figures.scene import CamPair, Guide, Still, Wheels, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -24,26 +22,19 @@ PLATES = -0.8  # layer of plates, the lowest
 PIN = 3.6  # radius of a joint
 GROUND_HEIGHT = 13.0
 SLIDER_SIZE = (22.0, 13.0)  # along its guide and across
-ARC = 25.0  # radius of an angle drive's arrow
-FORCE = 34.0  # length of a force's arrow
 SPRING_COLOR = "#444444"
-_COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turns to either side
+COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turns to either side
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
 _PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
 _RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
-_NESTING = 9.0  # between the arrows of drives at one pivot
-_PUSH = 30.0  # length of a straight arrow
-_MIN_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
 _STEEL = "#777777"
 _GHOST = "#777777"
-DRIVE_COLOR = style.VERMILION
 LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
 Color = str | tuple[float, float, float]
 Dashes = Literal["-"] | tuple[float, tuple[float, ...]]  # for Matplotlib: dashes and gaps in widths of the line
-Travel = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -148,19 +139,19 @@ def darker(color: str, share: float = 0.3) -> Color:
     return red, green, blue
 
 
-def link_colors(mechanism: Mechanism) -> dict[str, str]:
+def link_colors(description: Description) -> dict[str, str]:
     """The colour of each link, the same in every picture."""
-    moving = [name for name in mechanism.description.links if name != GROUND]
+    moving = [name for name in description.links if name != GROUND]
     return {name: LINK_COLORS[k % len(LINK_COLORS)] for k, name in enumerate(moving)} | {GROUND: style.INK}
 
 
-def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) -> list[Shape]:
-    """A mechanism in one pose without drives and names; guides are as long as the `travel` of their slides."""
-    shapes: list[Shape] = []
+def mechanism_shapes(scene: Still) -> list[Shape]:
+    """A mechanism in one pose without drives and names."""
+    colors, shapes = link_colors(scene.description), list[Shape]()
     for point in scene.pivots():
         shapes += _pivot(scene.points[point])
     for guide in scene.guides:
-        shapes += _guide(scene, guide, colors, guide.ends(travel, scene.span))
+        shapes += _guide(scene, guide, colors, guide.ends)
     for rank, (name, body) in enumerate(bodies(scene)):
         if len(body) > 2:
             # A smaller plate lies on a larger one, all of them below paths and bars.
@@ -240,7 +231,7 @@ def _pivot(place: complex) -> list[Symbol]:
     ]
 
 
-def _guide(scene: Scene, guide: Guide, colors: Mapping[str, str], ends: tuple[complex, complex]) -> list[Shape]:
+def _guide(scene: Still, guide: Guide, colors: Mapping[str, str], ends: tuple[complex, complex]) -> list[Shape]:
     """A rail of the ground, or a bar with a slot, and the slider on it."""
     shapes: list[Shape] = []
     if guide.owner == GROUND:
@@ -272,7 +263,7 @@ def _bar(ends: Sequence[complex], color: str, link: str) -> list[Shape]:
     return [Line(ends, color, BAR, 0.1, link), Line(ends, lighter(color), BAR - 2.4, 0.11, link)]
 
 
-def _leg(scene: Scene, ends: tuple[str, str], color: str) -> list[Shape]:
+def _leg(scene: Still, ends: tuple[str, str], color: str) -> list[Shape]:
     """A telescopic leg: cylinder from the base, rod to the tip."""
     base, tip = (scene.points[end] for end in ends)
     parts = ((0.0, 1.0, color, 3.6, 0.1), (0.0, 1.0, lighter(color), 1.6, 0.11),
@@ -283,7 +274,7 @@ def _leg(scene: Scene, ends: tuple[str, str], color: str) -> list[Shape]:
     ]
 
 
-def _spring(scene: Scene, spring: Spring) -> list[Shape]:
+def _spring(scene: Still, spring: Spring) -> list[Shape]:
     """A coil spring as a zigzag, a damper as a piston in its cup, both side by side, or a gas spring."""
     points = spring_points(spring)
     places = scene.points[points[0]], scene.points[points[1]]
@@ -292,21 +283,21 @@ def _spring(scene: Scene, spring: Spring) -> list[Shape]:
         cylinder = [complex(x, y) for x, y in ((0.08, -4), (0.6, -4), (0.6, 4), (0.08, 4), (0.08, -4))]
         return [Strut(places, points, ((0j, 1 + 0j),), **looks | {"width": 2.4}),
                 Strut(places, points, (cylinder,), fill="#DDDDDD", **looks | {"layer": 0.15})]  # fmt: skip
-    coil = [0.12 + 0j, *(complex(0.12 + 0.76 * (k + 0.5) / _WINDINGS, _COIL * (-1) ** k) for k in range(_WINDINGS)),
+    coil = [0.12 + 0j, *(complex(0.12 + 0.76 * (k + 0.5) / _WINDINGS, COIL * (-1) ** k) for k in range(_WINDINGS)),
             0.88 + 0j]  # fmt: skip
-    cup = [complex(x, y) for x, y in ((0.68, -_COIL), (0.32, -_COIL), (0.32, _COIL), (0.68, _COIL))]
-    piston = [complex(0.55, -0.7 * _COIL), complex(0.55, 0.7 * _COIL)]
+    cup = [complex(x, y) for x, y in ((0.68, -COIL), (0.32, -COIL), (0.32, COIL), (0.68, COIL))]
+    piston = [complex(0.55, -0.7 * COIL), complex(0.55, 0.7 * COIL)]
     dashpot = [[0.12 + 0j, 0.32 + 0j], cup, piston, [0.55 + 0j, 0.88 + 0j]]
     parts = [[coil]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
     outlines: list[list[complex]] = [[0j, 0.12 + 0j], [0.88 + 0j, 1 + 0j]]
-    for part, aside in zip(parts, (0.0,) if len(parts) == 1 else (1.4 * _COIL, -1.4 * _COIL), strict=True):
+    for part, aside in zip(parts, (0.0,) if len(parts) == 1 else (1.4 * COIL, -1.4 * COIL), strict=True):
         outlines += [[corner + 1j * aside for corner in line] for line in part]
     if len(parts) > 1:
-        outlines += [[complex(end, 1.4 * _COIL), complex(end, -1.4 * _COIL)] for end in (0.12, 0.88)]
+        outlines += [[complex(end, 1.4 * COIL), complex(end, -1.4 * COIL)] for end in (0.12, 0.88)]
     return [Strut(places, points, outlines, **looks)]
 
 
-def _torsion(scene: Scene, spring: Spring) -> list[Shape]:
+def _torsion(scene: Still, spring: Spring) -> list[Shape]:
     """A spiral spring at the pivot of two links, which ends on the one that moves."""
     link, reference = spring.between if spring.between[0] != GROUND else spring.between[::-1]
     pivot = scene.pivot(link, reference)
@@ -330,7 +321,7 @@ def center_shapes(places: Iterable[complex]) -> list[Shape]:
     return shapes
 
 
-def ghost_shapes(scene: Scene, dashes: Dashes) -> list[Shape]:
+def ghost_shapes(scene: Still, dashes: Dashes) -> list[Shape]:
     """The links as thin grey lines."""
     lines = [[*body, *(body[:1] if len(body) > 2 else [])] for _, body in bodies(scene) if len(body) > 1]
     for link in scene.description.links.values():
@@ -340,7 +331,7 @@ def ghost_shapes(scene: Scene, dashes: Dashes) -> list[Shape]:
     return [Line(line, _GHOST, 1.3, 0.1, dashes=dashes) for line in lines]
 
 
-def bodies(scene: Scene) -> list[tuple[str, list[complex]]]:
+def bodies(scene: Still) -> list[tuple[str, list[complex]]]:
     """Outline of each moving rigid link, the largest first so that none hides another."""
     outlines = []
     for name, link in scene.description.links.items():
@@ -355,139 +346,8 @@ def _area(corners: list[complex]) -> float:
     return abs(sum((a.conjugate() * b).imag for a, b in turned)) / 2 if len(corners) > 2 else 0.0
 
 
-def reach(scene: Scene, guide: Guide, places: Iterable[complex]) -> list[complex]:
+def reach(scene: Still, guide: Guide, places: Iterable[complex]) -> list[complex]:
     """Ends of the line that a link carries: from its own points to where something slides."""
     own = [scene.points[point] for point in scene.link_points(guide.owner)]
     along = [((place - guide.origin) * guide.along.conjugate()).real for place in (*own, *places)]
     return [guide.origin + s * guide.along for s in (min(along), max(along))]
-
-
-def drive_shapes(scene: Scene) -> tuple[list[Shape], list[Label]]:
-    """An arrow for each drive, and their names.
-
-    That of an angle runs from the line it is measured from, that of a length or slide in its positive sense.
-    """
-    shapes: list[Shape] = []
-    labels: list[Label] = []
-    turned: list[complex] = []
-    for name, drive in scene.description.drives.items():
-        if drive.kind == "angle":
-            place = scene.points[scene.pivot(drive.target, drive.reference)]
-            radius = ARC + _NESTING * turned.count(place)
-            turned.append(place)
-            start = cmath.phase(scene.rotations[drive.reference])
-            sweep = cmath.phase(scene.rotations[drive.target] / scene.rotations[drive.reference])
-            if abs(sweep) < _MIN_SWEEP:
-                sweep = 4 * _MIN_SWEEP
-            shapes += arc(place, start, sweep, radius, DRIVE_COLOR)
-            base = (0j, (radius + 9) * cmath.exp(1j * start))
-            shapes.append(Symbol(place, 0.3, (base,), edge=DRIVE_COLOR, width=0.9, dashes=(0, (3, 2))))
-            labels.append(Label(name, (place,), DRIVE_COLOR, radius + 4, start + sweep / 2))
-            continue
-        if drive.kind == "length":
-            ends = scene.description.links[drive.target].ends
-            assert ends is not None
-            foot, leg = scene.points[ends[0]], scene.points[ends[1]] - scene.points[ends[0]]
-            place, along, away = foot + 0.36 * leg, leg / abs(leg), BAR / 2 + 6
-        else:
-            guide = next(guide for guide in scene.guides if guide.joint == drive.target)
-            place, along, away = guide.pin, guide.along, SLIDER_SIZE[1] / 2 + 6
-        stem = (complex(-_PUSH / 2, away), complex(_PUSH / 2 - 4, away))
-        shapes += _arrow(place, stem, complex(_PUSH / 2, away), 1.0, 7.0, DRIVE_COLOR, along)
-        labels.append(Label(name, (place,), DRIVE_COLOR, away + 5, cmath.phase(1j * along)))
-    return shapes, labels
-
-
-def arc(place: complex, start: float, sweep: float, radius: float, color: str) -> list[Shape]:
-    """A curved arrow about a place, from the angle `start` over `sweep` (radians); the radius in points."""
-    angles = start + np.linspace(0.0, sweep, 48)
-    # The head is as long on the arc as it looks; a small angle has a small head.
-    head = min(7.0, 0.7 * abs(sweep) * radius)
-    stem = radius * np.exp(1j * angles[np.abs(angles - start) <= abs(sweep) - 0.6 * head / radius])
-    sign = math.copysign(1.0, sweep)
-    tip = radius * np.exp(1j * angles[-1])
-    tangent = 1j * sign * np.exp(1j * (angles[-1] - sign * head / (2 * radius)))
-    return _arrow(place, stem.tolist(), complex(tip), complex(tangent), head, color)
-
-
-def force(place: complex, direction: complex, color: str) -> list[Shape]:
-    """A force: an arrow that ends at the place where it acts."""
-    return _arrow(place, (complex(-FORCE - PIN), complex(-PIN - 6)), complex(-PIN), 1.0, 9.0, color, direction)
-
-
-def arrow(place: complex, tail: complex, tip: complex, color: str, dashes: Dashes = "-") -> list[Shape]:
-    """A straight arrow from and to points on paper beside a place."""
-    way = tip - tail
-    if not way:
-        return []
-    along, head = way / abs(way), min(8.0, 0.7 * abs(way))
-    stem = (tail, tip - 0.6 * head * along)
-    line, *rest = _arrow(place, stem, tip, along, head, color)
-    assert isinstance(line, Symbol)
-    return [replace(line, dashes=dashes), *rest]
-
-
-def _arrow(
-    place: complex, stem: Sequence[complex], tip: complex, along: complex, head: float, color: str,
-    direction: complex = 1.0,
-) -> list[Shape]:  # fmt: skip
-    back = tip - head * along
-    wings = (tip, back + 0.45j * head * along, back - 0.45j * head * along)
-    shapes: list[Shape] = [Symbol(place, 0.6, (wings,), fill=color, edge=None, direction=direction)]
-    if len(stem) > 1:
-        shapes.insert(0, Symbol(place, 0.6, (stem,), edge=color, width=1.7, direction=direction))
-    return shapes
-
-
-def point_labels(scene: Scene) -> list[Label]:
-    """Names of points; what slides in a line has none but its own."""
-    slid = {guide.point for guide in scene.guides if guide.slider is not None}
-    labels = []
-    for name, kind in scene.kinds().items():
-        if kind != "none" or name in slid:
-            away = SLIDER_SIZE[1] / 2 if name in slid else PIN
-            labels.append(Label(name, (scene.points[name],), style.INK, away + 4, size=10.5))
-    return labels
-
-
-def slide_labels(scene: Scene) -> list[Label]:
-    """Names of the slides that are no drive."""
-    return [
-        Label(guide.joint, (guide.pin,), style.FAINT, SLIDER_SIZE[1] / 2 + 8, -math.pi / 3, 9, optional=True)
-        for guide in scene.guides
-        if guide.joint not in scene.description.drives
-    ]
-
-
-def spring_labels(scene: Scene) -> list[Label]:
-    """Names of the springs between points."""
-    labels = []
-    for name, spring in scene.description.springs.items():
-        if not spring.turning:
-            begin, end = (scene.points[point] for point in spring_points(spring))
-            anchors = tuple(begin + share * (end - begin) for share in (0.5, 0.35, 0.65))
-            labels.append(
-                Label(name, anchors, SPRING_COLOR, 2 * _COIL + 2, cmath.phase(1j * (end - begin)), 9, optional=True)
-            )
-    return labels
-
-
-def link_labels(scene: Scene, colors: Mapping[str, str], *, driven: bool = False) -> list[Label]:
-    """Names of the moving links, with those that are `driven` or without."""
-    labels = []
-    for name in scene.description.links:
-        places = [scene.points[point] for point in scene.link_points(name)]
-        if name == GROUND or (name in scene.description.drives and not driven) or not places:
-            continue
-        anchors: tuple[complex, ...]
-        if len(places) == 1:
-            anchors, away, heading = (places[0],), SLIDER_SIZE[1] / 2 + 4, -math.pi / 2
-        elif len(corners := hull(places)) > 2:
-            # The middle of a plate is its own best place.
-            anchors, away, heading = (sum(corners) / len(corners),), 0.0, 0.0
-        else:
-            run = places[1] - places[0]
-            anchors = tuple(places[0] + share * run for share in (0.5, 0.4, 0.6, 0.3, 0.7))
-            away, heading = BAR / 2 + 3, cmath.phase(1j * run if (1j * run).imag >= 0 else -1j * run)
-        labels.append(Label(name, anchors, darker(colors[name]), away, heading, 9, optional=True))
-    return labels

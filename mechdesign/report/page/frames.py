@@ -16,7 +16,7 @@ from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vectors
 from mechdesign.questions.kinematics.moved import full
 from mechdesign.questions.poses import Shown
-from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Table
 
 # Of more poses evenly spread ones are taken, and none are added.

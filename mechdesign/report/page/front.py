@@ -25,7 +25,7 @@ from mechdesign.questions.optimize.figures.front import front_picture, marked, p
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import parted
 from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.scene import Sweep, pose
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.report.page.frames import near_the_paths, paths_of
 from mechdesign.report.page.linkage import Canvas, Sketcher, add
 from mechdesign.report.page.moving import gaps
@@ -110,8 +110,8 @@ def _drawing(sheet: Canvas, sweep: Sweep) -> str:
     root = sheet.root("the mechanism of a design of the front")
     _draw(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
     few = sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()
-    scenes = [scene for k in few if (scene := pose(sweep.mechanism, sweep.configuration, k)) is not None]
-    sketcher = Sketcher(root, sheet, sweep.mechanism, scenes[0], sweep.travel)
+    scenes = sweep.scene.some(few)
+    sketcher = Sketcher(root, sheet, scenes[0])
     sketcher.names(scenes, links=False)
     sketcher.ruler(sweep.study.units.label("length"))
     return tostring(root, encoding="unicode")
@@ -189,9 +189,9 @@ def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[di
 
 def _draw(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     """A design in its first valid pose, and the paths of its points."""
-    scene = pose(sweep.mechanism, sweep.configuration, int(sweep.valid[0]))
+    scene = sweep.first
     assert scene is not None
-    sketcher = Sketcher(layer, sheet, sweep.mechanism, scene, sweep.travel)
+    sketcher = Sketcher(layer, sheet, scene)
     for look in path_looks(sweep):
         sketcher.trace(look.path, look.color, look.width, look.share)
     sketcher.draw()

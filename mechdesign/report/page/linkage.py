@@ -17,15 +17,14 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.path import Path
 
-from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.report.figures import shapes
+from mechdesign.report.figures import callouts, shapes
 from mechdesign.report.figures.framing import fit
 from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions, rows
 from mechdesign.report.figures.panels import round_down
-from mechdesign.report.figures.scene import Scene
-from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol, Travel
+from mechdesign.report.figures.scene import Still
+from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol
 
 # Width, greatest height and margin of a drawing, in its own units of about one point on paper.
 WIDTH = 520.0
@@ -83,22 +82,18 @@ class Canvas:
 class Sketcher:
     """Draws a pose of a mechanism into an SVG element."""
 
-    def __init__(self, root: Element, sheet: Canvas, mechanism: Mechanism, scene: Scene, travel: Travel) -> None:
-        self.root, self.sheet, self.scene, self.travel = root, sheet, scene, travel
-        self.colors = shapes.link_colors(mechanism)
+    def __init__(self, root: Element, sheet: Canvas, scene: Still) -> None:
+        self.root, self.sheet, self.scene = root, sheet, scene
 
     def draw(self) -> None:
         """The mechanism without its names."""
-        for shape in sorted(self._shapes(self.scene), key=lambda shape: shape.layer):
+        for shape in sorted(shapes.mechanism_shapes(self.scene), key=lambda shape: shape.layer):
             if isinstance(shape, Symbol):
                 self._symbol(shape)
             elif isinstance(shape, Strut):
                 self._strut(shape)
             else:
                 self._line(shape)
-
-    def _shapes(self, scene: Scene) -> list[Shape]:
-        return shapes.mechanism_shapes(scene, self.colors, self.travel)
 
     def _group(self, point: str, link: str = GROUND) -> Element:
         """A group that stays at a point, and turns with a link that moves."""
@@ -158,25 +153,25 @@ class Sketcher:
         add(self.root, "path", **{"class": "moving-trace"}, d=self.sheet.path(places), stroke=color,
             stroke_width=width, opacity=share)  # fmt: skip
 
-    def names(self, scenes: Sequence[Scene], *, links: bool = True) -> None:
+    def names(self, scenes: Sequence[Still], *, links: bool = True) -> None:
         """Names of the points and of the links, each where it covers least, averaged over some poses of the motion.
 
         Those of links stay level; the script shows them on request.
         """
         first = self.scene
-        labels = [replace(label, size=_NAME) for label in shapes.point_labels(first)]
+        labels = [replace(label, size=_NAME) for label in callouts.point_labels(first)]
         owners = [(label.text, GROUND) for label in labels]
-        for label in shapes.link_labels(first, self.colors, driven=True) if links else ():
+        for label in callouts.link_labels(first, driven=True) if links else ():
             labels.append(replace(label, size=_NAME - 2, optional=False))
             owners.append((first.link_points(label.text)[0], label.text))
 
-        def anchors(scene: Scene, label: Label, point: str, link: str) -> Floats:
+        def anchors(scene: Still, label: Label, point: str, link: str) -> Floats:
             moved = (np.array(label.anchors) - first.points[point]) * scene.rotations[link] / first.rotations[link]
             return rows(self.sheet.all(scene.points[point] + moved).conj())
 
         places = [[anchors(scene, label, *owner) for label, owner in zip(labels, owners, strict=True)]
                   for scene in scenes]  # fmt: skip
-        nets = [net(map(self._outline, self._shapes(scene))) for scene in scenes]
+        nets = [net(map(self._outline, shapes.mechanism_shapes(scene))) for scene in scenes]
         window = rows(np.array([-1j * self.sheet.height, self.sheet.width]))
         chosen = positions(labels, places, nets, window)
         for label, (point, link), position in zip(labels, owners, chosen, strict=True):

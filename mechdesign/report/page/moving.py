@@ -25,7 +25,8 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.panels import abscissa, round_down
-from mechdesign.report.figures.scene import Scene, Sweep, pose
+from mechdesign.report.figures.scene import Scene, Still
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.report.page.axes import box
 from mechdesign.report.page.frames import frames, largest
 from mechdesign.report.page.linkage import Canvas, Sketcher
@@ -112,9 +113,9 @@ def _motion(
         return None
     begin = int(sweep.valid[0])
     few = sweep.valid[evenly(len(sweep.valid), _FEW_POSES)]
-    scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
+    scenes = Scene(sweep.mechanism, sweep.configuration, whole.scene.travel).some(few.tolist())
     # Guides reach farther than points.
-    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends(whole.travel, scene.span)]
+    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
     sheet = Canvas.around(np.append(whole.extent, ends))
     numbers = ShownNumbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
@@ -151,11 +152,11 @@ def _motion(
     return MovingPicture(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
-def _drawing(study: Study, whole: Sweep, sheet: Canvas, scenes: Sequence[Scene], words: str, *, plain: bool) -> str:
+def _drawing(study: Study, whole: Sweep, sheet: Canvas, scenes: Sequence[Still], words: str, *, plain: bool) -> str:
     """The first of some valid poses, with the paths of the points."""
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
-    sketcher = Sketcher(root, sheet, whole.mechanism, scene, whole.travel)
+    sketcher = Sketcher(root, sheet, scene)
     for look in path_looks(whole):
         sketcher.trace(look.path, look.color, look.width, look.share)
     sketcher.draw()

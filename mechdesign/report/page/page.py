@@ -25,10 +25,11 @@ from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.drawing import Posed
 from mechdesign.report.figures.framing import fit
-from mechdesign.report.figures.mechanism import sketch_figure
-from mechdesign.report.figures.scene import pose
+from mechdesign.report.figures.layout import draw
+from mechdesign.report.figures.mechanism import sketch_picture
+from mechdesign.report.figures.scene import sketched
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.dark import dark
@@ -191,7 +192,7 @@ def _sketch(study: Study) -> str:
     """The sketch, if no question has drawn the mechanism; empty if it cannot be drawn."""
     try:
         with style.context():
-            return vector.inline(sketch_figure(study), "sketch", "The sketch, assembled")
+            return vector.inline(draw(sketch_picture(study)), "sketch", "The sketch, assembled")
     except Exception:
         return ""
 
@@ -200,9 +201,7 @@ def thumbnail(study: Study) -> str:
     """A small drawing of a study's mechanism as a data URI; empty where it cannot be drawn."""
     try:
         with style.context():
-            mechanism = study.mechanism
-            scene = pose(mechanism, mechanism.sketch_configuration)
-            assert scene is not None
+            scene = sketched(study.mechanism)
             width, height = (pixels / style.DPI for pixels in _THUMBNAIL)
             window = fit(scene.points.values(), width, height, 0.25)
             figure = style.new_figure(height, layout=None)
@@ -212,7 +211,7 @@ def thumbnail(study: Study) -> str:
             half = complex(width, height) / 2 / window.scale
             axes.set_xlim(window.middle.real - half.real, window.middle.real + half.real)
             axes.set_ylim(window.middle.imag - half.imag, window.middle.imag + half.imag)
-            draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False, size=0.7)
+            Posed(scene, names=False, drives=False).draw(axes)
             drawn = Image.open(io.BytesIO(style.encoded(figure))).convert("RGB")
     except Exception:
         return ""

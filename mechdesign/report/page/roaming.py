@@ -25,7 +25,7 @@ from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.scene import pose, travels
+from mechdesign.report.figures.scene import Scene
 from mechdesign.report.page.linkage import Canvas, Sketcher, add, dashed
 from mechdesign.report.page.tracks import Map, MovingPicture, ShownNumbers, meanings, places
 from mechdesign.results import Result, Table
@@ -71,8 +71,6 @@ def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
         choices.append(choice | {"numbers": numbers.tracks} | places(sheet, configuration, links))
         drawn.append((begin, entries))
     (begin, entries), (rows, configuration) = drawn[0], solved[0]
-    scene = pose(mechanism, configuration, begin)
-    assert scene is not None
     root = sheet.root(f"the mechanism in the workspace of point {section.point}")
     indices = [index for index in index_columns(shown[0])
                if all(np.isfinite(region.local[index]).any() for region in shown)]  # fmt: skip
@@ -81,9 +79,8 @@ def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
     for k, region in enumerate(shown):
         maps.append((region.title, _maps(layers, sheet, region, norms, f"{name}-map-{k}")))
     add(root, "use", **{"class": "moving-region"}, href=f"#{maps[0][1][0].href}")
-    few = evenly(len(rows), _NAMED_POSES).tolist()
-    scenes = list(filter(None, (pose(mechanism, configuration, index) for index in [begin, *few])))
-    sketcher = Sketcher(root, sheet, mechanism, scene, travels(scenes))
+    scenes = Scene(mechanism, configuration).some([begin, *evenly(len(rows), _NAMED_POSES).tolist()])
+    sketcher = Sketcher(root, sheet, scenes[0])
     sketcher.draw()
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))

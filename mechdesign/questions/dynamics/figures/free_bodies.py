@@ -8,31 +8,29 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.report.figures import shapes, style
-from mechdesign.report.figures.drawing import draw
-from mechdesign.report.figures.framing import extent
+from mechdesign.report.figures.arrows import RATES, Arrows
+from mechdesign.report.figures.callouts import arc, arrow
+from mechdesign.report.figures.drawing import draw, write
+from mechdesign.report.figures.framing import extent, fitting_windows
 from mechdesign.report.figures.joints import NOTHING
-from mechdesign.report.figures.labels import Label, covered, place_labels
+from mechdesign.report.figures.labels import Label
+from mechdesign.report.figures.marks import Late, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, pose
+from mechdesign.report.figures.scene import Still, pose
 from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut
 
 MAX_LINKS = 11
 LEAST = 5e-3  # part of the largest force, and of the largest moment, below which nothing is drawn
-# Inches.
-_LONGEST = 0.62  # arrow
-_PAD = 0.8  # around a link, for arrows and their names
-_TALL, _LOW = 2.5, 2.05  # a panel, and one of a page that holds no more
-_EDGE, _TOP, _TITLE, _BOTTOM = 0.15, 0.62, 0.26, 0.55
+_LONGEST = 45.0  # arrow, points
 _ARC = 19.0  # radius of a moment's arrow, points
+_NOWHERE = np.empty(0, dtype=complex)
 
 
 class _Look(NamedTuple):
@@ -55,7 +53,7 @@ LOOKS = {
 
 
 @picture(DynamicsView, "free_bodies", order=10)
-def free_bodies_figure(view: DynamicsView) -> Figure | None:
+def free_bodies_picture(view: DynamicsView) -> Picture | None:
     """The mechanism with what acts on it from outside, and each link with all that acts on it; None without forces."""
     drawn, mechanism = view.drawn, view.study.mechanism
     index = _worst(view)
@@ -70,36 +68,39 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     moving = [name for name in mechanism.description.links if name != GROUND]
     sizes = {name: max((a.size for a in acting if a.link == name), default=0.0) for name in moving}
     bearing = sorted(filter(sizes.get, moving), key=lambda name: -sizes[name])
-    # A page holds the mechanism and so many links below it.
-    held = int((style.tallest() - _TOP - _bottom()) / (_LOW + _TITLE)) - 1 if style.narrow() else MAX_LINKS
-    shown = sorted(bearing[:held], key=moving.index)
-    count = len(shown) + 1
-    columns = 1 if style.narrow() else 2 if count < 5 else 3
-    wide = (style.width() - 2 * _EDGE) / columns
-    row = int(drawn.shown.rows[index])
-    where, unit = pose_in_words(view.study, view.poses, row, 4), view.study.units.label("force")
+    # A page of paper holds the mechanism and so many links below it.
+    shown = sorted(bearing[: fitting_windows(MAX_LINKS + 1) - 1], key=moving.index)
+    unit, row = view.study.units.label("force"), int(drawn.shown.rows[index])
+    where = pose_in_words(view.study, view.poses, row, 4)
     words = f"Forces on the links [{style.printed(unit)}] at {where}, where a joint bears most"
     words += f"; of {len(bearing)} links those {len(shown)} with the largest forces" * (len(shown) < len(bearing))
-    words = style.folded(words, 11.0, style.width() - 2 * _EDGE)
-    top, rows = _TOP + 0.18 * words.count("\n"), -(-count // columns)
-    tall = min(_TALL, (style.tallest() - top - _bottom() + _TITLE) / rows - _TITLE)
-    figure, panels = style.page(count, columns, tall, left=_EDGE, right=_EDGE, top=top, bottom=_bottom(), down=_TITLE)
-    figure.text(_EDGE / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=11)
-    colors = shapes.link_colors(mechanism)
-    whole = shapes.mechanism_shapes(scene, colors, {})
-    centers = mass_centers(view.study, drawn.shown.configuration, index)
-    tile = _Tile(view, 72 * _LONGEST / largest, least, (wide, tall))
+    whole, centers = shapes.mechanism_shapes(scene), mass_centers(view.study, drawn.shown.configuration, index)
     outside = [action for action in acting if action.link != GROUND and _outside(action, acting)]
-    tile.draw(panels[0], "Mechanism", whole, [*scene.points.values(), *scene.round], outside, [*centers.values()])
-    for axes, name in zip(panels[1:], shown, strict=True):
-        own = [scene.points[point] for point in scene.link_points(name)]
-        mine = [action for action in acting if action.link == name]
-        marked = [place for body, place in centers.items() if body.partition(":")[0] == name]
-        body = _alone(scene, name, whole)
+    reached = np.array([*scene.points.values(), *scene.round])
+    parts = [("Mechanism", whole, reached, outside, [*centers.values()])]
+    for name in shown:
+        body, mine = _alone(scene, name, whole), [action for action in acting if action.link == name]
         outlines = [place for shape in body if isinstance(shape, Line) for place in shape.places]
-        tile.draw(axes, name, body, [*own, *outlines, *(action.place for action in mine)], mine, marked)
-    _key(figure, acting, largest, unit)
-    return figure
+        own = [*(scene.points[point] for point in scene.link_points(name)), *outlines, *(a.place for a in mine)]
+        marked = [place for body, place in centers.items() if body.partition(":")[0] == name]
+        parts.append((name, body, np.array(own), mine, marked))
+    key = Arrows(_NOWHERE, _NOWHERE, 72 * largest / _LONGEST, unit, True, label="force", look=RATES[0])
+    kinds: list[PanelMark] = [
+        Trace([], [], label=look.words, look={"color": look.color, "linestyle": look.dashes, "linewidth": 1.8})
+        for kind, look in LOOKS.items() if any(action.kind == kind for action in acting)
+    ]  # fmt: skip
+    panels = []
+    for name, body, places, mine, marked in parts:
+        most = max((action.size for action in mine), default=0.0) / largest
+        longer = max(round_down(1 / most), 1.0) if most else 1.0
+        tile = _Tile(view, longer * _LONGEST / largest, least, body, mine, marked)
+        shows = np.array([*places, *marked])
+        middle, *sides = extent(shows)
+        if max(sides) < 1e-3 * mechanism.size:
+            shows = middle + 1e-3 * mechanism.size * np.array([-1, 1, 1j, -1j])
+        title = f"{name}, arrows \N{MULTIPLICATION SIGN}{longer:g}" if longer > 1 else name
+        panels.append(Panel([Late(tile.draw), *kinds, key], title=title, equal=1.0, shows=shows, bare=True))
+    return Picture(words, panels, across=1 if style.narrow() else 3)
 
 
 def _worst(view: DynamicsView) -> int | None:
@@ -120,7 +121,7 @@ def _outside(action: Action, acting: Sequence[Action]) -> bool:
                and abs(other.moment + action.moment) <= LEAST * abs(action.moment) for other in same)  # fmt: skip
 
 
-def _alone(scene: Scene, name: str, whole: Sequence[Shape]) -> list[Shape]:
+def _alone(scene: Still, name: str, whole: Sequence[Shape]) -> list[Shape]:
     """The shapes of one link, with its pins and without springs."""
     points, ends = scene.link_points(name), scene.description.links[name].ends
     alone: list[Shape] = []
@@ -136,90 +137,37 @@ def _alone(scene: Scene, name: str, whole: Sequence[Shape]) -> list[Shape]:
     return alone
 
 
-class _Tile:
-    """Draws a link and its arrows into a panel; forces to one scale, each link to its own."""
+class _Tile(NamedTuple):
+    """A link and what acts on it, forces to a scale of points."""
 
-    def __init__(self, view: DynamicsView, scale: float, least: float, size: tuple[float, float]) -> None:
-        self.unit, self.scale, (self.wide, self.tall) = view.study.units.label("moment"), scale, size
-        self.least = least
-        self.smallest = 1e-3 * view.study.mechanism.size
+    view: DynamicsView
+    scale: float
+    least: float
+    body: Sequence[Shape]
+    acting: Sequence[Action]
+    centers: Sequence[complex]
 
-    def draw(
-        self, axes: Axes, title: str, body: Sequence[Shape], places: Sequence[complex], acting: Sequence[Action],
-        centers: Sequence[complex],
-    ) -> None:  # fmt: skip
-        """One panel."""
-        middle, across, tall = extent([*places, *centers])
-        across, tall = max(across, self.smallest), max(tall, self.smallest)
-        scale = min((self.wide - 2 * _PAD) / across, (self.tall - 2 * _PAD) / tall)
-        half = complex(self.wide, self.tall) / 2 / scale
-        axes.set_xlim(middle.real - half.real, middle.real + half.real)
-        axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
-        axes.set_aspect("equal")
-        _bare(axes)
-        largest = max((action.size for action in acting), default=0.0) * self.scale / (72 * _LONGEST)
-        longer = round_down(1 / largest) if largest else 1.0
-        words = f", arrows \N{MULTIPLICATION SIGN}{longer:g}" if longer > 1 else ""
-        axes.set_title(f"{title}{words}", loc="left", fontsize=9.5, color=style.INK)
-        draw(axes, body, size=0.8)
-        draw(axes, shapes.center_shapes(centers), size=0.8)
+    def draw(self, axes: Axes) -> None:
+        """The link, its arrows, and their sizes beside them."""
+        draw(axes, [*self.body, *shapes.center_shapes(self.centers)])
+        middle = complex(sum(axes.get_xlim()) / 2, sum(axes.get_ylim()) / 2)
+        length = np.ptp(axes.get_xlim()) / (72 * axes.bbox.width / style.dots())  # of a point
         labels = []
-        for action in sorted(acting, key=lambda action: -action.size):
-            look = LOOKS[action.kind]
-            way = longer * self.scale * action.force
-            if abs(way) > longer * 72 * _LONGEST * LEAST:
+        for action in sorted(self.acting, key=lambda action: -action.size):
+            look, way = LOOKS[action.kind], self.scale * action.force
+            if abs(way) > _LONGEST * LEAST:
                 # A push ends at its place, a pull begins there.
-                push = action.kind not in ("weight", "inertia") and ((middle - action.place).conjugate() * way).real > 0
-                draw(
-                    axes, shapes.arrow(action.place, -way if push else 0j, 0j if push else way, look.color, look.dashes)
-                )
-                end = action.place + (-way if push else way) / 72 / scale
-                heading = cmath.phase(end - action.place)
-                name = "" if action.kind in ("weight", "inertia") else f"{action.name} "
-                labels.append(
-                    Label(
-                        f"{name}{quantity(action.size, '').strip()}",
-                        (end, (2 * end + action.place) / 3),
-                        look.color,
-                        3.0,
-                        heading,
-                        8.5,
-                    )
-                )
+                inertial = action.kind in ("weight", "inertia")
+                push = not inertial and ((middle - action.place).conjugate() * way).real > 0
+                tail, tip = (-way, 0j) if push else (0j, way)
+                draw(axes, arrow(action.place, tail, tip, look.color, look.dashes))
+                end = action.place + length * (tail if push else tip)
+                words = f"{'' if inertial else action.name} {quantity(action.size, '')}".strip()
+                labels.append(Label(words, (end, (2 * end + action.place) / 3), look.color, 3.0,
+                                    cmath.phase(end - action.place), 8.5))  # fmt: skip
             if abs(action.moment) > self.least:
                 sweep = np.copysign(1.4 * np.pi, action.moment)
-                draw(axes, shapes.arc(action.place, -0.2 * np.pi, sweep, _ARC, look.color))
-                words = quantity(abs(action.moment), self.unit)
+                draw(axes, arc(action.place, -0.2 * np.pi, sweep, _ARC, look.color))
+                words = quantity(abs(action.moment), self.view.study.units.label("moment"))
                 labels.append(Label(words, (action.place,), look.color, _ARC + 3, None, 8.5))
-        place_labels(axes, labels, covered(axes), order=6.0)
-
-
-def _key(figure: Figure, acting: Sequence[Action], largest: float, unit: str) -> None:
-    """Legend of the kinds, and an arrow of a round force."""
-    kinds = [kind for kind in LOOKS if any(action.kind == kind for action in acting)]
-    handles = [Line2D([], [], color=LOOKS[kind].color, linestyle=LOOKS[kind].dashes, linewidth=1.8,
-                      label=LOOKS[kind].words) for kind in kinds]  # fmt: skip
-    columns = 3 if style.narrow() else len(handles)
-    figure.legend(handles=handles, loc="lower left", ncols=columns, borderaxespad=0.2, columnspacing=1.2,
-                  handlelength=1.8)  # fmt: skip
-    force = round_down(largest)
-    right, length, low = style.width() - _EDGE, _LONGEST * force / largest, _bottom() - 0.39
-    key = figure.add_axes((0, 0, 1, _bottom() / figure.get_figheight()))
-    key.set_xlim(0, style.width())
-    key.set_ylim(0, _bottom())
-    _bare(key)
-    draw(key, shapes.arrow(complex(right - length, low), 0j, complex(72 * length), style.INK))
-    key.text(right - length - 0.08, low, quantity(force, unit), ha="right", va="center", fontsize=9)
-
-
-def _bottom() -> float:
-    """Inches for the legend and the arrow, which stands above it on a narrow page."""
-    return _BOTTOM + 0.35 * style.narrow()
-
-
-def _bare(axes: Axes) -> None:
-    """Without ticks and edges."""
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.spines[:].set_visible(False)
-    axes.patch.set_visible(False)
+        write(axes, labels)

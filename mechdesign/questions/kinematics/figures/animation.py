@@ -6,17 +6,18 @@ import io
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
 from mechdesign.numerics.arrays import Ints, evenly
-from mechdesign.questions.kinematics.figures.paths import HEIGHT, draw_paths
+from mechdesign.questions.kinematics.figures.paths import path_marks
 from mechdesign.questions.poses import Shown
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import TITLE, framed
-from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.drawing import Posed
+from mechdesign.report.figures.layout import draw
+from mechdesign.report.figures.marks import Picture
+from mechdesign.report.figures.panels import drawn_plane
+from mechdesign.report.figures.sweep import Sweep
 
 FRAMES = 36  # at most
 _COLORS = 32
@@ -44,10 +45,10 @@ def animation(shown: Shown) -> bytes:
         return b""
     timed = sweep.poses.times is not None
     some, pause = _in_time(sweep) if timed else _in_steps(sweep)
-    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
+    panel = drawn_plane([*path_marks(sweep), Posed(None)], sweep.extent, sweep.study, sweep.words(int(some[0])))
+    figure = draw(Picture("", [panel]))
     figure.set_dpi(_WIDTH / style.width())
-    draw_paths(axes, sweep)
-    pictures = _frames(figure, axes, sweep, some)
+    pictures = _frames(figure, sweep, some)
     if not timed and not sweep.closed:
         pictures += pictures[-2:0:-1]
     palette = _palette(pictures)
@@ -87,12 +88,14 @@ def in_order(sweep: Sweep) -> Ints:
     return valid
 
 
-def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: Ints) -> list[Image.Image]:
+def _frames(figure: Figure, sweep: Sweep, indices: Ints) -> list[Image.Image]:
     canvas: Any = figure.canvas  # the Agg canvas; its own methods have no types
+    (axes,) = figure.axes
+    title = axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=10.5)
     # The paths stand still, but above plates that move.
-    paths = axes.get_lines()
-    for path in paths:
-        path.set_animated(True)
+    lasting = [*axes.get_lines(), title]
+    for artist in lasting:
+        artist.set_animated(True)
     canvas.draw()
     still = canvas.copy_from_bbox(figure.bbox)
     failed = len(sweep.rows) - len(sweep.valid)
@@ -100,13 +103,11 @@ def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: Ints) -> list[Ima
     standing = set(axes.get_children())
     pictures = []
     for index in indices.tolist():
-        draw_mechanism(
-            axes, sweep.mechanism, sweep.configuration, index, labels=False, drives=False, travel=sweep.travel
-        )
-        axes.text(0.0, 1.02, sweep.words(index) + note, transform=axes.transAxes, fontsize=10.5, color=style.INK)
+        Posed(sweep.at(index), names=False, drives=False).draw(axes)
+        title.set_text(sweep.words(index) + note)
         moving = [artist for artist in axes.get_children() if artist not in standing]
         canvas.restore_region(still)
-        for artist in sorted([*paths, *moving], key=lambda artist: artist.get_zorder()):
+        for artist in sorted([*lasting, *moving], key=lambda artist: artist.get_zorder()):
             axes.draw_artist(artist)
         for artist in moving:
             artist.remove()

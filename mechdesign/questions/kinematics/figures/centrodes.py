@@ -5,30 +5,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mechdesign.mechanism.algebra import vector
 from mechdesign.numerics.arrays import Complexes, Flags
 from mechdesign.questions.kinematics.figures.poses import centre_look
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, legend_at_left, tiled, windows
+from mechdesign.report.figures.drawing import Posed
+from mechdesign.report.figures.framing import extent
+from mechdesign.report.figures.marks import Dots, PanelMark, Picture, Trace
+from mechdesign.report.figures.panels import drawn_plane
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Table
 
 MOST_PAIRS = 4
 _NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
 _STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is a pin of the link
-_MAX_COLUMNS = 2
-_PADS = (0.4, 0.3)  # inches around what is drawn, in one column and in several
-_PAGE = 8.0  # inches, of all panels together, about
-_MIN_HEIGHT = 2.0  # inches, of a panel
-_TITLE = 0.5  # inches above a panel
-_HEADING = 0.36
-_GAP = 0.15
-_LEGEND = 0.3
 _LOOKS = ((style.INK, (0, (7, 2, 1.5, 2))), (style.VERMILION, "-"))
 
 
@@ -44,7 +37,7 @@ class Centrodes(NamedTuple):
 
 
 @picture(MotionView, "centrodes", order=35)
-def centrodes_figure(view: MotionView) -> Figure | None:
+def centrodes_picture(view: MotionView) -> Picture | None:
     """A panel for each pair of links whose instant centre is asked for; None where each stays at a pin."""
     sweep, table = view.sweep, view.result.tables.get("instant_centres")
     if table is None or not sweep.poses.followed or not len(sweep.valid):
@@ -53,29 +46,20 @@ def centrodes_figure(view: MotionView) -> Figure | None:
     if not pairs:
         return None
     middle, *sides = extent(sweep.extent)
-    near = [path[np.abs(path - middle) <= _NEAR * max(sides)]
-            for pair in pairs for path in (pair.on_fixed, pair.on_moving)]  # fmt: skip
-    places, count = np.concatenate([sweep.extent, *near]), len(pairs)
-    columns, window = tiled(places, count, _MAX_COLUMNS, gap=_GAP, pads=_PADS, page=_PAGE, least=_MIN_HEIGHT)
-    unit = view.study.units.label("length")
-    figure, panels = windows(window, unit, count, columns, gap=_GAP, above=_TITLE, top=_HEADING, below=0.55 + _LEGEND)
-    heading = "Centrodes: paths of the instant centre in both links; one rolls on the other"
-    heading = style.folded(heading, 11, style.width() - LEFT - RIGHT)
-    style.grow(figure, above=style.line(11) * heading.count("\n"))
-    figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), heading, va="top", fontsize=11)
-    for axes, pair in zip(panels, pairs, strict=True):
-        title = f"{pair.moving} on {pair.fixed}\n{sweep.words(pair.pose)}"
-        axes.set_title(style.folded(title, 9, window.width), loc="left", fontsize=9)
+    panels = []
+    for pair in pairs:
+        marks, shows = list[PanelMark](), [sweep.extent]
         for path, words, (color, dashes) in zip(pair[-2:], ("fixed", "moving"), _LOOKS, strict=True):
-            path = np.where(leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
-            axes.plot(path.real, path.imag, color=color, linestyle=dashes, linewidth=1.5, zorder=2.75,
-                      label=f"{words} centrode")  # fmt: skip
-        axes.plot([pair.centre.real], [pair.centre.imag], **centre_look(), label="instant centre")
-        draw_mechanism(axes, sweep.mechanism, sweep.configuration, pair.pose, travel=sweep.travel, drives=False,
-                       size=1.0 if columns == 1 else 0.7)  # fmt: skip
-    handles = [line for line in panels[0].lines if not str(line.get_label()).startswith("_")]
-    legend_at_left(figure, handles, len(handles))
-    return figure
+            broken = np.where(leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
+            look = {"color": color, "linestyle": dashes, "linewidth": 1.5, "zorder": 2.75}
+            marks.append(Trace(broken.real, broken.imag, label=f"{words} centrode", look=look))
+            shows.append(path[np.abs(path - middle) <= _NEAR * max(sides)])
+        marks += [Dots([pair.centre.real], [pair.centre.imag], label="instant centre", look=centre_look()),
+                  Posed(sweep.at(pair.pose), drives=False)]  # fmt: skip
+        title = f"{pair.moving} on {pair.fixed}\n{sweep.words(pair.pose)}"
+        panels.append(drawn_plane(marks, np.concatenate(shows), view.study, title))
+    heading = "Centrodes: paths of the instant centre in both links; one rolls on the other"
+    return Picture(heading, panels, across=2, share="xy")
 
 
 def centrodes(sweep: Sweep, table: Table) -> list[Centrodes]:

@@ -16,12 +16,13 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.layout import fitting, fitting_rows
+from mechdesign.report.figures.layout import fitting_rows
+from mechdesign.report.figures.legends import fitting
 from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
 from mechdesign.report.figures.overlay import DASHES, both_named
 from mechdesign.report.figures.panels import Along, abscissa, moving_names, times
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import ranks
+from mechdesign.report.figures.sweep import ranks
 from mechdesign.results import Table
 from mechdesign.study import Study, Units
 

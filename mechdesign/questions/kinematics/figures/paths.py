@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import cmath
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
@@ -19,22 +20,17 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, framed, tiled, windows
+from mechdesign.report.figures.drawing import Posed
 from mechdesign.report.figures.labels import Label, paper
-from mechdesign.report.figures.layout import PLANE
-from mechdesign.report.figures.overlay import draw_sweep, name_both
-from mechdesign.report.figures.panels import moving_names
+from mechdesign.report.figures.marks import Late, Panel, PanelMark, Picture, Trace
+from mechdesign.report.figures.overlay import both_named, sweep_marks
+from mechdesign.report.figures.panels import drawn_plane, moving_names
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep, ranks
 from mechdesign.report.figures.shapes import Color, darker, lighter, link_colors
+from mechdesign.report.figures.sweep import Sweep, ranks
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-HEIGHT = 5.6  # inches, of a mechanism along its motion at most
-_LEGEND_LINE = 0.19  # inches
-_TICKS = 0.4  # inches, the word before those of ticks
-_LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
@@ -54,25 +50,17 @@ _NUMBER = 8.0  # points, the type of a number
 _ROUND_ANGLES = (15, 30, 45, 60, 90, 120, 180)  # steps of numbers, degrees
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
-# Of the panels of assemblies.
-_MAX_COLUMNS = 4
-_PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
-_PAGE = 8.0  # inches, of all panels together, about
-_MIN_HEIGHT = 1.2  # inches, of a panel
-_TITLE = 0.3  # inches above a panel
-_NOTE = 0.3  # inches above all panels
-_GAP = 0.12  # inches between panels
-_SMALL_SYMBOLS = 0.6
+_MAX_COLUMNS = 4  # of assemblies
 
 
 @picture(MotionView, "paths", order=10)
-def motion_paths_figure(view: MotionView) -> Figure | None:
-    """The paths of a motion; None where no pose is valid."""
+def paths_picture(view: MotionView) -> Picture | None:
+    """The paths of a motion, with the class of few loops; None where no pose is valid."""
     if not view.sweep.poses.followed or not len(view.sweep.valid):
         return None
-    tables = view.result.tables
-    kinds = _kinds(view.study, tables["loops"]) if "loops" in tables else []
-    return paths_figure(view.sweep, kinds=kinds, before=view.before)
+    kinds = _kinds(view.study, view.result.tables["loops"]) if "loops" in view.result.tables else []
+    title = "Paths of the points" + " now and before" * (view.before is not None)
+    return Picture(title, [paths_panel(view.sweep, before=view.before)], kinds)
 
 
 def _kinds(study: Study, table: Table) -> list[str]:
@@ -82,55 +70,37 @@ def _kinds(study: Study, table: Table) -> list[str]:
     return words if len(words) <= _MOST_KINDS else []
 
 
-def paths_figure(
-    sweep: Sweep, *, above: float = ABOVE, kinds: Sequence[str] = (),
-    before: Before | None = None,
-) -> Figure:  # fmt: skip
+def paths_panel(sweep: Sweep, more: Sequence[PanelMark] = (), before: Before | None = None) -> Panel:
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `kinds` are words
-    about its loops. A study before it lies under it in grey dashes. `above` it, inches are left for a title.
+    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some. A study before it
+    lies under it in grey dashes.
     """
     goals = [
         target.table[:, -2] + 1j * target.table[:, -1]
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
-    places = np.concatenate([sweep.extent, *goals, *([earlier.extent] if earlier is not None else [])])
-    steps = steps_of(sweep)
-    room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
-    kinds = [style.folded(kind, 9, room) for kind in kinds]
-    if steps is not None:
-        steps = steps._replace(words=style.folded(steps.words, 9, room - _TICKS))
-    if rows := sum(label.count("\n") + 1 for label in (*kinds, *([steps.words] if steps is not None else []))):
-        above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
-    figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    axes.set_label(PLANE)
-    for kind in kinds:
-        axes.plot([], [], " ", label=kind)
-    numbers = _draw_steps(axes, sweep, steps) if steps is not None else []
-    for path in goals:
-        axes.plot(
-            path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
-            zorder=3.7,
-        )  # fmt: skip
+    dotted = {"marker": "o", "color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (1, 2.5)), "markersize": 3,
+              "zorder": 3.7}  # fmt: skip
+    marks: list[PanelMark] = [Trace(path.real, path.imag, look=dotted) for path in goals]
     count = len(sweep.mechanism.description.links) - 1
     _, ghosts = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
-    for index in np.unique(some[1 : -1 if sweep.closed else None]):
-        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
-    if earlier is not None:
-        draw_sweep(axes, earlier)
-    draw_paths(axes, sweep)
-    first = int(sweep.valid[0])
-    more = [*_path_names(sweep), *numbers]
-    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel, more=more)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
-    name_both(figure, before)
-    return figure
+    marks += [Posed(still, ghost=True) for still in sweep.scene.some(np.unique(some[1 : -1 if sweep.closed else None]))]
+    marks += [*both_named(before), *path_marks(sweep)]
+    shows, names = [sweep.extent, *goals], _path_names(sweep)
+    if before is not None:
+        earlier = Sweep.of(DrawnMotion.of(before.result).shown)
+        marks += sweep_marks(earlier)
+        shows.append(earlier.extent)
+    if steps := steps_of(sweep):
+        tick = {"color": style.INK, "linewidth": 0.8, "marker": "|", "markersize": _TICK, "markeredgewidth": 1.2}
+        marks += [Late(partial(_draw_steps, sweep, steps)), Trace([], [], label=f"ticks {steps.words}", look=tick)]
+        names += _step_names(sweep, steps)
+    marks += [*more, Posed(sweep.first, more=names)]
+    return drawn_plane(marks, np.concatenate(shows), sweep.study, followed=True)
 
 
 class Steps(NamedTuple):
@@ -171,40 +141,48 @@ def steps_of(sweep: Sweep) -> Steps | None:
     return Steps(rows, f"every {words}; numbers: {name}", written)
 
 
-def _draw_steps(axes: Axes, sweep: Sweep, steps: Steps) -> list[Label]:
-    """Short lines across the boldest paths, of a length on paper; returns the numbers to be written beside some."""
-    ranked, looks = ranks(sweep.study), {look.point: look for look in path_looks(sweep)}
-    shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
-    half, lines, numbers = _TICK / 2 / (shown[1, 0] - shown[0, 0]), [], []
+def _across(sweep: Sweep, steps: Steps) -> Iterator[tuple[str, Complexes, Complexes]]:
+    """Points of the boldest paths, their places at the steps, and the unit vectors across the path there."""
+    ranked, rows = ranks(sweep.study), steps.rows
     for point, path in sweep.places.items():
-        if ranked[point] < max(ranked.values()):
-            continue
-        rows = steps.rows
-        before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
-        with np.errstate(invalid="ignore"):
-            along = np.where(np.isfinite(path[after]), path[after], path[rows])
-            along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
-            across = 1j * half * along / np.abs(along)
-        ends = np.stack([path[rows] - across, path[rows] + across], axis=1)
+        if ranked[point] == max(ranked.values()):
+            before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
+            with np.errstate(invalid="ignore"):
+                along = np.where(np.isfinite(path[after]), path[after], path[rows])
+                along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
+                yield point, path[rows], 1j * along / np.abs(along)
+
+
+def _draw_steps(sweep: Sweep, steps: Steps, axes: Axes) -> None:
+    """Short lines across the boldest paths, of a length on paper."""
+    shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
+    half, lines = _TICK / 2 / (shown[1, 0] - shown[0, 0]), []
+    for _, places, across in _across(sweep, steps):
+        ends = np.stack([places - half * across, places + half * across], axis=1)
         lines += [np.column_stack([end.real, end.imag]) for end in ends if np.isfinite(end).all()]
-        color = darker(looks[point].color)
-        for row, toward in zip(rows.tolist(), across.tolist(), strict=True):
-            if row in steps.written and np.isfinite(toward):
-                numbers.append(Label(steps.written[row], (complex(path[row]),), color, _TICK / 2 + 1,
-                                     float(np.angle(toward)), _NUMBER, optional=True))  # fmt: skip
     axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
-    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2,
-              label=f"ticks {steps.words}")  # fmt: skip
-    return numbers
 
 
-def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
-    """Draw the path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
-    for look in path_looks(sweep):
-        axes.plot(
-            look.path.real, look.path.imag, color=look.color, linewidth=look.width * width, alpha=look.share,
-            zorder=2.5 + 0.1 * look.rank, solid_joinstyle="round",
-        )  # fmt: skip
+def _step_names(sweep: Sweep, steps: Steps) -> list[Label]:
+    """The values that are written beside some steps."""
+    looks = {look.point: look for look in path_looks(sweep)}
+    return [
+        Label(steps.written[row], (place,), darker(looks[point].color), _TICK / 2 + 1, cmath.phase(toward), _NUMBER,
+              optional=True)
+        for point, places, across in _across(sweep, steps)
+        for row, place, toward in zip(steps.rows.tolist(), places.tolist(), across.tolist(), strict=True)
+        if row in steps.written and cmath.isfinite(toward)
+    ]  # fmt: skip
+
+
+def path_marks(sweep: Sweep, width: float = 1.0) -> list[Trace]:
+    """The path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
+    return [
+        Trace(look.path.real, look.path.imag, look={
+            "color": look.color, "linewidth": look.width * width, "alpha": look.share, "zorder": 2.5 + 0.1 * look.rank,
+            "solid_joinstyle": "round"})
+        for look in path_looks(sweep)
+    ]  # fmt: skip
 
 
 class PathLook(NamedTuple):
@@ -220,7 +198,7 @@ class PathLook(NamedTuple):
 
 def path_looks(sweep: Sweep) -> list[PathLook]:
     """The path of every moving point, those of a low rank first."""
-    ranked, colors = ranks(sweep.study), link_colors(sweep.mechanism)
+    ranked, colors = ranks(sweep.study), link_colors(sweep.mechanism.description)
     # Where all points are of a low rank, none is thin.
     lift = 2 - max(ranked.values(), default=2)
     owners: dict[str, str] = {}
@@ -254,28 +232,21 @@ def _path_names(sweep: Sweep) -> list[Label]:
 
 
 @picture(MotionView, "modes", order=50)
-def modes_figure(view: MotionView) -> Figure | None:
+def modes_picture(view: MotionView) -> Picture | None:
     """A panel an assembly that has a valid pose, as many of all as the record of the result has, on one scale."""
     if "modes" not in view.result.tables:
         return None
-    study, table, count = view.study, view.result.tables["modes"], view.result.counts["modes"]
+    table, count = view.result.tables["modes"], view.result.counts["modes"]
     shown = [(title, Sweep.of(motion)) for title, motion in view.drawn.modes.items()]
     moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
-    notes = []
-    if moving > len(shown):
-        notes.append(f"{len(shown)} of {moving} assemblies")
-    if count > moving:
-        notes.append(f"{count - moving} of {count} assemblies have no valid pose")
-    places = np.concatenate([sweep.extent for _, sweep in shown])
-    columns, window = tiled(places, len(shown), _MAX_COLUMNS, gap=_GAP, pads=_PADS, page=_PAGE, least=_MIN_HEIGHT)
-    unit, top = study.units.label("length"), _NOTE if notes else 0.0
-    figure, grid = windows(window, unit, len(shown), columns, gap=_GAP, above=_TITLE, top=top)
-    for axes, (title, sweep) in zip(grid, shown, strict=True):
-        axes.set_title(title, loc="left", fontsize=10)
-        draw_paths(axes, sweep, width=0.8)
-        draw_mechanism(
-            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
-            travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
-        )  # fmt: skip
-    figure.text(LEFT / style.width(), 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
-    return figure
+    notes = [f"{len(shown)} of {moving} assemblies"] * (moving > len(shown))
+    notes += [f"{count - moving} of {count} assemblies have no valid pose"] * (count > moving)
+    return Picture("Assemblies", [drawn_panel(sweep, title) for title, sweep in shown], ["; ".join(notes)],
+                   across=_MAX_COLUMNS, share="xy")  # fmt: skip
+
+
+def drawn_panel(sweep: Sweep, title: str, more: Sequence[PanelMark] = (), *, followed: bool = False) -> Panel:
+    """The first valid pose without names, and the paths of its points, if it moves, beside others on one scale."""
+    paths = path_marks(sweep, 0.8) if sweep.poses.followed else ()
+    posed = Posed(sweep.first, names=False, drives=False)
+    return drawn_plane([*paths, *more, posed], sweep.extent, sweep.study, title, followed=followed)

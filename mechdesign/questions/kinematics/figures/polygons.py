@@ -6,24 +6,24 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.questions.kinematics.figures.poses import KINDS, RateArrow, arrow, place_of, rates_of
+from mechdesign.questions.kinematics.figures.poses import KINDS, place_of, rates_of
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.special_poses import SpecialPose
 from mechdesign.report.figures import style
+from mechdesign.report.figures.arrows import RATES, Arrows
+from mechdesign.report.figures.drawing import write
 from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
+from mechdesign.report.figures.labels import Label
+from mechdesign.report.figures.marks import Axis, Dots, Late, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import hull
 from mechdesign.report.figures.shapes import link_colors
 
 MOST_POSES = 3
 POLE = "p"
-_PAD = 0.16  # of its size, around a polygon
 _SAME = 1e-6  # of the largest rate: tips as near as this are one
 _NAME = 9.0  # points
 
@@ -53,8 +53,7 @@ def images(view: MotionView, special: SpecialPose, order: int) -> Mapping[str, d
 
 def _panel(view: MotionView, special: SpecialPose, order: int) -> Panel:
     """The polygon of one order of rates: arrows from the pole, and the image of each link."""
-    mechanism, kind = view.study.mechanism, KINDS[order]
-    colors, tips = link_colors(mechanism), dict[str, complex]()
+    colors, tips = link_colors(view.study.mechanism.description), dict[str, complex]()
     for points in (links := images(view, special, order)).values():
         tips |= points
     parts = _parts(view, special, links) if order else {}
@@ -74,23 +73,14 @@ def _panel(view: MotionView, special: SpecialPose, order: int) -> Panel:
         thin = {"color": colors[link], "linewidth": 1.0, "linestyle": (0, (4, 2)), "zorder": 4.7}
         marks.append(Trace(path.real, path.imag, look=thin))
     pole = {"marker": "+", "color": style.INK, "markersize": 11, "markeredgewidth": 1.6, "zorder": 5}
-    middle, wide, tall = extent(places if largest else np.array([-1, 1j]))
-    marks += [Dots([0], [0], look=pole), Own(partial(_arrows, named, kind, middle), late=True)]
-    unit, room = view.study.units.label(kind.name), _PAD * max(wide, tall)
-    x, y = (Axis(f"{kind.name} {name}", unit, ends=(at - side / 2 - room, at + side / 2 + room))
-            for name, at, side in (("x", middle.real, wide), ("y", middle.imag, tall)))  # fmt: skip
-    return Panel(marks, x, y, f"{kind.name.capitalize()} at {special.where}", equal=1.0)
-
-
-def _arrows(named: Mapping[complex, list[str]], kind: RateArrow, middle: complex, axes: Axes) -> None:
-    """Arrows from the pole to the tips, and the names of these."""
-    inches = axes.bbox.width / style.dots() / float(np.ptp(axes.get_xlim()))
-    for tip in named:
-        if tip:
-            axes.add_line(arrow(0j, tip, kind, inches))
+    shows = places if largest else np.array([-1, 1j])
+    middle, long = extent(shows)[0], np.array([tip for tip in named if tip], dtype=complex)
     labels = [Label(", ".join(names), (tip,), style.INK, 6.0, float(np.angle(tip - middle)), _NAME)
               for tip, names in named.items()]  # fmt: skip
-    place_labels(axes, labels, covered(axes), order=5.2)
+    marks += [Dots([0], [0], look=pole), Arrows(0 * long, long, look=RATES[order]), Late(partial(write, labels=labels))]
+    kind, unit = KINDS[order], view.study.units.label(KINDS[order])
+    title = f"{kind.capitalize()} at {special.where}"
+    return Panel(marks, Axis(f"{kind} x", unit), Axis(f"{kind} y", unit), title, equal=1.0, shows=shows)
 
 
 def _parts(view: MotionView, special: SpecialPose, links: Mapping[str, dict[str, complex]]) -> dict[str, Complexes]:

@@ -15,7 +15,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
 from mechdesign.report.figures.panels import Along, abscissa, moving_names
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Table
 from mechdesign.study import Study
 

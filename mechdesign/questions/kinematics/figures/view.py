@@ -6,7 +6,7 @@ from functools import cached_property
 
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.report.figures.pictures import View
-from mechdesign.report.figures.scene import Sweep
+from mechdesign.report.figures.sweep import Sweep
 
 
 class MotionView(View):

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.questions.kinematics.figures.paths import draw_paths, paths_figure
+from mechdesign.questions.kinematics.figures.paths import drawn_panel, paths_panel
 from mechdesign.questions.optimize.analysis import DrawnDesign, drawn_design
 from mechdesign.questions.optimize.figures.designs import listed
 from mechdesign.questions.optimize.figures.front import chosen, described, marked
@@ -23,32 +20,17 @@ from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.boundary import regions_picture, workspace_picture
 from mechdesign.questions.workspace.figures.regions import regions
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, framed
-from mechdesign.report.figures.layout import OVER
-from mechdesign.report.figures.marks import Axis, Own, Panel, PanelMark, Picture, Trace
+from mechdesign.report.figures.drawing import Posed
+from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.mechanism import sketch_and_first_pose
-from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa
+from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, drawn_plane
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Sweep
-from mechdesign.report.figures.ticks import tick
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # Angles at which the outline of a contained shape is drawn.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
-# Inches.
-_HEIGHT = 5.0
-_TITLE = 0.42
-_TITLE_LINE = 0.18
-_PANEL = 1.25
-_PANEL_GAP = 0.42
-_BELOW = 0.55
-_LEGEND = 0.35
-_BESIDE = 0.12
-_SMALL_SYMBOLS = 0.7
-_ROOM = 0.07  # of its size, about what is shown
-_LETTERS_AN_INCH = 13.5
 _CURVE_POSES = 240  # of the motion between listed poses
 # Of more poses the values are joined by a line.
 _MAX_DOTS = 15
@@ -86,56 +68,28 @@ def reached(table: Table) -> list[Reached]:
     return [curve for curve in outputs if curve.values is not None] or outputs
 
 
-def design_figure(study: Study, motion: Result, words: str) -> Figure:
+def design_picture(study: Study, motion: Result, words: str) -> Picture:
     """The mechanism in motion or at its listed poses, with target places; below, target curves and those reached."""
     sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
     shown = reached(table)
-    title = style.folded(words, 11.0, style.width() - LEFT)
-    above = _TITLE + _TITLE_LINE * title.count("\n")
+    targets = [*_target_marks(table, shown)]
     if sweep.poses.followed:
-        figure = paths_figure(sweep, above=above)
+        panel = paths_panel(sweep, targets)
     else:
         worst = _worst(shown, sweep.valid)
-        title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
-        title = style.folded(title.replace("\n", " "), 11.0, style.width() - LEFT)
-        above = _TITLE + _TITLE_LINE * title.count("\n")
-        figure = _posed(sweep, worst, _targets(table, shown), above)
-    axes = figure.axes[0]
-    axes.set_title(title, loc="left", fontsize=10.5)
-    for mark in _target_marks(table, shown):
-        mark.draw(axes).set_label(mark.label)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
-    if shown:
-        _panels(figure, abscissa(study, sweep.poses), shown[: MAX_PANELS // 2])
-    return figure
+        words += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
+        panel = _posed(sweep, worst, _targets(table, shown), targets)
+    return Picture(words, [panel, *_over_poses(abscissa(study, sweep.poses), shown[: MAX_PANELS // 2])])
 
 
 def designs_picture(parts: Sequence[tuple[str, Shown, Result | None]]) -> Picture:
     """Designs side by side on one scale: each in its poses, under its words, with its motion where that was judged."""
-    sweeps = [Sweep.of(shown) for _, shown, _ in parts]
-    places, panels = np.concatenate([sweep.extent for sweep in sweeps]), []
-    for (words, _, motion), sweep in zip(parts, sweeps, strict=True):
+    panels = []
+    for words, shown, motion in parts:
         table = motion.tables["motion"] if motion is not None else None
         targets = [] if table is None else [*_target_marks(table, reached(table))]
-        panels.append((words, [*targets, Own(partial(_draw_design, sweep), late=True)]))
-    middle, wide, tall = extent(places)
-    half = np.array([wide, tall]) / 2 + _ROOM * max(wide, tall)
-    unit = sweeps[0].study.units.label("length")
-    x, y = (Axis(name, unit, ends=(at - side, at + side))
-            for name, at, side in zip("xy", (middle.real, middle.imag), half.tolist(), strict=True))  # fmt: skip
-    shown = [Panel(marks, x, y, words, equal=1.0, plane=True) for words, marks in panels]
-    return Picture("", shown, across=1 if style.narrow() else len(shown), share="xy")
-
-
-def _draw_design(sweep: Sweep, axes: Axes) -> None:
-    """A design in its first valid pose, and the paths of its points."""
-    if sweep.poses.followed:
-        draw_paths(axes, sweep, width=0.8)
-    draw_mechanism(
-        axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
-        travel=sweep.travel, size=_SMALL_SYMBOLS,
-    )  # fmt: skip
+        panels.append(drawn_panel(Sweep.of(shown), words, targets, followed=True))
+    return Picture("", panels, across=len(panels), share="xy")
 
 
 def _worst(shown: Sequence[Reached], valid: Ints) -> int:
@@ -168,19 +122,15 @@ def _target_marks(table: Table, shown: Sequence[Reached]) -> Iterator[Trace]:
         yield Trace(x, y, label=f"{point} reached", look={"color": style.INK} | _LOOKS["reached", few])
 
 
-def _posed(sweep: Sweep, index: int, targets: dict[str, Complexes], above: float) -> Figure:
+def _posed(sweep: Sweep, index: int, targets: dict[str, Complexes], more: Sequence[PanelMark]) -> Panel:
     """The mechanism in one of its listed poses, pale in the others, and the curves of its points between them."""
-    between = _between(sweep)
-    curves = {point: between[point] for point in targets if point in between}
+    curves = {point: curve for point, curve in _between(sweep).items() if point in targets}
+    look = {"color": style.BLUE, "linewidth": 1.6, "zorder": 3.6}
+    marks: list[PanelMark] = [Trace(curve.real, curve.imag, label=f"path of {point}", look=look)
+                              for point, curve in curves.items()]  # fmt: skip
+    marks += [Posed(still, ghost=True) for still in sweep.scene.some(sweep.valid[sweep.valid != index])]
     places = np.concatenate([sweep.extent, *targets.values(), *curves.values()])
-    figure, axes = framed(places, sweep.study.units.label("length"), height=_HEIGHT, above=above)
-    for other in sweep.valid:
-        if other != index:
-            draw_ghost(axes, sweep.mechanism, sweep.configuration, int(other))
-    for point, curve in curves.items():
-        axes.plot(curve.real, curve.imag, color=style.BLUE, linewidth=1.6, zorder=3.6, label=f"path of {point}")
-    draw_mechanism(axes, sweep.mechanism, sweep.configuration, index, travel=sweep.travel)
-    return figure
+    return drawn_plane([*marks, *more, Posed(sweep.at(index))], places, sweep.study)
 
 
 def _between(sweep: Sweep) -> dict[str, Complexes]:
@@ -200,50 +150,23 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     return paths
 
 
-def _error_title(curve: Reached) -> str:
-    """An output and its largest error."""
-    words = f"{curve.output}: reached less wanted, in the poses at most {curve.worst:.3g} {curve.unit}".rstrip()
-    return style.folded(words, 9.5, style.width() - LEFT)
-
-
-def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
-    """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
-    titles = {curve.output: _error_title(curve) for curve in shown}
-    gap = _PANEL_GAP + style.line(9.5) * max(title.count("\n") for title in titles.values())
-    rows = [(curve, part) for curve in shown for part in ("curve", "error")
-            if part == "error" or (curve.values is not None and curve.output[-2:] not in (".x", ".y"))]  # fmt: skip
-    room = len(rows) * (_PANEL + gap) + _BELOW
-    style.grow(figure, below=room)
-    height = figure.get_figheight()
-    left, wide = LEFT / style.width(), 1 - (LEFT + RIGHT) / style.width()
-    look: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
-    for k, (curve, part) in enumerate(rows):
-        low = _BELOW + (len(rows) - 1 - k) * (_PANEL + gap)
-        axes = figure.add_axes((left, low / height, wide, _PANEL / height))
-        if part == "curve" and curve.values is not None:
-            axes.plot(over.values, curve.values - curve.error, color=style.VERMILION, linestyle=(0, (5, 2)),
-                      linewidth=2.4, label="wanted")  # fmt: skip
-            axes.plot(over.values, curve.values, color=style.BLUE, linewidth=1.2, label="reached", **look)
-            axes.legend(loc="best", ncols=2)
-            axes.set_title(curve.output, loc="left", fontsize=9.5)
-            axes.set_ylabel(style.axis_label("value", curve.unit))
-        else:
-            axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
-            axes.plot(over.values, curve.error, color=style.BLUE, **look)
-            axes.set_title(titles[curve.output], loc="left", fontsize=9.5)
-            axes.set_ylabel(style.axis_label("error", curve.unit))
-        axes.locator_params(axis="y", nbins=5)
-        axes.set_label(f"{OVER}{over.label}")
-        tick(axes.xaxis, over.axis, wide * style.width())
-        axes.margins(x=0.02)
-        if k == len(rows) - 1:
-            axes.set_xlabel(over.label)
-        else:
-            axes.tick_params(labelbottom=False)
+def _over_poses(over: Along, shown: Sequence[Reached]) -> Iterator[Panel]:
+    """Scalar outputs as wanted and reached, and the error of every output, over the poses."""
+    dots: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
+    blue = {"color": style.BLUE} | dots
+    for curve in shown:
+        if curve.values is not None and curve.output[-2:] not in (".x", ".y"):
+            dashed = {"color": style.VERMILION, "linestyle": (0, (5, 2)), "linewidth": 2.4}
+            marks = [Trace(over.values, curve.values - curve.error, label="wanted", look=dashed),
+                     Trace(over.values, curve.values, label="reached", look=blue | {"linewidth": 1.2})]  # fmt: skip
+            yield Panel(marks, over.wider, Axis("value", curve.unit), curve.output)
+        words = f"{curve.output}: reached less wanted, in the poses at most {curve.worst:.3g} {curve.unit}".rstrip()
+        zero = Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})
+        yield Panel([zero, Trace(over.values, curve.error, look=blue)], over.wider, Axis("error", curve.unit), words)
 
 
 @picture(DesignsView, "optimum", order=80)
-def optimum_figure(view: DesignsView) -> Figure | Picture:
+def optimum_picture(view: DesignsView) -> Picture:
     """The best design: in its workspace if that was judged, else in its motion.
 
     Of a front those that are marked in it, side by side.
@@ -269,7 +192,7 @@ def optimum_figure(view: DesignsView) -> Figure | Picture:
         return workspace_picture(best.study, shown, region, title, more=[*_contained(best)])
     words = f"The best design, {words}"
     if best.motion is not None:
-        return design_figure(best.study, best.motion, words)
+        return design_picture(best.study, best.motion, words)
     return sketch_and_first_pose(best.study, best.shown, words)
 
 

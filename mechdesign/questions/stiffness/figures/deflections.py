@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -24,32 +21,27 @@ from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, legend_at_left, windows
-from mechdesign.report.figures.panels import quantity, round_down
+from mechdesign.report.figures.callouts import ARC, arc, force
+from mechdesign.report.figures.drawing import Posed, draw
+from mechdesign.report.figures.marks import Dots, Late, Own, PanelMark, Picture, Trace
+from mechdesign.report.figures.panels import drawn_plane, quantity, round_down
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, hull, pose
-from mechdesign.report.figures.shapes import ARC, arc, force
+from mechdesign.report.figures.scene import Scene, Still, hull, pose
+from mechdesign.report.figures.shapes import Shape
 from mechdesign.study import Study
 
 MAX_LOADS = 4
 # Poses, and those that a column of a journal holds.
 MAX_DIRECTIONS = 4
 MAX_NARROW_DIRECTIONS = 3
-_MAX_TICKS = 6  # below a panel
 _SAME = 1e-6  # of the mechanism's size, between the points of two poses that are one
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
-_LETTERS_AN_INCH = 14.5  # of a panel's title
 # Main axes of the ellipse: column, words, angle from that of k_max, colour and dashes.
 _MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
     ("k_min", "softest", np.pi / 2, style.VERMILION, "-"),
     ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
 )
-# Inches.
-_PANEL_TITLE = 0.17  # a line
-_HEADING = 0.32
-_LEGEND = 0.3
 _PALE = "#D5DCE4"  # of the mechanism without load, in the legend
 # Shape functions of a deflected beam, cubic between its ends as bending makes it, at these parts of its length.
 _ALONG = np.linspace(0.0, 1.0, 25)
@@ -58,9 +50,9 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
 
 
 @picture(StiffnessView, "deflections", order=20)
-def deflections_figure(view: StiffnessView) -> Figure | None:
+def deflections_picture(view: StiffnessView) -> Picture | None:
     """The whole mechanism where each load moves it, a panel a load, all with one magnification."""
-    study, poses, drawn = view.study, view.poses, view.drawn.first
+    study, drawn = view.study, view.drawn.first
     if drawn is None:
         return None
     scene, body = pose(study.mechanism, drawn.configuration), drawn.body
@@ -74,63 +66,32 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
         return None
     scale = round_down(LARGEST_MOVE * scene.span / max(*sizes, 1e-300))
     bent = [[rest + scale * move[:, k] for rest, move in shapes] for k in range(len(loads))]
-    places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
-    where = pose_in_words(study, poses, drawn.row)
-    figure, panels = _panels(
-        study, places, len(loads), f"deflections, drawn {scale:g} times as large, at {where}", lines=2
-    )
     name, length = body.section.at, study.units.label("length")
-    for k, (axes, lines, load) in enumerate(zip(panels, bent, loads.tolist(), strict=True)):
-        axes.locator_params(axis="x", nbins=_MAX_TICKS)
-        draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
-        for line in lines:
-            axes.plot(line.real, line.imag, color=style.INK, linewidth=1.8, zorder=5)
-        moved = lines[0][0]
-        axes.plot([at.real, moved.real], [at.imag, moved.imag], ":", color=style.BLUE, linewidth=1.4, zorder=5.2)
-        axes.plot([moved.real], [moved.imag], "o", color=style.BLUE, zorder=6)
+    unloaded = Trace([], [], label="without load", look={"color": _PALE, "linewidth": 6.0})
+    loaded = {"color": style.INK, "linewidth": 1.8, "zorder": 5}
+    panels = []
+    for k, (lines, load) in enumerate(zip(bent, loads.tolist(), strict=True)):
+        moved = complex(lines[0][0])
+        way = {"color": style.BLUE, "linestyle": ":", "marker": "o", "markevery": [1], "linewidth": 1.4, "zorder": 5.2}
         # The arrows act where the load does; at the asked point, where it has moved.
-        own = (complex(moved), complex(*load[:2]), load[2] if load[2:] else 0.0)
-        for place, push, turn in drawn.pushes.get(k, [own]):
-            if push:
-                draw(axes, force(place, push / abs(push), style.VERMILION), order=5.5)
-            if turn:
-                draw(axes, arc(place, -np.pi / 4, np.copysign(1.5 * np.pi, turn), ARC, style.VERMILION), order=5.5)
-        size = abs(shapes[0][1][0, k])
-        axes.set_title(f"{words[k]}\n{name} moves {quantity(float(size), length)}",
-                       loc="left", fontsize=9)  # fmt: skip
-    handles = [Line2D([], [], color=color, linewidth=width, label=words)
-               for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
-                                           (style.VERMILION, 1.8, "load"))]  # fmt: skip
-    handles.append(Line2D([], [], color=style.BLUE, linestyle=":", marker="o", label=f"{name} and its way"))
-    legend_at_left(figure, handles, len(handles))
-    return figure
+        pushes = drawn.pushes.get(k, [(moved, complex(*load[:2]), load[2] if load[2:] else 0.0)])
+        arrows = list[Shape]()
+        for place, push, turn in pushes:
+            arrows += force(place, push / abs(push), style.VERMILION) if push else []
+            arrows += arc(place, -np.pi / 4, np.copysign(1.5 * np.pi, turn), ARC, style.VERMILION) if turn else []
+        marks = [unloaded, Posed(scene, faint=True),
+                 *(Trace(line.real, line.imag, label="under the load", look=loaded) for line in lines),
+                 Trace([], [], label="load", look={"color": style.VERMILION, "linewidth": 1.8}),
+                 Trace([at.real, moved.real], [at.imag, moved.imag], label=f"{name} and its way", look=way),
+                 Late(partial(draw, drawn=arrows, order=5.5))]  # fmt: skip
+        size = quantity(float(abs(shapes[0][1][0, k])), length)
+        shows = np.concatenate([scene.places, *(line for lines in bent for line in lines)])
+        panels.append(drawn_plane(marks, shows, study, f"{words[k]}\n{name} moves {size}"))
+    title = f"Deflections, drawn {scale:g} times as large, at {pose_in_words(study, view.poses, drawn.row)}"
+    return Picture(title, panels, across=2, share="xy")
 
 
-def _panels(
-    study: Study, places: Complexes, count: int, heading: str, lines: int = 3
-) -> tuple[Figure, list[Axes]]:  # fmt: skip
-    """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
-    columns = 1 if style.narrow() else min(count, 2)
-    heading = style.folded(heading[0].upper() + heading[1:], 11.0, style.width() - LEFT - RIGHT)
-    above = _PANEL_TITLE * lines + ABOVE
-    top = _HEADING + style.line(11.0) * heading.count("\n")
-    # All of them on a page of paper.
-    rows = -(-count // columns)
-    room = (style.tallest() - top - BELOW - 2 * _LEGEND) / rows - above
-    tall = min(MAX_HEIGHT if count == 1 else min(3.2, 8.0 / rows), room)
-    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, tall, min(PAD, 0.3 * tall))
-    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=top,
-                           below=BELOW + _LEGEND)  # fmt: skip
-    figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), heading, va="top", fontsize=11)
-    return figure, axes
-
-
-def _symbol_size(panels: int) -> float:
-    """Size of symbols, smaller where several drawings stand side by side."""
-    return 1.0 if panels == 1 else 0.7
-
-
-def _shapes(drawn: DrawnPose, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+def _shapes(drawn: DrawnPose, scene: Still) -> list[tuple[Complexes, Complexes]]:
     """Lines of all links at rest, shape (n,), and their displacements by each load, shape (n, loads).
 
     The first begins at the asked point.
@@ -199,7 +160,7 @@ def _beam(
 
 
 @picture(StiffnessView, "directions", order=40)
-def directions_figure(view: StiffnessView) -> Figure | None:
+def directions_picture(view: StiffnessView) -> Picture | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
     study, tables, shown = view.study, view.result.tables, view.drawn.shown
     table, soft, section = tables["stiffness"], tables["compliance"], StiffnessSection.of(study)
@@ -211,8 +172,8 @@ def directions_figure(view: StiffnessView) -> Figure | None:
     ]
     closed = len(index) > 2 and all(abs(last - first) <= _SAME * study.mechanism.size for first, last in ends)
     some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index)), endpoint=not closed).astype(int))
-    posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
-    scenes = {k: scene for k, scene in posed.items() if scene is not None}
+    every = Scene(study.mechanism, shown.configuration)
+    scenes = {k: scene for k in index[some].tolist() if (scene := every.at(k)) is not None}
     if not scenes:
         return None
     rows = shown.rows[list(scenes)]
@@ -221,43 +182,41 @@ def directions_figure(view: StiffnessView) -> Figure | None:
         return None
     if soft_ends.max() < _ONE_SCALE * soft_ends.min():
         soft_ends[:] = soft_ends.max()
-    force, span = _force(study), max(scene.span for scene in scenes.values())
-    scales = [force * round_down(_LARGEST_ELLIPSE * span / (force * end)) for end in soft_ends.tolist()]
+    force = _force(study)
+    scales = [force * round_down(_LARGEST_ELLIPSE * every.span / (force * end)) for end in soft_ends.tolist()]
     turns, ellipses = np.exp(1j * np.linspace(0, 2 * np.pi, 361)), []
     for row, scale in zip(rows, scales, strict=True):
         xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
         ellipses.append(scale * (xx * turns.real + xy * turns.imag + 1j * (xy * turns.real + yy * turns.imag)))
-    places = [[*scene.points.values(), *(scene.points[section.point] + ellipse)]
-              for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
-    words = f"{force:g} {style.printed(study.units.label('force'))}"
-    heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
-    wide = (style.width() - RIGHT) / (1 if style.narrow() else min(len(scenes), 2)) - LEFT
-    # Broken between coordinates only.
-    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, shown.poses, int(row), 4)) for row in rows]
-    where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]
-    lines = 4 + max(words.count("\n") for words in where)
-    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=lines)
-    units = study.units.label("stiffness"), study.units.label("angle")
-    shapes = zip(panels, scenes.items(), rows, scales, ellipses, where, strict=True)
-    for axes, (k, scene), row, scale, ellipse, words in shapes:
+    units, panels = (study.units.label("stiffness"), study.units.label("angle")), []
+    shapes = zip(scenes.values(), rows.tolist(), scales, ellipses, strict=True)
+    for scene, row, scale, ellipse in shapes:
         at = scene.points[section.point]
-        draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_symbol_size(len(panels)))
-        axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
-        axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
-        angle, title_lines = float(table["k_angle"][row]) * study.units.angle_factor, []
+        edge = at + ellipse
+        marks: list[PanelMark] = [
+            Posed(scene, faint=True),
+            Own(partial(_fill, edge)),
+            Trace(edge.real, edge.imag, look={"color": style.INK, "linewidth": 1.2, "zorder": 5}),
+            Dots([at.real], [at.imag], look={"color": style.INK, "markersize": 4, "zorder": 5.4}),
+        ]
+        title = pose_in_words(study, shown.poses, row, 4)
+        angle = float(table["k_angle"][row]) * study.units.angle_factor
         for name, adjective, turn, color, dashes in _MAIN_AXES:
             stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
             line = at + scale / stiff * way * np.array([-1, 1])
-            axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
+            look = {"color": color, "linestyle": dashes, "linewidth": 1.8, "zorder": 5.2}
+            marks.append(Trace(line.real, line.imag, label=f"{adjective} direction, {name}", look=look))
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
-            title_lines.append(f"{adjective} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
-        axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        title_lines = [words, *title_lines, f"drawn {scale / force:g} times as large"]
-        axes.set_title("\n".join(title_lines), loc="left", fontsize=8.5)
-    handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{adjective} direction, {name}")
-               for name, adjective, _, color, dashes in _MAIN_AXES]  # fmt: skip
-    legend_at_left(figure, handles, len(handles))
-    return figure
+            title += f"\n{adjective} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}"
+        title += f"\ndrawn {scale / force:g} times as large"
+        panels.append(drawn_plane(marks, np.append(scene.places, edge), study, title))
+    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    heading = f"Ellipse: where a force of {words} in any direction moves {section.at}"
+    return Picture(heading, panels, across=2, share="xy")
+
+
+def _fill(edge: Complexes, axes: Axes) -> None:
+    axes.fill(edge.real, edge.imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
 
 
 def _force(study: Study) -> float:

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
-from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import quantity
+from mechdesign.report.figures.callouts import point_labels
+from mechdesign.report.figures.drawing import Posed, write
+from mechdesign.report.figures.labels import Label
+from mechdesign.report.figures.marks import Late, PanelMark, Picture, Trace
+from mechdesign.report.figures.panels import drawn_plane, quantity
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, hull, pose
-from mechdesign.report.figures.shapes import point_labels
+from mechdesign.report.figures.scene import Still, hull, pose
 from mechdesign.study import Study
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
@@ -37,23 +36,23 @@ LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
 
 @picture(StiffnessView, "springs", order=10)
-def springs_figure(view: StiffnessView) -> Figure | None:
+def springs_picture(view: StiffnessView) -> Picture | None:
     """The equivalent springs at the first pose, as coils."""
-    study, poses, drawn = view.study, view.poses, view.drawn.first
+    study, drawn = view.study, view.drawn.first
     if drawn is None:
         return None
     scene = pose(study.mechanism, drawn.configuration)
     coils = _coils(study, drawn, scene) if scene is not None else []
     if scene is None or not coils:
         return None
-    places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = posed(study, poses, drawn, places, "Equivalent springs", labels=False, drives=False)
-    draw_coils(axes, coils)
-    place_labels(axes, [coil.label for coil in coils] + point_labels(scene), covered(axes), order=8)
-    return figure
+    posed = Posed(scene, names=False, drives=False)
+    labels = [coil.label for coil in coils] + point_labels(scene)
+    marks = [posed, Late(partial(draw_coils, coils)), Late(partial(write, labels=labels))]
+    ends = np.array([end for coil in coils for end in (coil.place, coil.anchor)])
+    return posed_picture(view, drawn, [scene.places, ends], "Equivalent springs", marks)
 
 
-def _coils(study: Study, drawn: DrawnPose, scene: Scene) -> list[Coil]:
+def _coils(study: Study, drawn: DrawnPose, scene: Still) -> list[Coil]:
     legs, length = drawn.body.legs or (), _COIL_LENGTH * scene.span
     coils, own = [], drawn.springs
     columns = (own.leg, own.place, own.angle, own.stiffness)
@@ -115,7 +114,7 @@ class Coil:
         return Label(self.text, anchors, style.VERMILION, 16, float(np.angle(aside)), 9.5)
 
 
-def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
+def draw_coils(coils: Sequence[Coil], axes: Axes) -> None:
     """Coil springs along their lines, each with a hatched anchor, and a dashed line to where the leg ends."""
     for coil in coils:
         if abs(coil.place - coil.tip) > 1e-3 * abs(coil.anchor - coil.place):
@@ -141,9 +140,9 @@ def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: obje
 
 
 @picture(StiffnessView, "free", order=30)
-def free_motion_figure(view: StiffnessView) -> Figure | None:
+def free_motion_picture(view: StiffnessView) -> Picture | None:
     """The asked body moved both ways along its free twist, at the first pose that has one."""
-    study, table, poses, drawn = view.study, view.result.tables["stiffness"], view.poses, view.drawn.loose
+    study, table, drawn = view.study, view.result.tables["stiffness"], view.drawn.loose
     if drawn is None:
         return None
     section, row = drawn.body.section, drawn.row
@@ -163,22 +162,15 @@ def free_motion_figure(view: StiffnessView) -> Figure | None:
         ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
-    places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = posed(study, poses, drawn, places, "Free motion")
-    for line, dash in zip(ways, ("-", "--"), strict=True):
-        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
-                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
-    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    return figure
+    look = {"color": style.VERMILION, "linewidth": 2, "zorder": 6, "marker": "o" if len(rest) == 1 else ""}
+    marks = [Trace(line.real, line.imag, label="free to move", look=look | {"linestyle": dashes})
+             for line, dashes in zip(ways, ("-", "--"), strict=True)]  # fmt: skip
+    return posed_picture(view, drawn, [scene.places, *ways], "Free motion", [*marks, Posed(scene)])
 
 
-def posed(
-    study: Study, poses: Poses, drawn: DrawnPose, places: Complexes, heading: str, **look: Any
-) -> tuple[Figure, Axes]:
+def posed_picture(
+    view: StiffnessView, drawn: DrawnPose, places: Sequence[Complexes], heading: str, marks: Sequence[PanelMark]
+) -> Picture:  # fmt: skip
     """The mechanism in a pose, in a window that holds these places, too."""
-    title = style.folded(f"{heading} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
-    above = TITLE + style.line(11.0) * title.count("\n")
-    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=above)
-    axes.set_title(title, loc="left")
-    draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
-    return figure, axes
+    title = f"{heading} at {pose_in_words(view.study, view.poses, drawn.row)}"
+    return Picture(title, [drawn_plane(marks, np.concatenate(places), view.study)])

@@ -16,7 +16,6 @@ from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Complexes, evenly
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
-    ROOM,
     Region,
     fill,
     left_out,
@@ -35,12 +34,13 @@ from mechdesign.questions.workspace.tables import curves
 from mechdesign.region.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.labels import HALO, Label, covered, place_labels
-from mechdesign.report.figures.marks import Axis, Lines, Own, Panel, PanelMark, Picture, Trace, Words
-from mechdesign.report.figures.overlay import both_named, draw_line, draw_pose
+from mechdesign.report.figures.drawing import Posed, write
+from mechdesign.report.figures.labels import HALO, Label
+from mechdesign.report.figures.marks import Axis, Late, Lines, Own, Panel, PanelMark, Picture, Trace, Words
+from mechdesign.report.figures.overlay import both_named, line_mark, posed_before
 from mechdesign.report.figures.panels import MAX_PANELS, Along
 from mechdesign.report.figures.pictures import picture
+from mechdesign.report.figures.scene import Scene, pose, sketched
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -49,9 +49,8 @@ SIDES = ("inner", "outer")
 LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
 _LIMIT = {"color": style.INK, "linewidth": 0.9, "zorder": 1.5}
-_DRIVES_BESIDE = 1.2  # inches beside it
+_LETTERS = 55  # of the title of a panel of drives
 _TOGETHER = 0.09  # of its height, between limits whose names do not touch
-_SMALL_SYMBOLS = 0.7
 _NEAR_SHAPE = 3.0  # points from an inscribed shape to its size in words
 
 
@@ -61,20 +60,15 @@ def workspace_picture(
 ) -> Picture:  # fmt: skip
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
     section, mechanism = WorkspaceSection.of(study), study.mechanism
-    reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
-    everywhere = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
-                             places_before(before)])  # fmt: skip
+    everywhere = np.concatenate([region.places(), *Scene(mechanism, drawn.along).points.values(),
+                                 sketched(mechanism).places, places_before(before)])  # fmt: skip
     where = f" at {region.title}" if region.title else ""
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
 
-    def mechanisms(axes: Axes) -> None:
-        draw_before(axes, before)
-        for index in range(len(drawn.along.reason)):
-            draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
-        draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
-
-    marks = [Own(partial(fill, local=region.local)), *region_marks(region), *more, *both_named(before)]
-    return region_picture(study, everywhere, [("", [*marks, Own(mechanisms, late=True)])], title, ROOM)
+    marks = [Own(partial(fill, local=region.local)), *region_marks(region), *more, *both_named(before),
+             *marks_before(before)]  # fmt: skip
+    marks += [Posed(still, faint=True) for still in Scene(mechanism, drawn.along).some(range(len(drawn.along.reason)))]
+    return region_picture(study, everywhere, [("", [*marks, Posed(sketched(mechanism), drives=False)])], title)
 
 
 @picture(WorkspaceView, "workspace", order=10)
@@ -101,13 +95,10 @@ def regions_picture(
     panels = []
     for (words, own, region, more), configuration in zip(parts, poses, strict=True):
         marks = [Own(partial(fill, local=region.local)), *region_marks(region), *more, *both_named(before)]
-        inside = partial(
-            draw_mechanism, mechanism=own.mechanism, configuration=configuration, faint=True, size=_SMALL_SYMBOLS
-        )
-        marks += [Own(inside, late=True), Own(partial(draw_before, before=before, held=region.held), late=True)]
-        panels.append((words, marks))
+        inside = Posed(pose(own.mechanism, configuration), faint=True)
+        panels.append((words, [*marks, inside, *marks_before(before, region.held)]))
     title = f"workspace of point {WorkspaceSection.of(study).point}, {title}"
-    return region_picture(study, everywhere, panels, title, ROOM)
+    return region_picture(study, everywhere, panels, title)
 
 
 def _pose_inside(study: Study, region: Region) -> Configuration:
@@ -134,7 +125,7 @@ def inscribed_picture(view: WorkspaceView) -> Picture | None:
         # In small panels the sizes would lie over each other.
         names = [size for _, size in shapes]
         if len(shown) == 1:
-            marks.append(Own(partial(_name_shapes, names), late=True))
+            marks.append(Late(partial(write, labels=names)))
             names = []
         panels.append(("\n".join([region.title, *(size.text for size in names)]), marks))
     places = np.concatenate([region.places() for region in shown])
@@ -146,10 +137,6 @@ def _draw_shapes(shapes: Sequence[tuple[Patch, Label]], axes: Axes) -> None:
     for shape, size in shapes:
         shape.set(edgecolor=size.color, facecolor="none", linewidth=1.6, zorder=4)
         axes.add_patch(shape)
-
-
-def _name_shapes(sizes: Sequence[Label], axes: Axes) -> None:
-    place_labels(axes, sizes, covered(axes), order=5)
 
 
 def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Label]]:
@@ -187,7 +174,7 @@ def drives_picture(view: WorkspaceView) -> Picture | None:
         return None
     parts = [every[k] for k in evenly(len(every), MAX_PANELS)]
     words = [", ".join(filter(None, (where, f"{side} boundary"))) for _, side, where in parts]
-    titles, held = panel_titles(words, style.width() - _DRIVES_BESIDE, 1)
+    titles, held = panel_titles(words, _LETTERS)
     notes = [f"panels: values of {held}"] * bool(held)
     notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
     units = {study.units.label(study.mechanism.quantity(name)) for name in names}
@@ -234,27 +221,18 @@ def _together(limits: Mapping[float, Sequence[str]], near: float) -> list[tuple[
     return groups
 
 
-def draw_before(axes: Axes, before: Before | None, held: Mapping[str, float] | None = None) -> None:
+def marks_before(before: Before | None, held: Mapping[str, float] | None = None) -> list[PanelMark]:
     """The boundary or the path of the study before; where nothing is held, its mechanism in its sketch pose."""
     if before is None:
-        return
-    for line in _lines(before, held):
-        draw_line(axes, line, 1.8)
-    if not held:
-        mechanism = before.study.mechanism
-        draw_pose(axes, mechanism, mechanism.sketch_configuration)
+        return []
+    lines: list[PanelMark] = [*map(line_mark, _lines(before, held))]
+    return lines if held else [*lines, posed_before(sketched(before.study.mechanism))]
 
 
 def places_before(before: Before | None) -> Complexes:
     """All points of what is drawn of the study before."""
-    curves = [*_lines(before), sketch_places(before.study)] if before is not None else []
+    curves = [*_lines(before), sketched(before.study.mechanism).places] if before is not None else []
     return np.concatenate([np.empty(0, dtype=complex), *curves])
-
-
-def sketch_places(study: Study) -> Complexes:
-    """Places of all points in the sketch pose."""
-    mechanism = study.mechanism
-    return np.concatenate([np.ravel(mechanism.sketch_configuration.point(point)) for point in mechanism.points])
 
 
 def _lines(before: Before, held: Mapping[str, float] | None = None) -> list[Complexes]:

@@ -27,7 +27,7 @@ from mechdesign.questions.workspace.figures.regions import (
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.marks import Coloured, Own, PanelMark, Picture
+from mechdesign.report.figures.marks import Coloured, Late, Own, PanelMark, Picture
 from mechdesign.report.figures.panels import node_areas, quantile, quantity
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.style import Grid
@@ -92,7 +92,7 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         )
         marks = [drawn, *region_marks(region)]
         if len(regions) == 1 and not same:
-            marks.append(Own(partial(label_levels, patches=patches, norm=norm, drawn=lines), late=True))
+            marks.append(Late(partial(label_levels, patches=patches, norm=norm, drawn=lines)))
         panels.append((words, marks))
     return region_picture(study, everywhere, panels, title)
 

@@ -8,17 +8,18 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
-from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, region_picture
+from mechdesign.questions.workspace.figures.boundary import DASHES, marks_before, places_before
+from mechdesign.questions.workspace.figures.regions import coloured, pieces, places, region_picture
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.marks import Axis, Coloured, Own, Panel, Picture, Trace
+from mechdesign.report.figures.drawing import Posed
+from mechdesign.report.figures.marks import Axis, Coloured, Panel, Picture, Trace
 from mechdesign.report.figures.overlay import both_named
 from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.pictures import picture
+from mechdesign.report.figures.scene import sketched
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -47,8 +48,8 @@ def _label(path: Table) -> str:
 
 
 def _path(study: Study, path: Table, before: Before | None) -> Picture:
-    mechanism, section, z = study.mechanism, WorkspaceSection.of(study), places(path)
-    reached = np.concatenate([z, sketch_places(study), places_before(before)])
+    still, section, z = sketched(study.mechanism), WorkspaceSection.of(study), places(path)
+    reached = np.concatenate([z, still.places, places_before(before)])
     top, tail = _ends(path["speed_ratio"])
 
     def speeds(axes: Axes) -> tuple[ScalarMappable, dict[str, str]]:
@@ -58,13 +59,9 @@ def _path(study: Study, path: Table, before: Before | None) -> Picture:
             coloured(axes, z[rows], path["speed_ratio"][rows], norm, 4)
         return ScalarMappable(norm, style.COLORMAP), {"extend": "max" if tail else "neither"}
 
-    def mechanisms(axes: Axes) -> None:
-        draw_before(axes, before)
-        draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
-
-    marks = [Coloured(speeds, bar=_label(path)), *both_named(before), Own(mechanisms, late=True)]
+    marks = [Coloured(speeds, bar=_label(path)), *both_named(before), *marks_before(before), Posed(still)]
     title = f"path of point {section.point}, by its speed over the drive's"
-    return region_picture(study, reached, [("", marks)], title, ROOM)
+    return region_picture(study, reached, [("", marks)], title)
 
 
 def _speed(study: Study, path: Table) -> Picture:

@@ -17,8 +17,8 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.marks import Axis, Own, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import round_down
+from mechdesign.report.figures.marks import Own, PanelMark, Picture, Trace
+from mechdesign.report.figures.panels import drawn_plane, round_down
 from mechdesign.report.figures.style import Grid
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -41,10 +41,8 @@ LEFT_OUT = "#ECECEC"
 MAX_REGIONS = 9  # that a picture shows side by side
 # A region longer than so many times its width is stretched across, to about this ratio of its sides.
 _LONGEST, _STRETCHED = 10.0, 1.2
-# Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
-_PAD = 0.03
-ROOM = 0.07
-_BESIDE = 0.45  # inches beside a panel without labels of its own
+_MAX_COLUMNS = 3
+_LETTERS = 30  # of the title of a panel beside others
 
 
 def places(table: Table) -> Complexes:
@@ -181,6 +179,7 @@ def inner_loci(region: Region) -> list[Ints]:
 
 def fill(axes: Axes, local: Table, color: str = PALE, **look: Any) -> None:
     """Fill a region: what lies between both curves of each patch."""
+    axes.grid(visible=False)
     edges = [np.column_stack([np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)])
              for x, y, _ in grids(local, "det_J")]  # fmt: skip
     axes.add_collection(PolyCollection(edges, facecolors=color, linewidths=0, antialiaseds=False, **look))
@@ -206,42 +205,30 @@ def left_out(regions: Sequence[Region]) -> str:
 
 
 def region_picture(
-    study: Study, places: Complexes, panels: Sequence[tuple[str, Sequence[PanelMark]]], title: str, pad: float = _PAD
+    study: Study, places: Complexes, panels: Sequence[tuple[str, Sequence[PanelMark]]], title: str
 ) -> Picture:  # fmt: skip
     """Panels of marks under titles, which may have several lines, that all show the same part of the plane.
 
     The axes are equal, unless what is shown is a thin strip; the title says so.
     """
-    number, (middle, wide, tall) = len(panels), extent(places)
+    _, wide, tall = extent(places)
     stretch = stretch_of(wide / tall)
-    columns = number if number < 4 else 2 if number == 4 else 3
-    if style.narrow() or (number > 1 and wide > 2 * tall * stretch):
-        columns = 1 if number < 3 else 2
     if stretch != 1.0:
         title += f"; {'y' if stretch > 1 else 'x'} drawn {max(stretch, 1 / stretch):g} times larger"
-    titles = [words for words, _ in panels]
-    if number > 1:
-        titles, name = panel_titles(titles, style.width() / columns - _BESIDE)
-        title += f"; panels: values of {name}" * bool(name)
-    room = pad * max(wide, tall * stretch)
-    unit, (half, up) = study.units.label("length"), (wide / 2 + room, tall / 2 + room / stretch)
-    x = Axis("x", unit, ends=(middle.real - half, middle.real + half))
-    y = Axis("y", unit, ends=(middle.imag - up, middle.imag + up))
-    shown = [Panel(marks, x, y, words, equal=stretch, plane=True)
+    titles, name = panel_titles([words for words, _ in panels], _LETTERS)
+    title += f"; panels: values of {name}" * bool(name and len(panels) > 1)
+    shown = [drawn_plane(marks, places, study, words, stretch=stretch, followed=True)
              for words, (_, marks) in zip(titles, panels, strict=True)]  # fmt: skip
-    return Picture(title[0].upper() + title[1:], shown, across=columns, share="xy" if number > 1 else "")
+    return Picture(title[0].upper() + title[1:], shown, across=_MAX_COLUMNS, share="xy" if len(panels) > 1 else "")
 
 
-def panel_titles(titles: Sequence[str], room: float, most: int = 2) -> tuple[list[str], str]:
-    """Titles ``name = value unit`` in lines of so many inches; the value alone where these are more than `most`.
-
-    The name that is left out is returned as well, else nothing.
-    """
+def panel_titles(titles: Sequence[str], letters: int) -> tuple[list[str], str]:
+    """Titles ``name = value unit``, the value alone where they have more letters, and the name that is left out."""
     name, equals, _ = titles[0].partition(" = ")
-    long = style.folded(titles[0].partition("\n")[0], 9.5, room).count("\n") >= most
-    if not (long and equals and all(words.startswith(f"{name} = ") for words in titles)):
-        name = ""
-    return [style.folded(words.removeprefix(f"{name} = "), 9.5, room) for words in titles], name
+    alike = equals and all(words.startswith(f"{name} = ") for words in titles)
+    if not alike or max(map(len, titles)) <= letters:
+        return [*titles], ""
+    return [words.removeprefix(f"{name} = ") for words in titles], name
 
 
 def stretch_of(ratio: float) -> float:
