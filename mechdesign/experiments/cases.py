@@ -42,16 +42,12 @@ def answers(
 
     Each question that they need is asked once for every case, with the study's seed. `Answered.reasons` says why a case
     could not be loaded or answered. A batch has many cases where their questions can be asked of many designs at once,
-    else one. Cases before `begin` are left out, and batches of other shards.
+    else one. Batches before the case `begin` are left out, and those of other shards.
     """
     together = set(commands_of(study, results)) <= stacked.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
-    if begin >= len(cases):
-        return
-    # A computation that is resumed has the same stacked.
-    chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
-    answer = Answer(study, tuple(results), cases[0])
-    yield from map_chunks(answer, shard.share(chunks), jobs, travels=True)
+    batches = (cases[k : k + at_once] for k in range(begin, len(cases), at_once))
+    yield from map_chunks(Answer(study, tuple(results), cases[0]), shard.share(batches), jobs, travels=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
+from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.schema.sensitivities import Changed
-from mechdesign.experiments.tally import Tally
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.progress import NULL, Progress
@@ -115,21 +115,21 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
     cases: list[Changes] = [(), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
-    tally = Tally(cases, len(results), 0)
+    whole = Answered()
     for answered in answers(plain, cases, results, jobs=jobs):
-        tally.add(answered)
-        progress.update(len(answered.table))
-    rows = list(_rows(results, numbers, tally))
-    table = _table(rows, [tally.result(k)[1] for k in range(len(results))], numbers)
+        whole.add(answered)
+        progress.update(len(answered))
+    rows = list(_rows(results, numbers, whole))
+    table = _table(rows, whole.units, numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
-    failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
+    failed = f"the study itself has no answer: {whole.reason(0)}" if whole.reason(0) else ""
     warnings = [
         Caution("unconverged", f"{row.result} by {row.parameter}: {row.doubt}", table.name, k)
         for k, row in enumerate(rows)
         if row.doubt
     ]
-    for kind, warned in tally.warned.items():
-        words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first: {warned.message}"
+    for kind, warned in whole.warned.items():
+        words = f"{warned.cases} of {counted(len(whole), 'case')} have warnings; the first: {warned.message}"
         warnings.append(Caution(kind, words))
     return Result(SENSITIVITIES.name, {table.name: table}, warnings, counts, failed)
 
@@ -154,12 +154,12 @@ class Row:
         return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
 
 
-def _rows(results: Sequence[CaseNumber], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
-    values = np.column_stack([tally.result(k)[0] for k in range(len(results))])
+def _rows(results: Sequence[CaseNumber], numbers: Sequence[Changing], whole: Answered) -> Iterator[Row]:
+    values = whole.table[:, 3:]
     middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(results))
     slopes = [slope(middle, pair[0], pair[1], number.step) for number, pair in zip(numbers, sides, strict=True)]
     count = 2 * len(STEPS)
-    reasons = [next(filter(None, map(tally.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
+    reasons = [next(filter(None, map(whole.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
                for k in range(len(numbers))]  # fmt: skip
     for k, result in enumerate(results):
         for number, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
@@ -169,7 +169,7 @@ def _rows(results: Sequence[CaseNumber], numbers: Sequence[Changing], tally: Tal
             if not math.isnan(below):
                 doubt = f"has a kink here; its slope is {below:.6g} below {number.value:g} and {above:.6g} above"
             elif math.isnan(value):
-                doubt = f"is not known near {number.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
+                doubt = f"is not known near {number.value:g}: {reason or whole.reason(0) or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
                 # Noise needs longer steps, strong curvature shorter ones.
                 other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
