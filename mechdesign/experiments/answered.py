@@ -216,7 +216,7 @@ class Sheet:
         return warned
 
     def _worst(self, k: int) -> Worst:
-        """The case that misses a requirement by most: one whose margin is unknown, or does not let it meet, before all."""
+        """The case that misses a requirement by most; those of which no margin is known, or helps, miss it by more."""
         margins, met = self._margins[:, k], self._met[:, k]
         order = np.where(np.isnan(margins) | (~met & (margins >= 0)), -np.inf, margins)
         row, unmet = int(order.argmin()), np.flatnonzero(~met)
