@@ -12,7 +12,7 @@ import numpy as np
 from mechdesign.errors import MechdesignError
 from mechdesign.family.batch import Evaluated, without_numbers
 from mechdesign.family.evaluator import Evaluator
-from mechdesign.family.question import DesignsQuestion, question_of
+from mechdesign.family.question import DesignsQuestion
 from mechdesign.family.structures import MAX_KEPT, Form, Structures, Values
 
 # Designs evaluated together: enough for long arrays, few enough that all workers finish at about the same time.
@@ -58,7 +58,7 @@ class Family:
             if len(self._others) >= MAX_KEPT:
                 self._others.clear()
             names = [form.parameters.get(name, name) for name in own]
-            question = question_of(form.study, self.question.places, names, graded=self.question.graded)
+            question = DesignsQuestion(form.study, self.question.places, names, graded=self.question.graded)
             self._others[form] = Evaluator(question)
         evaluated = self._others[form](form.designs(own).changed)
         reasons = evaluated.reasons
