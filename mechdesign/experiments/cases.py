@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import CaseNumber
-from mechdesign.family import forms, stacked
+from mechdesign.family import stacked
+from mechdesign.family.structures import Form, Structures, Values
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look, with_fewer_rows
@@ -20,6 +23,7 @@ from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks
 from mechdesign.work.shards import WHOLE, Shard
@@ -42,72 +46,77 @@ def answers(
 
     Each question that they need is asked once for every case, with the study's seed. `Answered.reasons` says why a case
     could not be loaded or answered. A batch has many cases where their questions can be asked of many designs at once,
-    else one. Cases before `begin` are left out, and batches of other shards.
+    else one. Batches before the case `begin` are left out, and those of other shards.
     """
     together = set(commands_of(study, results)) <= stacked.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
-    if begin >= len(cases):
-        return
-    # A computation that is resumed has the same stacked.
-    chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
-    answer = Answer(study, tuple(results), cases[0])
-    yield from map_chunks(answer, shard.share(chunks), jobs, travels=True)
+    batches = (cases[k : k + at_once] for k in range(begin, len(cases), at_once))
+    yield from map_chunks(Answer(study, tuple(results), cases[0]), shard.share(batches), jobs, travels=True)
 
 
-@dataclass(frozen=True, eq=False)
 class Answer:
-    """Answers cases of a study that change the same entries; `first` is the first of all of them."""
+    """Answers cases of a study; numbers of entries that it leaves out are those of the `first` of them."""
 
-    study: Study
-    results: tuple[CaseNumber, ...]
-    first: Changes
+    def __init__(self, study: Study, results: tuple[CaseNumber, ...], first: Changes) -> None:
+        self._study, self._results = study, results
+        self._structures = Structures(study, dict(first))
 
     def __call__(self, cases: Sequence[Changes]) -> Answered:
         """The answers of a batch of cases."""
-        sheet = Sheet(self.study, self.results, len(cases))
-        alike: dict[str, list[int]] = {}
+        sheet = Sheet(self._study, self._results, len(cases))
+        alike: dict[tuple[tuple[str, bool], ...], list[int]] = {}
         for k, case in enumerate(cases):
-            alike.setdefault(forms.form_of(split(case)[0]), []).append(k)
+            alike.setdefault(tuple((name, is_number(value)) for name, value in split(case)[0]), []).append(k)
         for members in alike.values():
             self._alike(sheet, np.array(members), [cases[k] for k in members])
         return sheet.answered()
 
     def _alike(self, sheet: Sheet, rows: Ints, cases: Sequence[Changes]) -> None:
-        """Answer cases that differ in numbers alone, and in what they are judged by."""
+        """Answer cases that change the same entries, those of one structure together."""
         computed, judged = zip(*(split(case) for case in cases), strict=True)
-        required = [self._required(own) for own in judged]
-        designs: Designs | None = Designs(self.study, {})
-        if computed[0]:
-            form = forms.compiled(self.study, computed[0], split(self.first)[0])
-            designs = form.designs(computed) if form is not None else None
-        # A case that is wrong is loaded alone: its error then names the entries that it changes.
-        right = np.array([own is not None for own in required]) & (designs is not None and designs.faults == "")
-        if designs is not None and right.any():
-            some = np.flatnonzero(right)
-            designs, known = (
-                designs.take(some),
-                [own for own, good in zip(required, right, strict=True) if good and own],
-            )
-            for row, own in zip(rows[some].tolist(), designs.required(known), strict=True):
-                sheet.judging[row] = own
-            self._together(sheet, rows[some], designs)
-        for k in np.flatnonzero(~right).tolist():
+        groups: Iterable[tuple[Ints, Form | MechdesignError, Values]] = ()
+        alone = np.ones(len(rows), dtype=bool)
+        # Of a quantity in the unit of something else each case tells.
+        with suppress(QuantityError):
+            groups = self._structures.groups(self._values(computed), len(rows))
+        for some, form, own in groups:
+            if isinstance(form, MechdesignError):
+                continue
+            designs = form.designs(own)
+            required = [judging(form.study, judged[k]) for k in some.tolist()]
+            # A case that is wrong is loaded alone: its error then names the entries that it changes.
+            right = np.flatnonzero([self._comparable(case) for case in required] & (designs.faults == ""))
+            alone[some[right]] = False
+            known = [case for k in right.tolist() if (case := required[k]) is not None]
+            there, designs = rows[some[right]], designs.take(right)
+            for row, case in zip(there.tolist(), designs.required(known), strict=True):
+                sheet.judging[row] = case
+            if len(there):
+                self._together(sheet, there, designs)
+        for k in np.flatnonzero(alone).tolist():
             self._alone(sheet, rows[k : k + 1], cases[k])
 
-    def _required(self, changes: Changes) -> Judging | None:
-        """What is required of a case; None where its changes of that are wrong."""
-        own = judging(self.study, changes)
-        return own if own is not None and self._comparable(own) else None
+    def _values(self, cases: Sequence[Changes]) -> Values:
+        """Values of entries that the cases change, numbers in the study's units."""
+        study, values = self._study, {}
+        for changes in zip(*cases, strict=True):
+            name, first = changes[0]
+            own = [study.units.convert(value) if isinstance(value, str) and is_number(first) else value
+                   for _, value in changes]  # fmt: skip
+            parameter = name.removeprefix("mechanism.parameters.")
+            name = parameter if parameter in study.parameters.nominal else name
+            values[name] = np.fromiter(own, dtype=float if is_number(first) else object, count=len(own))
+        return values
 
-    def _comparable(self, own: Judging) -> bool:
+    def _comparable(self, own: Judging | None) -> bool:
         """Whether a case is judged on the results on which the study is."""
-        one, other = ([part.result for part in parts] for parts in (own.requirements, self.study.requirements))
-        return one == other
+        results = [requirement.result for requirement in self._study.requirements]
+        return own is not None and [requirement.result for requirement in own.requirements] == results
 
     def _alone(self, sheet: Sheet, row: Ints, case: Changes) -> None:
         """Answer one case, loaded as if its file had the changed entries."""
         try:
-            study = with_entries(self.study, case)
+            study = with_entries(self._study, case)
             own = Judging.of(study)
             if not self._comparable(own):
                 raise StudyError("a case is judged on the results of the study; only limits and rows may be otherwise")
@@ -119,10 +128,16 @@ class Answer:
 
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
         """Answer designs of a study, each a case; a study without changes is that of all the cases."""
-        for command in commands_of(designs.study, self.results):
+        for command in commands_of(designs.study, self._results):
             for group in stacked.answers(designs, command).groups:
                 for some in [rows[group.rows]] if designs.changed else rows[:, None]:
                     sheet.note(some, group)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number or a quantity."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number or (isinstance(value, str) and QUANTITY.fullmatch(value) is not None)
 
 
 def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
-from mechdesign.experiments.schema.matrix import GRID, Values
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.experiments.schema.matrix import GRID
+from mechdesign.numerics.arrays import Floats
+from mechdesign.report.cases import changes_in_words
 from mechdesign.study import Study
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
@@ -27,24 +27,29 @@ _DECIMAL = re.compile(r"-?[0-9.]+(e[-+]?[0-9]+)?")
 _MOST_SEARCHED, _MOST_TRIED = 10_000, 16
 
 
+@dataclass(frozen=True, eq=False)
 class Design(Sequence[Changes]):
-    """The cases of a matrix in their order; each gives every varied entry (`names`) a value."""
+    """The cases of a matrix in their order.
 
-    names: tuple[str, ...]
-    labels: Sequence[str] = ()  # of the cases; empty where they have none
-    written: Mapping[str, Callable[[Any], Any]] = {}  # entries with quantities that are judged: a value as written
+    Parameters
+    ----------
+    columns : mapping of str to ndarray of object, shape (cases,)
+        Values of the entries that vary.
+    distinct : mapping of str to sequence
+        Values that each entry takes, of a range its ends.
+    labels : sequence of str
+        Names of the cases; empty where they have none.
+    written : mapping of str to callable
+        Entries with quantities that are judged: a value as written.
+    """
 
-    @abstractmethod
-    def value(self, k: int, place: int) -> Any:
-        """The value of an entry in case `k`."""
+    columns: Mapping[str, NDArray[Any]]
+    distinct: Mapping[str, Sequence[Any]]
+    labels: Sequence[str] = ()
+    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
 
-    @abstractmethod
-    def distinct(self, place: int) -> Iterable[Any]:
-        """The values of an entry over all cases, each at least once."""
-
-    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        """The values of an entry in the first `count` cases, as the array that `convert` makes of them."""
-        return convert([self.value(k, place) for k in range(count)])
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
 
     @overload
     def __getitem__(self, k: int) -> Changes: ...
@@ -53,76 +58,17 @@ class Design(Sequence[Changes]):
     def __getitem__(self, k: int | slice) -> Changes | list[Changes]:
         if isinstance(k, slice):
             return [self[case] for case in range(*k.indices(len(self)))]
-        if not 0 <= k < len(self):
-            raise IndexError(k)
-        return tuple(
-            (name, self.written.get(name, lambda value: value)(self.value(k, place)))
-            for place, name in enumerate(self.names)
-        )
+        case = ((name, column[k]) for name, column in self.columns.items())
+        return tuple((name, self.written[name](value) if name in self.written else value) for name, value in case)
+
+    def named(self, k: int) -> str:
+        """A case in words: its number, from 1, its label, if it has one, and its values."""
+        label = self.labels[k] if self.labels else ""
+        return f"case {k + 1} ({label and f'{label}: '}{changes_in_words(self[k])})"
 
 
-@dataclass(frozen=True, eq=False)
-class Grid(Design):
-    """Every combination of values, the last entry fastest."""
-
-    names: tuple[str, ...]
-    values: tuple[tuple[Any, ...], ...]
-    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        return math.prod(map(len, self.values))
-
-    def value(self, k: int, place: int) -> Any:
-        return self.values[place][self._index(k, place)]
-
-    def distinct(self, place: int) -> Iterable[Any]:
-        return self.values[place]
-
-    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        index: Ints = self._index(np.arange(count), place)
-        return convert(self.values[place])[index]
-
-    def _index(self, k: Any, place: int) -> Any:
-        """Which of the entry's values case `k` has, a number or an array of them."""
-        return k // math.prod(map(len, self.values[place + 1 :])) % len(self.values[place])
-
-
-@dataclass(frozen=True, eq=False)
-class SpreadDesign(Design):
-    """Values at points of the unit cube, shape (cases, entries)."""
-
-    names: tuple[str, ...]
-    values: tuple[Values, ...]
-    cube: Floats
-    written: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        return len(self.cube)
-
-    def value(self, k: int, place: int) -> Any:
-        return self.values[place].at(float(self.cube[k, place]))
-
-    def distinct(self, place: int) -> Iterable[Any]:
-        values = self.values[place]
-        return values.values if values.values is not None else (values.from_, values.to)
-
-
-@dataclass(frozen=True, eq=False)
-class Listed(Design):
-    """The rows of a file."""
-
-    names: tuple[str, ...]
-    rows: Sequence[tuple[Any, ...]]
-    labels: Sequence[str] = ()
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def value(self, k: int, place: int) -> Any:
-        return self.rows[k][place]
-
-    def distinct(self, place: int) -> Iterable[Any]:
-        return (row[place] for row in self.rows)
+def _objects(values: Sequence[Any]) -> NDArray[Any]:
+    return np.fromiter(values, dtype=object, count=len(values))
 
 
 def cases_of(study: Study) -> Design:
@@ -135,17 +81,26 @@ def cases_of(study: Study) -> Design:
     """
     matrix = study.matrix
     assert matrix is not None
-    design: Design
     if matrix.vary is None:
-        design = Listed(*matrix.table(study.folder))
+        table = matrix.table(study.folder)
+        lists = dict(zip(table.names, zip(*table.rows, strict=True), strict=True))
+        design = Design({name: _objects(values) for name, values in lists.items()}, lists, table.labels)
     else:
         written = {name: partial(_as_written, study, name) for name in matrix.vary if is_judged(name)}
         if matrix.method == GRID:
-            design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()), written)
+            distinct = {name: values.on_grid() for name, values in matrix.vary.items()}
+            sizes = [*map(len, distinct.values())]
+            index = np.unravel_index(np.arange(math.prod(sizes)), sizes)
+            columns = {name: _objects(values)[k] for (name, values), k in zip(distinct.items(), index, strict=True)}
         else:
             assert matrix.samples is not None
             cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
-            design = SpreadDesign(tuple(matrix.vary), tuple(matrix.vary.values()), cube, written)
+            columns = {
+                name: _objects([values.at(share) for share in shares])
+                for (name, values), shares in zip(matrix.vary.items(), cube.T.tolist(), strict=True)
+            }
+            distinct = {name: values.values or (values.from_, values.to) for name, values in matrix.vary.items()}
+        design = Design(columns, distinct, (), written)
     keys = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     problems = [
         study.problem(f"{name}={in_yaml(value)}: {message}", *keys, *([name] if matrix.vary is not None else []))
@@ -171,9 +126,9 @@ def _as_written(study: Study, name: str, value: Any) -> Any:
 
 def tried(study: Study, design: Design) -> Iterator[tuple[str, Any]]:
     """Entries with each word or structure that one takes in some case, and one quantity of each unit as written."""
-    for place, name in enumerate(design.names):
-        written = study.resolved["matrix"]["vary"][name] if not isinstance(design, Listed) else ()
-        values = [*design.distinct(place), *_parts(written)]
+    written = study.resolved["matrix"].get("vary") or {}
+    for name, distinct in design.distinct.items():
+        values = [*distinct, *_parts(written.get(name, ()))]
         words = [value for value in values if isinstance(value, bool) or not _DECIMAL.fullmatch(str(value))]
         units = {(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}
         yield from ((name, value) for value in units.values())
@@ -182,8 +137,7 @@ def tried(study: Study, design: Design) -> Iterator[tuple[str, Any]]:
 def _wrong(study: Study, design: Design, name: str, value: Any) -> list[str]:
     """Why an entry cannot have a value: neither with the others as they are, nor as the first cases have them."""
     messages = [*faults(study, [(name, value)], name)]
-    place = design.names.index(name)
-    same = (design[k] for k in range(min(len(design), _MOST_SEARCHED)) if design.value(k, place) == value)
+    same = (design[k] for k, own in enumerate(design.columns[name][:_MOST_SEARCHED]) if own == value)
     right = messages and any(not [*faults(study, case, name)] for case in islice(same, _MOST_TRIED))
     return [] if right else messages
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -13,11 +14,10 @@ from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
+from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.schema.sensitivities import Changed
-from mechdesign.experiments.tally import Tally
-from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -115,83 +115,61 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
     cases: list[Changes] = [(), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
-    tally = Tally(cases, len(results), 0)
+    whole = Answered()
     for answered in answers(plain, cases, results, jobs=jobs):
-        tally.add(answered)
-        progress.update(len(answered.table))
-    rows = list(_rows(results, numbers, tally))
-    table = _table(rows, [tally.result(k)[1] for k in range(len(results))], numbers)
-    counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
-    failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
+        whole.add(answered)
+        progress.update(len(answered))
+    table, doubts = _table(results, numbers, whole)
+    counts = {"cases": len(cases), "derivatives": len(table), "uncertain": sum(map(bool, doubts))}
+    failed = f"the study itself has no answer: {whole.reason(0)}" if whole.reason(0) else ""
     warnings = [
-        Caution("unconverged", f"{row.result} by {row.parameter}: {row.doubt}", table.name, k)
-        for k, row in enumerate(rows)
-        if row.doubt
+        Caution("unconverged", f"{table['result'][k]} by {table['parameter'][k]}: {doubt}", table.name, k)
+        for k, doubt in enumerate(doubts)
+        if doubt
     ]
-    for kind, warned in tally.warned.items():
-        words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first: {warned.message}"
+    for kind, warned in whole.warned.items():
+        words = f"{warned.cases} of {counted(len(whole), 'case')} have warnings; the first: {warned.message}"
         warnings.append(Caution(kind, words))
     return Result(SENSITIVITIES.name, {table.name: table}, warnings, counts, failed)
 
 
-@dataclass(frozen=True)
-class Row:
-    """The derivative of a result by a number."""
-
-    result: str
-    parameter: str
-    value: float
-    at: float
-    derivative: float
-    error: float
-    below: float
-    above: float
-    doubt: str  # why it is unknown or uncertain; empty if it is neither
-
-    @property
-    def elasticity(self) -> float:
-        """Change of the result, in % of its size, for 1 % of the number's size more; nan where either is zero."""
-        return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
-
-
-def _rows(results: Sequence[CaseNumber], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
-    values = np.column_stack([tally.result(k)[0] for k in range(len(results))])
-    middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(results))
-    slopes = [slope(middle, pair[0], pair[1], number.step) for number, pair in zip(numbers, sides, strict=True)]
-    count = 2 * len(STEPS)
-    reasons = [next(filter(None, map(tally.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
+def _table(results: Sequence[CaseNumber], numbers: Sequence[Changing], whole: Answered) -> tuple[Table, list[str]]:
+    """The derivative of each result by each number, and why it is unknown or uncertain; empty where it is neither."""
+    middle, size = whole.table[0, 3:], 2 * len(STEPS)
+    sides = whole.table[1:, 3:].reshape(len(numbers), 2, len(STEPS), len(results))
+    steps = [number.step for number in numbers]
+    slopes = np.array([slope(middle, below, above, step) for (below, above), step in zip(sides, steps, strict=True)])
+    reasons = [next(filter(None, map(whole.reason, range(1 + k * size, 1 + (k + 1) * size))), whole.reason(0))
                for k in range(len(numbers))]  # fmt: skip
-    for k, result in enumerate(results):
-        for number, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
-            value, error, below, above = (float(part[k]) for part in found_slope)
-            scale = abs(middle[k]) * _NOTHING / number.step
-            doubt = ""
-            if not math.isnan(below):
-                doubt = f"has a kink here; its slope is {below:.6g} below {number.value:g} and {above:.6g} above"
-            elif math.isnan(value):
-                doubt = f"is not known near {number.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
-            elif error > max(_UNCERTAIN * abs(value), scale):
-                # Noise needs longer steps, strong curvature shorter ones.
-                other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
-                doubt = (
-                    f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
-                    f"(few samples); another step may help, {{parameter: {number.given}, step: {other:g}}}"
-                )
-            yield Row(result.title, number.given, float(middle[k]), number.value, value, error, below, above, doubt)
-
-
-def _table(rows: Sequence[Row], result_units: Sequence[str], numbers: Sequence[Changing]) -> Table:
-    units = [unit for unit in result_units for _ in numbers]
-    by = [number.unit for _ in result_units for number in numbers]
-    ratio = [Units.ratio(one, other) for one, other in zip(units, by, strict=True)]
-
-    def of(name: str) -> Floats:
-        return np.array([getattr(row, name) for row in rows], dtype=float)
-
+    pairs = [*product(range(len(results)), range(len(numbers)))]
+    doubts = [_doubt(slopes[k, :, j].tolist(), middle[j], numbers[k], reasons[k]) for j, k in pairs]
+    derivative, error, low, high = np.moveaxis(slopes, 0, 2).reshape(4, -1)
+    value, at = np.repeat(middle, len(numbers)), np.array([number.value for number in numbers] * len(results))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        elasticity = np.where((value != 0) & (at != 0), derivative * np.abs(at / value), np.nan)
+    units = [(whole.units[j], numbers[k].unit) for j, k in pairs]
     table = columns.SENSITIVITIES
     return table.table(table.columns(
-        {}, result=np.array([row.result for row in rows]), parameter=np.array([row.parameter for row in rows]),
-        derivative=of("derivative"), error=of("error"), unit=np.array(ratio), elasticity=of("elasticity"),
-        below=of("below"), above=of("above"), value=of("value"), value_unit=np.array(units), at=of("at"),
-        at_unit=np.array(by), settled=np.array([not row.doubt for row in rows]),
-    ))  # fmt: skip
+        {}, result=np.array([results[j].title for j, _ in pairs]),
+        parameter=np.array([numbers[k].given for _, k in pairs]), derivative=derivative, error=error,
+        unit=np.array([Units.ratio(*both) for both in units]), elasticity=elasticity, below=low, above=high,
+        value=value, value_unit=np.array([unit for unit, _ in units]), at=at,
+        at_unit=np.array([unit for _, unit in units]), settled=np.array([not doubt for doubt in doubts]),
+    )), doubts  # fmt: skip
+
+
+def _doubt(found: Sequence[float], middle: float, number: Changing, reason: str) -> str:
+    """Why a derivative is unknown or uncertain, with its error and the slopes on both sides; empty if it is neither."""
+    value, error, below, above = found
+    if not math.isnan(below):
+        return f"has a kink here; its slope is {below:.6g} below {number.value:g} and {above:.6g} above"
+    if math.isnan(value):
+        return f"is not known near {number.value:g}: {reason or 'it is nan there'}"
+    if error <= max(_UNCERTAIN * abs(value), abs(middle) * _NOTHING / number.step):
+        return ""
+    # Noise needs longer steps, strong curvature shorter ones.
+    other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
+    return (
+        f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
+        f"(few samples); another step may help, {{parameter: {number.given}, step: {other:g}}}"
+    )

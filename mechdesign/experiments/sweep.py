@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,23 +14,22 @@ from numpy.typing import NDArray
 from mechdesign.cautions import Caution
 from mechdesign.columns import Column
 from mechdesign.errors import Interrupted, StudyError, counted
-from mechdesign.experiments.answered import Answered
+from mechdesign.experiments.answered import IMPOSSIBLE, NOT_MET, Answered
 from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.columns import SWEEP
-from mechdesign.experiments.design import Design, Listed, cases_of, tried
+from mechdesign.experiments.design import Design, cases_of, tried
 from mechdesign.experiments.ranking import Ranking, goals_of
-from mechdesign.experiments.tally import Tally
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
-from mechdesign.report.requirements import DrawnCases, in_words
+from mechdesign.report.requirements import DrawnCases, in_words, over_cases
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit, is_judged, with_entries
-from mechdesign.work.journal import Journal
+from mechdesign.work.journal import Journal, digest
 from mechdesign.work.shards import Block, Shard
 from mechdesign.work.threads import one_thread
 
@@ -60,7 +58,7 @@ def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
     foresee(study, results)
     _foresee_limits(study, cases)
     # A number with a requirement has a column already.
-    required = requirement_names(study, cases.names)
+    required = requirement_names(study, [*cases.columns])
     return cases, [number for number in results if number.title not in required]
 
 
@@ -90,24 +88,35 @@ def sweep(
     study = seeded(study, seed)
     cases, results = prepared(study)
     progress.start(len(cases), "cases")
-    tally = Tally(cases, len(results), len(study.requirements))
-    if journal is not None:
-        tally.recall(journal)
-        progress.update(len(tally))
+    whole = Answered()
+    # What is no number of each batch in the journal.
+    texts = [] if journal is None else [*journal.words]
+    number = 0
+    while journal is not None and (table := journal.recall(_key(whole))) is not None:
+        journal.add(_key(whole), table, texts)
+        whole.add(Answered.read(table, texts[number]))
+        progress.update(len(table))
+        number += 1
+    del texts[number:]
     try:
-        for answered in answers(study, cases, results, begin=len(tally), jobs=jobs):
-            tally.add(answered)
-            progress.update(len(answered.table))
+        for answered in answers(study, cases, results, begin=len(whole), jobs=jobs):
             if journal is not None:
-                tally.note(journal)
+                texts.append(answered.texts)
+                journal.add(_key(whole), answered.table, texts)
+            whole.add(answered)
+            progress.update(len(answered))
     except KeyboardInterrupt:
         if journal is not None:
-            tally.note(journal, last=True)
             journal.save()
-        if not len(tally):
+        if not len(whole):
             raise
-        raise Interrupted(_result(study, cases, tally, results)) from None
-    return _result(study, cases, tally, results)
+        raise Interrupted(_result(study, cases, whole, results)) from None
+    return _result(study, cases, whole, results)
+
+
+def _key(before: Answered) -> bytes:
+    """The key of the batch after some cases."""
+    return digest([np.array([len(before)], dtype=float)])
 
 
 @one_thread()
@@ -120,8 +129,8 @@ def shard_of(
     progress.start(-(-len(cases) // shard.count), "cases")
     blocks = []
     for answered in answers(study, cases, results, jobs=jobs, shard=shard):
-        blocks.append((answered.table, json.dumps(answered.texts)))
-        progress.update(len(answered.table))
+        blocks.append((answered.table, answered.texts))
+        progress.update(len(answered))
     return blocks
 
 
@@ -129,22 +138,22 @@ def merged(study: Study, blocks: Sequence[Block], *, seed: int | None = None) ->
     """What `sweep` gives, from the blocks of all shards."""
     study = seeded(study, seed)
     cases, results = prepared(study)
-    tally = Tally(cases, len(results), len(study.requirements))
+    whole = Answered()
     for table, texts in blocks:
-        tally.add(Answered.read(table, json.loads(texts)))
-    return _result(study, cases, tally, results)
+        whole.add(Answered.read(table, texts))
+    return _result(study, cases, whole, results)
 
 
-def _result(study: Study, cases: Design, tally: Tally, results: Sequence[CaseNumber]) -> Result:
+def _result(study: Study, cases: Design, whole: Answered, results: Sequence[CaseNumber]) -> Result:
     """The result with the table of the answered cases."""
-    count, total, failed = len(tally), len(cases), tally.failed
-    counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
+    count, total, failed = len(whole), len(cases), np.flatnonzero(whole.table[:, 0] >= IMPOSSIBLE).tolist()
+    counts = {"cases": count, "not_met": int((whole.table[:, 0] == NOT_MET).sum()), "failed": len(failed)}
     message = ""
     if failed:
-        first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
+        first = f"{cases.named(failed[0])}: {whole.reason(failed[0])}"
         message = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
     part = f"{count} of {total} cases were answered; this is what they are" if count < total else ""
-    table = SWEEP.table(_columns(study, cases, tally, results))
+    table = SWEEP.table(_columns(study, cases, whole, results))
     ranked = None
     if goals := _goals(study):
         ranking = Ranking.of(goals, {name: table[name] for name in goals}, table["exit_code"] == 0)
@@ -153,20 +162,24 @@ def _result(study: Study, cases: Design, tally: Tally, results: Sequence[CaseNum
         if study.matrix and study.matrix.best and study.matrix.best.sort:
             table = table.take(np.argsort(ranking.rank, kind="stable"))
     return Result(
-        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, message, interrupted=part,
-        drawn=_drawn(study, tally, results),
+        "sweep", {"sweep": table}, tuple(_warnings(study, cases, whole, ranked)), counts, message, interrupted=part,
+        drawn=_drawn(study, cases, whole, results),
     )  # fmt: skip
 
 
-def _drawn(study: Study, tally: Tally, numbers: Sequence[CaseNumber]) -> DrawnCases:
+def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[CaseNumber]) -> DrawnCases:
     """The entries that vary, the results with what is required of them, and which are goals."""
-    entries = [name for name, _ in tally.cases[0]]
+    entries = [*cases.columns]
+    verdicts = tuple(
+        over_cases(worst.verdict, cases.named(worst.case), worst.unmet, len(whole), worst.first)
+        for worst in whole.worst
+    )
     own = _limits_of_cases(study, entries)
     bounds = [(None, None) if k in own else (requirement.at_least, requirement.at_most)
               for k, requirement in enumerate(study.requirements)]  # fmt: skip
     limits = dict(zip(requirement_names(study, entries), bounds, strict=True))
     results = limits | {number.title: (None, None) for number in numbers}
-    return DrawnCases(entries, results, _goals(study), tally.verdicts)
+    return DrawnCases(entries, results, _goals(study), verdicts)
 
 
 def _limits_of_cases(study: Study, entries: Sequence[str]) -> set[int]:
@@ -191,27 +204,25 @@ def _goals(study: Study) -> dict[str, int]:
     return {number.title: sign for number, sign in goals_of(best).items()}
 
 
-def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
+def _columns(study: Study, cases: Design, whole: Answered, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
-    count, table = len(tally), tally.table
+    count, table = len(whole), whole.table
     labels = {"label": np.array(cases.labels[:count])} if cases.labels else {}
     yield from SWEEP.columns({}, case=np.arange(1, count + 1), **labels, exit_code=table[:, 0].astype(np.intp))
-    for place, name in enumerate(cases.names):
-        values = cases.column(place, count, partial(_array, study.units))
-        yield SWEEP["<entry>"].column(values, entry_unit(study, name), entry=name)
-    own = _limits_of_cases(study, cases.names)
-    for k, name in enumerate(requirement_names(study, cases.names)):
-        worst, met, unit = tally.required(k)
-        limit = "what the case requires" if k in own else str(tally.worst[k].verdict.requirement)
-        yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
-        yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
+    for name, values in cases.columns.items():
+        yield SWEEP["<entry>"].column(_array(study.units, values[:count]), entry_unit(study, name), entry=name)
+    own = _limits_of_cases(study, [*cases.columns])
+    for k, name in enumerate(requirement_names(study, [*cases.columns])):
+        limit = "what the case requires" if k in own else str(whole.worst[k].verdict.requirement)
+        yield SWEEP["<requirement>"].column(*whole.number(len(numbers) + k), requirement=name, limit=limit)
+        yield SWEEP["<requirement>_met"].column(table[:, k - len(whole.worst)] == 1, requirement=name)
     for k, number in enumerate(numbers):
-        yield SWEEP["<result>"].column(*tally.result(k), result=number.title)
-    reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
+        yield SWEEP["<result>"].column(*whole.number(k), result=number.title)
+    reasons = np.array([*whole.reasons], dtype=object)[table[:, 2].astype(np.intp)]
     yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
 
 
-def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:
+def _array(units: Units, values: NDArray[Any]) -> NDArray[Any]:
     """Values as numbers, in these units, where each is one; else as words."""
     numbers = [
         units.convert(value) if isinstance(value, str) and QUANTITY.fullmatch(value) else value for value in values
@@ -238,29 +249,29 @@ def requirement_names(study: Study, entries: Sequence[str]) -> list[str]:
     return [name if first[name] == k else f"{name}, requirement {k + 1}" for k, name in enumerate(names)]
 
 
-def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caution]:
-    matrix, cases = study.matrix, tally.cases
+def _warnings(study: Study, cases: Design, whole: Answered, ranked: Flags | None) -> Iterator[Caution]:
+    matrix = study.matrix
     assert matrix is not None
     samples = len(cases)
     if matrix.method == "sobol" and matrix.vary is not None and samples & (samples - 1):
         near = 1 << samples.bit_length()
         words = f"{samples} samples of a Sobol' sequence are less even than a power of two: {near // 2} or {near}"
         yield Caution("suspect", words)
-    if isinstance(cases, Listed):
+    if matrix.vary is None:
         first: dict[str, int] = {}
-        twice = [(k, prior) for k, row in enumerate(cases.rows) if (prior := first.setdefault(json.dumps(row), k)) != k]
+        twice = [(k, prior) for k, case in enumerate(cases) if (prior := first.setdefault(json.dumps(case), k)) != k]
         if twice:
             k, prior = twice[0]
-            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {prior + 1} once more"
-            yield Caution("suspect", words, "sweep", pose=tally.named(k))
-    for kind, warned in tally.warned.items():
-        case = tally.named(warned.case)
-        words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first, {case}: {warned.message}"
+            words = f"{len(twice)} of {len(cases)} cases are repeated; {cases.named(k)} is case {prior + 1} once more"
+            yield Caution("suspect", words, "sweep", pose=cases.named(k))
+    for kind, warned in whole.warned.items():
+        case = cases.named(warned.case)
+        words = f"{warned.cases} of {counted(len(whole), 'case')} have warnings; the first, {case}: {warned.message}"
         yield Caution(kind, words, "sweep", pose=case)
-    met = tally.table[:, 0] == 0
+    met = whole.table[:, 0] == 0
     if ranked is not None and len(without := np.flatnonzero(met & ~ranked)):
         answered = counted(int(met.sum()), "case")
-        case = tally.named(int(without[0]))
+        case = cases.named(int(without[0]))
         words = (f"{len(without)} of {answered} that meet every requirement have no rank: a goal is no finite number, "
                  f"or part of the motion is missing; the first is {case}")  # fmt: skip
         yield Caution("undefined", words, "sweep", pose=case)

@@ -16,7 +16,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.family.columns import EVALUATED
 from mechdesign.family.family import DESIGNS_AT_ONCE, Family
 from mechdesign.family.goals import Goal, goal
-from mechdesign.family.question import question_of
+from mechdesign.family.question import DesignsQuestion
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.loading import load_document
@@ -116,7 +116,7 @@ def _compiled(study: Study, names: tuple[str, ...], results: str) -> tuple[list[
     try:
         goals = _goals(study, json.loads(results))
         own_numbers = [own for own in owns if own in study.parameters.nominal]
-        family = Family(question_of(study, dict.fromkeys(goals, ()), own_numbers))
+        family = Family(DesignsQuestion(study, dict.fromkeys(goals, ()), own_numbers))
     except StudyError as error:
         problems += error.problems
     if problems:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -27,11 +27,10 @@ from mechdesign.study.variants import remeasured
 from mechdesign.terms import Sum, terms_of
 
 
-@dataclass(frozen=True, eq=False)
 class DesignsQuestion:
     """What is asked of every design of a study.
 
-    Parameters
+    Attributes
     ----------
     goals : tuple of Goal
         Goals, then conditions, with their bounds in the units of their columns.
@@ -49,7 +48,7 @@ class DesignsQuestion:
         Columns that are followed between the poses.
     graded : bool
         Whether the rows behind the goals are wanted, and how far poses are from assembling.
-    squares : frozenset of Goal
+    squares : set of Goal
         Goals that are the root mean square of their rows.
     places : mapping of Goal to tuple
         Where the study names each goal.
@@ -57,19 +56,53 @@ class DesignsQuestion:
         Units of the columns of goals, where the study's own design has them.
     """
 
-    study: Study
-    goals: tuple[Goal, ...]
-    columns: Mapping[str, Column]
-    regions_together: bool
-    together: Mapping[str, Mapping[str, Sequence[Goal]]]
-    alone: Mapping[str, Sequence[Goal]]
-    outputs: set[str]
-    requests: set[Request]
-    graded: bool
-    squares: frozenset[Goal]
-    layout: Layout
-    places: Mapping[Goal, KeyPath]
-    units: Mapping[Goal, str]
+    def __init__(
+        self, study: Study, places: Mapping[Goal, KeyPath], names: Collection[str], *, graded: bool = False
+    ) -> None:
+        """Read what goals and conditions ask of designs that differ in `names`: parameters or places of the geometry.
+
+        `places` are those of the goals in the study, empty for one that it does not name. What goals need is found in
+        the answers of the study's own design.
+
+        Raises
+        ------
+        StudyError
+            If no result has the column of a goal, or the study lacks a section that it needs; every mistake in one go.
+        """
+        self.study, self.graded = study, graded
+        self.columns: Mapping[str, Column] = {}
+        self.regions_together = True
+        self.together: dict[str, dict[str, list[Goal]]] = {}
+        self.alone: dict[str, list[Goal]] = {}
+        self.outputs: set[str] = set()
+        self.requests: set[Request] = set()
+        self.squares: set[Goal] = set()
+        self.units: dict[Goal, str] = {}
+        self.places = places
+        # Goals with their bounds in the unit of their column, how many rows each has, and the number of margins of
+        # assembly by the commands of which every pose must be valid.
+        self._bounded: dict[Goal, Goal] = {}
+        self._rows: dict[Goal, int] = {}
+        self._margins: dict[str, int] = {}
+        problems: list[Problem] = []
+        if regions := regions_of(study, [*places]):
+            self.columns = index_columns(study, regions[0])
+            together = shared(study, regions, study.parameters.moved(names)) and not remeasured(study, names)
+            self.regions_together = together and all(batched(column) for column in regions[0].columns)
+            several = f"the workspace has {len(regions)} values where a coordinate is held; name one of them by 'where'"
+            single = [goal for goal in places if goal.regional and goal.single] if len(regions) > 1 else []
+            problems += [self._problem(goal, several) for goal in single]
+        problems += self._misfits()
+        for command in dict.fromkeys(goal.command for goal in places if not goal.regional and not goal.expression):
+            problems += self._read(command, [goal for goal in places if goal.command == command and not goal.regional])
+        if problems:
+            # A condition with two bounds has the same problem twice.
+            raise StudyError([*dict.fromkeys(problems)])
+        self.goals = tuple(self._bounded.get(goal, goal) for goal in places)
+        self.places = dict(zip(self.goals, places.values(), strict=True))
+        self.layout = Layout(self.goals, self._rows, self._margins)
+        if not graded:
+            self.limit(0)
 
     def __getstate__(self) -> dict[str, Any]:
         """State for another process, which computes the regions again."""
@@ -110,118 +143,47 @@ class DesignsQuestion:
         """Whether a design costs as much in a batch as alone: where not all goals are tables of all designs at once."""
         return bool(self.alone) or bool(self.regional)
 
-    def limited(self, most: int) -> DesignsQuestion:
-        """The question without rows of goals and margins of assembly where a design has more than `most` of them."""
-        if self.layout.width - self.layout.head <= most:
-            return self
-        return replace(self, squares=frozenset(), layout=Layout(self.goals, {}, {}))
+    def limit(self, most: int) -> None:
+        """Leave out rows of goals and margins of assembly where a design has more than `most` of them."""
+        if self.layout.width - self.layout.head > most:
+            self.squares, self.layout = set(), Layout(self.goals, {}, {})
 
     @property
-    def meanings(self) -> dict[str, tuple[str, str]]:
-        """Unit and meaning of each number of the workspace, by its column."""
-        meanings = {name: (column.unit, column.meaning) for name, column in self.columns.items()}
+    def meanings(self) -> dict[Goal, tuple[str, str]]:
+        """Unit of each goal, and what a number of the workspace means; empty of others."""
+        at = self.study.workspace.at if self.study.workspace is not None and len(self.regions) > 1 else {}
+        held = [f"{name} = {', '.join(f'{value:g}' for value in values)}" for name, values in at.items()]
+        meanings = {}
         for goal in self.goals:
+            meaning = self.columns[goal.column].meaning if goal.regional and goal.column in self.columns else ""
             if goal.outline is not None:
                 shape = goal.column.removeprefix("scale of ")
                 meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-                meanings[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
-        if len(self.regions) < 2:
-            return meanings
-        assert self.study.workspace is not None
-        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}" for name, values in self.study.workspace.at.items()]
-        return {
-            name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in meanings.items()
-        }
+                meaning += ": contained from 1 on, negative where its centre lies outside"
+            meanings[goal] = self.unit(goal), meaning + f"; the worst at {'; '.join(held)}" * bool(meaning and held)
+        return meanings
 
+    def _problem(self, goal: Goal, message: str) -> Problem:
+        """What is wrong with a goal, at its place in the study, or by its name."""
+        place = self.places.get(goal)
+        return self.study.problem(message, *place) if place else Problem(message, goal.name)
 
-def regions_of(study: Study, goals: Sequence[Goal]) -> list[Question]:
-    """What goals ask of the workspace of a study; nothing where none is a number of that."""
-    regional = [goal for goal in goals if goal.regional]
-    whole = [goal.column for goal in regional if goal.outline is None]
-    return questions(study, GRID_TOLERANCE, tuple(dict.fromkeys(("area", *whole)))) if regional else []
+    def _misfits(self) -> Iterator[Problem]:
+        """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
+        for goal in self.places:
+            known = goal.column in self.columns if goal.regional else goal.expression and self.unit(goal)
+            try:
+                if known:
+                    Amount.of(goal.bound).within(self.unit(goal))
+            except QuantityError as error:
+                yield self._problem(goal, str(error))
 
-
-def question_of(
-    study: Study, places: Mapping[Goal, KeyPath], names: Collection[str], *, graded: bool = False
-) -> DesignsQuestion:
-    """Read what goals and conditions ask of designs that differ in the parameters or places of the geometry `names`.
-
-    `places` are those of the goals in the study, empty for one that it does not name.
-
-    Raises
-    ------
-    StudyError
-        If no result has the column of a goal, or the study lacks a section that it needs; every mistake in one go.
-    """
-    columns: Mapping[str, Column] = {}
-    regions_together = True
-    problems: list[Problem] = []
-    if regions := regions_of(study, [*places]):
-        columns = index_columns(study, regions[0])
-        together = shared(study, regions, study.parameters.moved(names)) and not remeasured(study, names)
-        regions_together = together and all(batched(column) for column in regions[0].columns)
-        several = f"the workspace has {len(regions)} values where a coordinate is held; name one of them by 'where'"
-        single = [goal for goal in places if goal.regional and goal.single] if len(regions) > 1 else []
-        problems += [_problem(study, goal, places, several) for goal in single]
-    reader = _Reader(study, places, graded)
-    problems += _misfits(study, columns, places)
-    for command in dict.fromkeys(goal.command for goal in places if not goal.regional and not goal.expression):
-        problems += reader.read(command, [goal for goal in places if goal.command == command and not goal.regional])
-    if problems:
-        # A condition with two bounds has the same problem twice.
-        raise StudyError([*dict.fromkeys(problems)])
-    bounded = tuple(reader.bounded.get(goal, goal) for goal in places)
-    question = DesignsQuestion(
-        study, bounded, columns, regions_together, reader.together, reader.alone, reader.outputs, reader.requests,
-        graded, frozenset(reader.squares), Layout(bounded, reader.rows, reader.margins),
-        dict(zip(bounded, places.values(), strict=True)), reader.units,
-    )  # fmt: skip
-    return question if graded else question.limited(0)
-
-
-def _problem(study: Study, goal: Goal, places: Mapping[Goal, KeyPath], message: str) -> Problem:
-    """What is wrong with a goal, at its place in the study, or by its name."""
-    place = places.get(goal)
-    return study.problem(message, *place) if place else Problem(message, goal.name)
-
-
-def _misfits(study: Study, columns: Mapping[str, Column], places: Mapping[Goal, KeyPath]) -> Iterator[Problem]:
-    """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
-    units = {goal: columns[goal.column].unit for goal in places if goal.regional and goal.column in columns}
-    units |= {goal: unit for goal in places if goal.expression and (unit := unit_of(study, goal.column))}
-    for goal, unit in units.items():
-        try:
-            Amount.of(goal.bound).within(unit)
-        except QuantityError as error:
-            yield _problem(study, goal, places, str(error))
-
-
-class _Reader:
-    """Finds the tables and rows that goals need in the answers of the study's own design.
-
-    `places` are those of goals in the study. What is read is described at `DesignsQuestion`; besides, `bounded` has
-    goals with their bounds in the unit of their column, `units` those units, `rows` how many rows each has, and
-    `margins` the number of assembly margins by the commands of which every pose must be valid.
-    """
-
-    def __init__(self, study: Study, places: Mapping[Goal, KeyPath], graded: bool) -> None:
-        self._study, self._places, self._graded = study, places, graded
-        self.together: dict[str, dict[str, list[Goal]]] = {}
-        self.alone: dict[str, list[Goal]] = {}
-        self.outputs: set[str] = set()
-        self.requests: set[Request] = set()
-        self.squares: set[Goal] = set()
-        self.bounded: dict[Goal, Goal] = {}
-        self.units: dict[Goal, str] = {}
-        self.rows: dict[Goal, int] = {}
-        self.margins: dict[str, int] = {}
-
-    def read(self, command: str, goals: list[Goal]) -> Iterator[Problem]:
+    def _read(self, command: str, goals: list[Goal]) -> Iterator[Problem]:
         """Read what goals of a command need; yields their problems."""
-        study = self._study
+        study = self.study
         if command == "optimize":
             mistake = "an optimisation cannot judge itself; name a result of another command"
-            yield _problem(study, goals[0], self._places, mistake)
+            yield self._problem(goals[0], mistake)
             return
         if command in stacked.TABLES and stacked.complete(study, command):
             judged = self._read_together(command, goals)
@@ -235,12 +197,12 @@ class _Reader:
                 try:
                     goals[k] = self._count(goal, _named(goal, result), result)
                 except UnknownColumnError as error:
-                    yield _problem(study, goal, self._places, str(error))
+                    yield self._problem(goal, str(error))
         self.alone.setdefault(command, []).extend(goals)
 
     def _read_together(self, command: str, goals: Sequence[Goal]) -> Collection[Goal]:
         """Read the goals that are judged in tables of all designs at once; returns them."""
-        study, poses = self._study, study_poses(self._study, command)
+        study, poses = self.study, study_poses(self.study, command)
         result = stacked.tables(study, command, stacked.TABLES[command], poses).result
         named: dict[Goal, Chosen | Sum] = {}
         for goal in goals:
@@ -264,20 +226,27 @@ class _Reader:
             judged[terms.parts[0].table.name].append(goal)
         self.together[command] = judged
         # Extremes may be those of a part of the poses.
-        if self._graded and (poses.listed or set(judged) != {"extremes"}):
-            self.margins[command] = stacked.assembly_margins(study, poses, stack.solved).shape[1]
+        if self.graded and (poses.listed or set(judged) != {"extremes"}):
+            self._margins[command] = stacked.assembly_margins(study, poses, stack.solved).shape[1]
         return named
 
     def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
         """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
-        self.bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
+        self._bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
         self.units[bounded] = terms.unit
         judgement = bounded.judge(result)
         if judgement.squares:
             self.squares.add(bounded)
         if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
-            self.rows[bounded] = judgement.rows.size
+            self._rows[bounded] = judgement.rows.size
         return bounded
+
+
+def regions_of(study: Study, goals: Sequence[Goal]) -> list[Question]:
+    """What goals ask of the workspace of a study; nothing where none is a number of that."""
+    regional = [goal for goal in goals if goal.regional]
+    whole = [goal.column for goal in regional if goal.outline is None]
+    return questions(study, GRID_TOLERANCE, tuple(dict.fromkeys(("area", *whole)))) if regional else []
 
 
 def _named(goal: Goal, result: Result) -> Chosen | Sum:

@@ -14,9 +14,9 @@ import numpy as np
 
 import mechdesign
 from mechdesign.errors import MechdesignError
+from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import CaseNumber
 from mechdesign.experiments.cases import answers
-from mechdesign.experiments.tally import Tally
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
 from mechdesign.motion.group import DesignGroup
@@ -282,9 +282,9 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
             cases.append(entries)
         names = [f"{name}.{word}" for name in columns(command, own)[:12] for word in ("min", "max")]
         wanted = [CaseNumber(name) for name in names]
-        tally = Tally([tuple(entries.items()) for entries in cases], len(wanted), 0)
-        for answered in answers(mechdesign.load(data), tally.cases, wanted):
-            tally.add(answered)
+        whole = Answered()
+        for answered in answers(mechdesign.load(data), [tuple(entries.items()) for entries in cases], wanted):
+            whole.add(answered)
         for k, entries in enumerate(cases):
             written = [f"{name}={value!r}" for name, value in entries.items()]
             try:
@@ -293,15 +293,15 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 reason = str(error).splitlines()[0]
             else:
                 reason = ""
-            assert reason in tally.reason(k), (seed, tally.reason(k))
+            assert reason in whole.reason(k), (seed, whole.reason(k))
             if reason:
                 continue
-            assert tally.table[k, 1] == len(result.warnings), seed
-            for kind in [kind for kind, warned in tally.warned.items() if warned.case == k]:
+            assert whole.table[k, 1] == len(result.warnings), seed
+            for kind in [kind for kind, warned in whole.warned.items() if warned.case == k]:
                 first = next(warning for warning in result.warnings if warning.kind == kind)
-                assert tally.warned[kind].message.startswith(f"{command}: {first}"), seed
+                assert whole.warned[kind].message.startswith(f"{command}: {first}"), seed
             for j, each in enumerate(wanted):
                 (expected,) = each.find(DesignGroup.alone(result))[0].tolist()
-                assert same(tally.result(j)[0][k], expected), (seed, each.name, tally.result(j)[0][k])
+                assert same(whole.number(j)[0][k], expected), (seed, each.name, whole.number(j)[0][k])
                 compared += 1
     assert compared

@@ -233,3 +233,13 @@ def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_th
     name = "kinematics.inverse_condition"
     assert by_drives.tables["designs"]["feasible"][0]
     assert by_drives.tables["designs"][name][0] == pytest.approx(by_pose.tables["designs"][name][0])
+
+
+def test_goals_have_the_units_of_their_results() -> None:
+    changes = (
+        "stiffness={at: P, actuators: {upper: 1e5, fore: 1e5}, poses: [{upper: 30, fore: 60}]}",
+        "optimize={variables: {a: {choices: [1, 2]}}, minimize: [stiffness.k_min, kinematics.P.x, 2*a]}",
+    )
+    table = mechdesign.optimize(study_of(ARM.replace("FORMULA", "P.x").replace("[f]", "[P]"), *changes)).main
+    units = [table.column(name).unit for name in ("stiffness.k_min", "kinematics.P.x", "2*a")]
+    assert units == ["N/mm", "mm", "mm"]

@@ -189,7 +189,8 @@ def test_rows_of_goals_are_those_of_the_tables():
     assert found.table[:, places[goals[0]]] == pytest.approx(path.real)
     assert found.table[:, places[goals[1]]] == pytest.approx(path.imag)
     assert found.table[:, 0] == pytest.approx(path.real.max(axis=1))
-    evaluator = Evaluator(evaluator.question.limited(evaluator.layout.width - evaluator.layout.head - 1))
+    evaluator.question.limit(evaluator.layout.width - evaluator.layout.head - 1)
+    evaluator = Evaluator(evaluator.question)
     assert not evaluator.layout.rows
     assert evaluator(designs).table.shape == (3, evaluator.layout.head)
 

@@ -77,7 +77,8 @@ def optimize(
         if section.method == "pareto"
         else searching.allowance(len(section.variables), len(weights), alone=bool(question.alone))
     )
-    question, meanings = question.limited(MAX_KEPT_ROWS // budget), question.meanings
+    question.limit(MAX_KEPT_ROWS // budget)
+    meanings = question.meanings
     with workers(VariableFamily(question), jobs, travels=True) as compute:
         judge = Judge(question, compute, progress, journal)
         try:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.columns import Column, ColumnKind
-from mechdesign.errors import MechanismError
 from mechdesign.family.batch import Evaluated
 from mechdesign.family.family import DESIGNS_AT_ONCE
-from mechdesign.family.goals import Goal, unit_of
+from mechdesign.family.goals import Goal
 from mechdesign.family.question import DesignsQuestion
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
@@ -23,10 +22,7 @@ from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESU
 from mechdesign.questions.optimize.explorer import ASSEMBLY, Part, Points
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
 from mechdesign.questions.optimize.variables import unit_of as variable_unit
-from mechdesign.questions.reliability.schema.limits import SUFFIXES
-from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
-from mechdesign.study.schema.checker import ORDERS
 from mechdesign.work.journal import Journal, digest
 
 # Designs evaluated together where a design costs much and a search evaluates few at once.
@@ -50,8 +46,8 @@ class DesignSet:
     shortfall : ndarray
         How far the poses of a design are from assembling; nan where that is not known.
     weights : ndarray, shape (rows, goals)
-    meanings : mapping
-        Unit and meaning of indices of the workspace, by column.
+    meanings : mapping of Goal to (str, str)
+        Unit of each goal and condition; what it means, if it is a number of the workspace.
     marks : tuple of str
         What each optimum is, of a front.
     chosen : ndarray of int
@@ -68,7 +64,7 @@ class DesignSet:
     words: list[str]
     shortfall: Floats
     weights: Floats
-    meanings: Mapping[str, tuple[str, str]]
+    meanings: Mapping[Goal, tuple[str, str]]
     marks: tuple[str, ...] = ()
     chosen: Ints = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
@@ -116,10 +112,26 @@ class DesignSet:
         return np.stack([self.results[goal] for goal in self.goals], axis=1)
 
     @cached_property
-    def _ends(self) -> tuple[Floats, Floats]:
-        """Smallest and largest value of each goal over the feasible designs; an empty range where there are none."""
+    def costs(self) -> Floats:
+        """The same with the sign with which less is better."""
+        return np.asarray(self.values * [goal.sign for goal in self.goals])
+
+    def normalised(self, values: Floats) -> Floats:
+        """Goals of any designs, shape (designs, goals), as fractions of their ranges over the feasible ones.
+
+        1 is the best [S1, eq. 27]; 0 where a goal has no range.
+        """
         inside = self.values[self.feasible]
-        return inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
+        low, high = inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
+        share = (values - low) / np.where(high > low, high - low, np.inf)
+        return np.where(high > low, np.where([goal.smallest for goal in self.goals], 1 - share, share), 0.0)
+
+    @cached_property
+    def shares(self) -> Floats:
+        """The goals of all designs so; nan where a design is not feasible."""
+        shares = np.full(self.values.shape, np.nan)
+        shares[self.feasible] = self.normalised(self.values[self.feasible])
+        return shares
 
     @cached_property
     def cpi(self) -> Floats:
@@ -147,33 +159,7 @@ class DesignSet:
 
     def score(self, row: Floats) -> Floats:
         """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
-        score = np.full(len(self), np.nan)
-        score[self.feasible] = self.score_of(self.values[self.feasible], row)
-        return score
-
-    def score_of(self, values: Floats, row: Floats) -> Floats:
-        """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
-
-        Each goal counts as the fraction of its range over the feasible designs.
-        """
-        total = np.zeros(len(values))
-        for k in np.flatnonzero(row).tolist():
-            total += row[k] * self._normalised(values, k)
-        return total
-
-    def share(self, k: int) -> Floats:
-        """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
-        share = np.full(len(self), np.nan)
-        share[self.feasible] = self._normalised(self.values[self.feasible], k)
-        return share
-
-    def _normalised(self, values: Floats, k: int) -> Floats:
-        """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
-        low, high = (end[k] for end in self._ends)
-        if not high > low:
-            return np.zeros(len(values))
-        share = (values[:, k] - low) / (high - low)
-        return np.asarray(1 - share if self.goals[k].smallest else share)
+        return weighted(self.shares, row)
 
     def unit_of(self, name: str) -> str:
         """Unit of a goal or a variable, where it is known."""
@@ -181,10 +167,6 @@ class DesignSet:
             if goal.name == name:
                 return self._kind(goal)[1]
         return variable_unit(self.study, name)
-
-    def unit_of_condition(self, condition: Goal) -> str:
-        """Unit of the result that a condition bounds; the scale of a shape has none."""
-        return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors if `errors` is true, and the CPI."""
@@ -201,30 +183,19 @@ class DesignSet:
                 yield DESIGNS["<result>_error"].column(error[rows], self._kind(goal)[1], result=goal.name)
         for condition in self.conditions:
             if condition.outline is not None:
-                words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
+                words = {"result": condition.column, "meaning of the result": self.meanings[condition][1]}
                 yield RESULT.column(self.results[condition][rows], **words)
         yield CPI.column(self.cpi[rows])
 
     def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
         """Kind of a goal's column, its unit, and the meaning of a number of the workspace."""
-        if goal.expression is not None:
-            return EXPRESSION, unit_of(self.study, goal.column), ""
-        if goal.regional and goal.column in self.meanings:
-            return RESULT, *self.meanings[goal.column]
-        return WORST_ROW, self._coordinate_unit(goal), ""
+        unit, meaning = self.meanings.get(goal, ("", ""))
+        return EXPRESSION if goal.expression else RESULT if meaning else WORST_ROW, unit, meaning
 
-    def _coordinate_unit(self, judged: Goal) -> str:
-        """Unit of a coordinate, its rates and its error; none where a goal is something else."""
-        head, _, word = judged.column.partition(" ")[0].rpartition(".")
-        if word in STATISTICS and STATISTICS[word].pure:
-            return ""
-        column = (head if word in STATISTICS else judged.column).removeprefix("motion.")
-        order = next((order for order, suffix in enumerate(SUFFIXES) if suffix and column.endswith(suffix)), 0)
-        try:
-            quantity = self.study.mechanism.quantity(column.removesuffix(SUFFIXES[order]).removesuffix("_error"))
-        except MechanismError:
-            return ""
-        return self.study.units.label(ORDERS[quantity][order]) if quantity in ORDERS else ""
+
+def weighted(shares: Floats, row: Floats) -> Floats:
+    """Sums of normalised goals, shape (designs, goals), times their weights [S1, eq. 28]."""
+    return sum((shares[:, k] * row[k] for k in np.flatnonzero(row).tolist()), np.zeros(len(shares)))
 
 
 class Judge:
@@ -325,7 +296,7 @@ class Judge:
         evaluated.table[:, self.layout.code] = codes
         return evaluated.table
 
-    def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> DesignSet:
+    def designs(self, weights: Floats, meanings: Mapping[Goal, tuple[str, str]]) -> DesignSet:
         """Everything evaluated so far; see `DesignSet` of the arguments."""
         head = self.layout.head
         rows = np.concatenate([np.empty((0, head)), *(part[:, :head] for part in self._rows)])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import count
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 
@@ -269,8 +269,7 @@ def knee(values: Floats) -> int:
     return int(np.argmin(normalised(values) @ plane(values)))
 
 
-@dataclass(frozen=True)
-class Front:
+class Front(NamedTuple):
     """The designs on the front, the best of the first goal first.
 
     Parameters
@@ -284,26 +283,11 @@ class Front:
     rows: Ints
     values: Floats
 
-    @property
-    def knee(self) -> int:
-        """Row of the knee in the designs."""
-        return int(self.rows[knee(self.values)])
-
-    @property
-    def ends(self) -> list[int]:
-        """Rows of the best of each goal in the designs."""
-        return [int(self.rows[k]) for k in ends(normalised(self.values))]
-
-
-def signs_of(designs: DesignSet) -> Floats:
-    """1 for each goal that is minimised, -1 for one that is maximised."""
-    return np.array([goal.sign for goal in designs.goals])
-
 
 def front_of(designs: DesignSet) -> Front:
     """The front over all feasible designs that were evaluated."""
     feasible = np.flatnonzero(designs.feasible)
-    values = designs.values[feasible] * signs_of(designs)
+    values = designs.costs[feasible]
     rows = front(values)
     rows = rows[np.lexsort(values[rows].T[::-1])]
     rows = rows[distinct(values[rows])]
@@ -325,7 +309,7 @@ def optima(designs: DesignSet, pareto_front: Front, typed: Floats) -> DesignSet:
     weights = plane(pareto_front.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
     rows = np.concatenate([[weights / weights.max()], np.eye(len(weights)), typed])
     names = ("knee", *(f"best {goal.name}" for goal in designs.goals), *["weights"] * len(typed))
-    chosen = np.array([pareto_front.knee, *pareto_front.ends], dtype=np.intp)
+    chosen = pareto_front.rows[[knee(pareto_front.values), *ends(normalised(pareto_front.values))]]
     return dataclasses.replace(designs, weights=rows, marks=names, chosen=chosen)
 
 
@@ -346,7 +330,7 @@ def growth_table(designs: DesignSet) -> Table:
     rows = np.flatnonzero(designs.feasible)
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = counts - counts // 10
-    values = designs.values[rows] * signs_of(designs)
+    values = designs.costs[rows]
     sizes, hypervolumes = volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier])))
     volume, before = np.split(hypervolumes, 2)
     return HYPERVOLUME.table(HYPERVOLUME.columns(
@@ -357,7 +341,6 @@ def growth_table(designs: DesignSet) -> Table:
 
 def pareto_table(designs: DesignSet, pareto_front: Front) -> Table:
     """The designs on the front."""
-    marks = PARETO.columns(
-        {}, knee=pareto_front.rows == pareto_front.knee, crowding=fronts.crowding(pareto_front.values)
-    )
-    return PARETO.table([*designs.columns(pareto_front.rows), *marks])
+    rows, values = pareto_front
+    marks = PARETO.columns({}, knee=rows == rows[knee(values)], crowding=fronts.crowding(values))
+    return PARETO.table([*designs.columns(rows), *marks])

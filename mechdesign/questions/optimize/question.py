@@ -10,7 +10,7 @@ from mechdesign.errors import StudyError
 from mechdesign.family.batch import Evaluated
 from mechdesign.family.family import Family
 from mechdesign.family.goals import Goal, bounds_of, goal
-from mechdesign.family.question import DesignsQuestion, question_of
+from mechdesign.family.question import DesignsQuestion
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.optimize.schema import OptimizeSection
 from mechdesign.questions.optimize.variables import choice_problems, entries, from_cube
@@ -27,7 +27,7 @@ def designs_question(study: Study, goals: Sequence[Goal] = (), *, graded: bool =
     Raises
     ------
     StudyError
-        See `mechdesign.family.question.question_of`; also if a choice makes no study.
+        See `DesignsQuestion`; also if a choice makes no study.
     """
     section = study.optimize
     assert section is not None
@@ -35,7 +35,7 @@ def designs_question(study: Study, goals: Sequence[Goal] = (), *, graded: bool =
     judged = {goal: places.get(goal, ()) for goal in goals or places}
     problems = [] if goals else [*choice_problems(study)]
     try:
-        question = question_of(study, judged, [*section.variables], graded=graded)
+        question = DesignsQuestion(study, judged, [*section.variables], graded=graded)
     except StudyError as error:
         raise StudyError([*error.problems, *problems]) from None
     if problems:

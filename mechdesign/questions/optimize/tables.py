@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.optimize.columns import BEST, BOUNDS, DESIGNS, NEAREST, OPTIMUM, SENSITIVITY
-from mechdesign.questions.optimize.judge import DesignSet, Judge
+from mechdesign.questions.optimize.judge import DesignSet, Judge, weighted
 from mechdesign.questions.optimize.variables import BOUND_ROUNDING, Batch, bounds, ranges, steps
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -66,17 +66,10 @@ def nearest_table(designs: DesignSet, row: int) -> Table:
         rows = [(word, np.nan, np.nan, designs.shortfall[row], "")]
     else:
         rows = [
-            (
-                condition.name,
-                value := designs.results[condition][row],
-                condition.bound,
-                max(0.0, -condition.margin(value)),
-                unit,
-            )
-            for condition, unit in zip(
-                designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True
-            )
-        ]
+            (condition.name, value := designs.results[condition][row], condition.bound,
+             max(0.0, -condition.margin(value)), designs.meanings[condition][0])
+            for condition in designs.conditions
+        ]  # fmt: skip
     names, values, bounds_of, missing, units = zip(*rows, strict=True)
     return NEAREST.table(NEAREST.columns(
         {}, condition=np.array(names, dtype=object), value=np.array(values), bound=np.array(bounds_of),
@@ -172,8 +165,9 @@ def sensitivity_table(designs: DesignSet, judge: Judge) -> Table:
     which = np.full(inside.shape, len(candidates))
     which[inside] = back.ravel()
     changes = np.empty(inside.shape)
-    for row, (weights, winner) in enumerate(zip(designs.weights, designs.winners, strict=True)):
-        gained = designs.score_of(values, weights) - designs.score_of(designs.values[[winner]], weights)
+    shares, best = designs.normalised(values[:, : len(designs.goals)]), designs.shares[designs.winners]
+    for row, weights in enumerate(designs.weights):
+        gained = weighted(shares, weights) - weighted(best[[row]], weights)
         changes[row] = np.append(np.where(feasible, gained, np.nan), np.nan)[which[row]]
     down, up = changes.reshape(-1, 2).T
     return SENSITIVITY.table(SENSITIVITY.columns(

@@ -106,7 +106,7 @@ def score_curves(designs: DesignSet, front: Table | None = None) -> Picture:
         for k, color in zip(range(len(designs.goals)) if many and not several else (), style.PALETTE, strict=False):
             look = {"color": color, "linestyle": style.DASHES[(k + 1) % len(style.DASHES)]}
             words = f"{designs.goals[k].name}, normalised"
-            marks.append(Trace(column[best], designs.share(k)[best], label=words, look=look))
+            marks.append(Trace(column[best], designs.shares[best, k], label=words, look=look))
         look = {"color": style.VERMILION, "markersize": 6.5, "zorder": 4}
         marks.append(Dots([column[winner]], [score[winner]], label="best", look=look))
         words = f"best: {listed(designs, {name: designs.design(winner)[name]})[0]}"
