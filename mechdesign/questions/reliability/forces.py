@@ -175,24 +175,18 @@ class ForceModel(PoseNumbers):
         places = mechanism.description.places
         if name.startswith(FOLLOWED):
             return abs(self.nominal[name.removeprefix(FOLLOWED)]) or 1.0
-        if name in mechanism.drives:
-            kind: str = mechanism.quantity(name)
-        else:
-            kind = places[name].quantity if name in places else "length"
-        if kind == "angle":
-            return 1.0
-        if kind == "length":
-            return mechanism.size
+        kind: str = places[name].quantity if name in places else "length"
+        kind = mechanism.quantity(name) if name in mechanism.drives else kind
+        if kind in ("angle", "length"):
+            return 1.0 if kind == "angle" else mechanism.size
         return max(abs(place.nominal) for place in places.values() if place.quantity == kind) or 1.0
 
 
-def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
+def force_model(study: Study, poses: Poses) -> ForceModel | None:
     """The model of a study, or of designs at their poses; None where no force is asked."""
     if study.dynamics is None or not kinds_of_forces(study):
         return None
     question = ForceQuestion.of(study, moves=pace(study).rated)
-    if poses is None:
-        return ForceModel(question)
     return ForceModel(question, poses.parameters, poses.own.changed, poses.times)
 
 

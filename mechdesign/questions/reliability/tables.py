@@ -51,6 +51,11 @@ def _channels(task: Task, channels: Ints) -> dict[str, Strings]:
     return {"output": output[channels], "order": order[channels]}
 
 
+def _rows(*shape: int) -> list[Ints]:
+    """The numbers along each axis of all rows of a table."""
+    return [index.ravel() for index in np.indices(shape)]
+
+
 def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[MethodResult]:
     """Results with moments of the errors; the first order's where no method has any."""
     return [result for result in results if result.sums or result.normal] or [methods.run("analytic", task)]
@@ -86,20 +91,20 @@ def judged(
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
     results = _with_moments(task, results)
-    means, covariances = zip(*(result.moments(task) for result in results), strict=True)
-    scale, linear = task.scale[:, None], task.linear
-    shape = (task.poses.count, len(results), len(scale))
-    pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean = np.stack(means)[method, channel, pose] * scale[channel, 0]
-    variance = np.stack(covariances)[method, pose, channel, channel]
-    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
-    nominal = (task.nominal * scale)[channel, pose]
-    low, high = linear.worst_ends()
+    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
+    scale, linear = task.scale, task.linear
+    pose, method, channel = _rows(task.poses.count, len(results), len(scale))
+    sigma = np.sqrt(np.maximum(covariances[method, pose, channel, channel], 0.0)) * scale[channel]
+
+    def column(values: Floats) -> Floats:
+        return np.asarray((values * scale[:, None])[channel, pose])
+
+    nominal, low, high = (column(values) for values in (task.nominal, *linear.worst_ends()))
     table = MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
         {}, method=np.array([result.method for result in results])[method], **_channels(task, channel), nominal=nominal,
-        mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
-        worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
-        unit=task.labels[2][channel], valid=task.reason[pose] == 0,
+        mean=nominal + means[method, channel, pose] * scale[channel], sigma=sigma,
+        worst_case=column(linear.worst_case()), worst_low=low, worst_high=high, unit=task.labels[2][channel],
+        valid=task.reason[pose] == 0,
     ))  # fmt: skip
     return replace(table, unassembled=dict.fromkeys(("mean", "sigma"), _lost(results, pose, method)))
 
@@ -156,7 +161,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     results, question = _with_moments(task, results), task.question.at(task.nominal)
     single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
     shape = (task.poses.count, len(results), len(single))
-    pose, method, limit = (index.ravel() for index in np.indices(shape))
+    pose, method, limit = _rows(*shape)
     scale = task.scale[rows]
     means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
     # Circles have no value and no limits of a value: nan.
@@ -206,7 +211,7 @@ def _by_limit(task: Task, result: MethodResult, single: Sequence[ReliabilityQues
 def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
-    pose, channel, source = (index.ravel() for index in np.indices(share.shape))
+    pose, channel, source = _rows(*share.shape)
     names = np.array([source.name for source in task.sources.all])
     pins, study = [pin.quantity for pin in task.sources.pins], task.study
     turned = [study.units.angle_factor if quantity == "angle" else 1.0 for quantity in pins]
@@ -214,20 +219,15 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     # A parameter without a known unit appears by its name in the derivative's unit.
     below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
     below += [study.units.label(quantity) for quantity in pins]
-    units = np.array(
-        [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
-    )
+    units = np.array([[study.units.ratio(unit, of_source) for of_source in below] for unit in task.labels[2].tolist()])
     links = np.array([holders(task.study, channel) for channel in task.question.channels])
     table = CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
         share=share.ravel(), **_index_values(indices, share.shape),
     ))  # fmt: skip
-    lost = {
-        row: f"{own.invalid} of {own.samples} samples cannot be assembled"
-        for row, own in indices.items()
-        if own.invalid
-    }
+    lost = {row: f"{own.invalid} of {own.samples} samples cannot be assembled" * (own.invalid > 0)
+            for row, own in indices.items()}  # fmt: skip
     words = np.array([lost.get(row, "") for row in pose.tolist()], dtype=str)
     return replace(table, unassembled={name: words for name in table.names if name.startswith("sobol_")})
 
@@ -368,7 +368,7 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
     """Mean of each output by the number of samples, at the pose that is shown [S3, Fig. 4]."""
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
-    step, channel = (index.ravel() for index in np.indices(means.shape))
+    step, channel = _rows(*means.shape)
     return CONVERGENCE.table(at_poses(task, np.full(len(step), row)) + CONVERGENCE.columns(
         {}, samples=trend[step, 1].astype(np.int64), **_channels(task, channel), mean=means.ravel(),
         unit=task.labels[2][channel],
