@@ -84,7 +84,6 @@ def _worst(task: Task) -> Floats:
     failure = ndtr(-task.closing.distance()).max(axis=0, initial=0.0)
     for rows in linear.alike():
         for limit in question.single:
-            bands, discs = linear.limits(limit.bands, limit.discs, rows)
-            own = failure_probability(covariance[rows], bands, discs, mean[rows])
+            own = failure_probability(covariance[rows], linear.limits(limit.limits, rows), mean[rows])
             failure[rows] = np.fmax(failure[rows], own)
     return np.where(task.assembled, failure, 1.0)

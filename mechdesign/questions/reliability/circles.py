@@ -10,7 +10,7 @@ from scipy.special import erfcx, ndtr
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.statistics import MAX_DEVIATION, outside
-from mechdesign.questions.reliability.question import Band, Disc
+from mechdesign.questions.reliability.question import Limit
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
@@ -93,7 +93,7 @@ def disc_chance(covariance: Floats, radius: float, mean: Floats) -> float:
     return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
 
 
-def standard_ends(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
+def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
     """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
     sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
     low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
@@ -135,7 +135,7 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
     return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
 
-def disc_and_band_failure(covariance: Floats, disc: Disc, band: Band, mean: Floats) -> float:
+def disc_and_band_failure(covariance: Floats, disc: Limit, band: Limit, mean: Floats) -> float:
     """Probability that normal errors at one pose leave a circle, or a ring, or that one other leaves its band.
 
     Notes
@@ -147,8 +147,8 @@ def disc_and_band_failure(covariance: Floats, disc: Disc, band: Band, mean: Floa
 
     over u = middle + half sin t, in which both roots at the rim are smooth.
     """
-    pair = [disc.x, disc.y]
-    spread, centre, radius, least = covariance[np.ix_(pair, pair)], mean[pair], float(disc.radius), float(disc.least)
+    pair = [*disc.channels]
+    spread, centre, radius, least = covariance[np.ix_(pair, pair)], mean[pair], float(disc.high), float(disc.low)
     beyond = disc_failure(spread, radius, centre) + (disc_chance(spread, least, centre) if least > 0 else 0.0)
     squares, axes = np.linalg.eigh(spread)
     wide = np.sqrt(max(float(squares[1]), 0.0))

@@ -18,7 +18,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.motion.rows import NOWHERE, Poses
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant

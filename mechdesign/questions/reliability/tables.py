@@ -24,7 +24,7 @@ from mechdesign.questions.reliability.columns import (
 )
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.questions.reliability.first_order import correlation
-from mechdesign.questions.reliability.question import ReliabilityQuestion, holders
+from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, holders
 from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
@@ -84,7 +84,7 @@ def judged(
         "moments": partial(moments, task, results), "reliability": partial(success, task, results),
         "capability": partial(capability, task, results), "contributions": partial(contributions, task, indices),
     }  # fmt: skip
-    limits = () if task.question.limited else ("reliability", "capability")
+    limits = () if task.question.limits else ("reliability", "capability")
     return (make() for name, make in makers.items() if name not in limits and (names is None or name in names))
 
 
@@ -159,32 +159,33 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     Limits of an error are added to the nominal value.
     """
     results, question = _with_moments(task, results), task.question.at(task.nominal)
-    single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
-    shape = (task.poses.count, len(results), len(single))
+    limits, single = question.limits, task.question.single
+    shape = (task.poses.count, len(results), len(limits))
     pose, method, limit = _rows(*shape)
+    rows, rounds = [limit.output for limit in limits], np.array([limit.round for limit in limits])
     scale = task.scale[rows]
     means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
     # Circles have no value and no limits of a value: nan.
-    nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
-    nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
-    mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
-    sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
-    for k, band in enumerate(question.bands):
-        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
+    sigma = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0))
+    parts = (task.nominal[rows].T[:, None], np.moveaxis(means[:, rows], 2, 0), sigma)
+    nominal, mean, sigma = (np.broadcast_to(np.where(rounds, np.nan, part * scale), shape) for part in parts)
+    low, high = np.empty((2, *shape))
+    for k, own in enumerate(limits):
+        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (own.low, own.high))
     both = np.isfinite(low) & np.isfinite(high)
     cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
     cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
-    upper = np.where(np.isfinite(high), nominal + high, np.nan)
-    for k, disc in enumerate(question.discs, bands):
-        upper[..., k] = np.reshape(disc.radius, (-1, 1))
+    upper = np.where(np.isfinite(high), np.where(rounds, 0.0, nominal) + high, np.nan)
     estimates = [_by_limit(task, result, single) for result in results]
     failure, least, most = (
         np.array([[[getattr(by_pose.get(row, _UNKNOWN), name) for by_pose in limits] for limits in estimates]
                   for row in range(len(nominal))])
         for name in ("failure", "low", "high")
     )  # fmt: skip
-    output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
-    output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
+    output, order, unit = (label[rows] for label in task.labels)
+    output = np.array(
+        [name.rpartition(".")[0] if own.round else name for name, own in zip(output, limits, strict=True)]
+    )
     table = CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
         {}, method=np.array([result.method for result in results])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
@@ -254,8 +255,8 @@ class Samples:
         Errors of the samples that can be assembled.
     kept : ndarray of bool, shape (n,)
         Whether a sample keeps every limit.
-    bands, discs
-        The limits of errors: (channel, lowest, highest error); (channel of x, channel of y, radius).
+    limits
+        Those of errors.
     pair : (int, int) or None
         The two channels whose density is drawn.
     mean, covariance : ndarray, shapes (channels,) and (channels, channels)
@@ -268,8 +269,7 @@ class Samples:
     units: Strings
     errors: Floats
     kept: Flags
-    bands: tuple[tuple[int, float, float], ...]
-    discs: tuple[tuple[int, int, float], ...]
+    limits: tuple[Limit, ...]
     pair: tuple[int, int] | None
     mean: Floats
     covariance: Floats
@@ -289,11 +289,11 @@ def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
     if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
         return None
     pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
+    limits = (replace(limit, low=limit.low * scale[limit.output], high=limit.high * scale[limit.output])
+              for limit in question.limits)  # fmt: skip
     return Samples(
-        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)),
-        tuple((b.output, b.low * scale[b.output], b.high * scale[b.output]) for b in question.bands),
-        tuple((d.x, d.y, d.radius) for d in question.discs), question.pair,
-        task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
+        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)), tuple(limits),
+        question.pair, task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
     )  # fmt: skip
 
 
@@ -302,7 +302,7 @@ def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
     built = [_density(task, sums), _histogram(task, sums)]
     followed = next(((row, part) for row, part in sorted(sums.items()) if len(part.trend)), None)
     if followed is not None:
-        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
+        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limits else None]
     return [table for table in built if table is not None]
 
 

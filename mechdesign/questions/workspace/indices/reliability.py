@@ -30,7 +30,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.reliability.probability import made_failure
 
     errors = Errors.of(study, NOWHERE)
-    if not errors.question.limited:
+    if not errors.question.limits:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
@@ -43,8 +43,7 @@ def prepare(study: Study) -> Evaluate:
 
     def evaluate(configuration: Configuration) -> Floats:
         nominal, linear, margins, _ = errors.linearized(configuration, rates)
-        bands = question.at(nominal).bands
-        return 1.0 - made_failure(model_of(question, linear, nominal), margins, bands, question.discs)[0]
+        return 1.0 - made_failure(model_of(question, linear, nominal), margins, question.at(nominal).limits)[0]
 
     return of_configurations(evaluate)
 

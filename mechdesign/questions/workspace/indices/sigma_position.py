@@ -25,7 +25,7 @@ def prepare(study: Study) -> Evaluate:
 
     point = WorkspaceSection.of(study).point
     channels = tuple(Channel.of(study.mechanism.coordinate(f"{point}.{axis}")) for axis in "xy")
-    errors = replace(Errors.of(study, NOWHERE), question=ReliabilityQuestion(channels, (), (), None))
+    errors = replace(Errors.of(study, NOWHERE), question=ReliabilityQuestion(channels))
 
     def evaluate(configuration: Configuration) -> Floats:
         linear = errors.linearized(configuration, DriveRates((), ()))[1]
