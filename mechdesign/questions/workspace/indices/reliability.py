@@ -22,14 +22,13 @@ def prepare(study: Study) -> Evaluate:
     StudyError
         Where nothing is limited, or a velocity whose drives' rates are not known.
     """
-    from mechdesign.motion.rows import NOWHERE
     from mechdesign.questions.kinematics.rates import constant_rates
     from mechdesign.questions.reliability.errors import Errors
     from mechdesign.questions.reliability.forces import pace
     from mechdesign.questions.reliability.lengths import model_of
     from mechdesign.questions.reliability.probability import made_failure
 
-    errors = Errors.of(study, NOWHERE)
+    errors = Errors.of(study)
     if not errors.question.limits:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))
