@@ -68,29 +68,30 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
     -----
     In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
     """
-    if radius == np.inf:
-        return 0.0
-    a, b, m, n = _principal(covariance, mean)
-    if radius <= 0 or a == 0:
-        return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
-    if b < 1e-12 * a:
-        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
-    height, weight = _across(radius, a, b, m, n)
-    return float(outside((-radius - m) / a, (radius - m) / a)
-                 + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))  # fmt: skip
+    return 0.0 if radius == np.inf else _chance(covariance, radius, np.zeros(2) if mean is None else mean, within=False)
 
 
 def disc_chance(covariance: Floats, radius: float, mean: Floats) -> float:
     """P(bivariate normal within a circle about zero), to all digits of a small one; see `disc_failure`."""
-    a, b, m, n = _principal(covariance, mean)
+    return _chance(covariance, radius, mean, within=True)
+
+
+def _chance(covariance: Floats, radius: float, mean: Floats, *, within: bool) -> float:
+    squares, axes = np.linalg.eigh(covariance)
+    b, a = np.sqrt(np.maximum(squares, 0.0))
+    # Sizes of the mean's parts along the principal axes.
+    n, m = np.abs(axes.T @ mean)
     if radius <= 0 or a == 0:
-        return float(np.hypot(m, n) <= radius > 0)
+        return float((a == 0 and np.hypot(m, n) <= radius > 0) == within)
     if b < 1e-12 * a:
         half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(ndtr((half - m) / a) - ndtr((-half - m) / a))
+        low, high = (-half - m) / a, (half - m) / a
+        return float(ndtr(high) - ndtr(low) if within else outside(low, high) if half else 1.0)
     height, weight = _across(radius, a, b, m, n)
-    return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
+    if within:
+        return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
+    beyond = outside((-radius - m) / a, (radius - m) / a)
+    return float(beyond + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))
 
 
 def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
@@ -102,14 +103,6 @@ def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats
             np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
             np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
         )
-
-
-def _principal(covariance: Floats, mean: Floats | None) -> tuple[Any, Any, Any, Any]:
-    """Standard deviations along the principal axes, the larger first, and the sizes of the mean's parts along them."""
-    squares, axes = np.linalg.eigh(covariance)
-    b, a = np.sqrt(np.maximum(squares, 0.0))
-    n, m = (0.0, 0.0) if mean is None else np.abs(axes.T @ mean)
-    return a, b, m, n
 
 
 def _across(radius: float, a: Any, b: Any, m: Any, n: Any) -> tuple[Floats, Floats]:
