@@ -66,7 +66,7 @@ def _panels(
     samples: Samples, channel: int, name: str, values: Floats, edges: Floats, normal: Floats | None,
     limits: tuple[float, float],
 ) -> tuple[Panel, Panel]:  # fmt: skip
-    """All samples, those of them that fail, a normal density and the limits that are near; and on a logarithmic axis."""
+    """All samples, those that fail, a normal density and the limits that are near; below on a logarithmic axis."""
     every, failed = (np.histogram(part, edges)[0] for part in (values, values[~samples.kept]))
     unit, one = str(samples.units[channel]), 1.0 / (every.sum() * (edges[1] - edges[0]))  # density of a single sample
     marks: list[PanelMark] = [
