@@ -81,7 +81,7 @@ class Reliable:
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.questions.reliability.probability import made_failure
 
-        return made_failure(linear, closing, question.bands, question.discs)[0][None]
+        return made_failure(linear, closing, question.limits)[0][None]
 
     def method(self, task: Task, section: ReliabilitySection) -> str:
         """The simulation method that confirms the target."""
@@ -173,8 +173,8 @@ def aim_of(allocate: Allocate) -> Aim:
 
 
 def _cpk(question: ReliabilityQuestion, mean: Floats, sigma: Floats) -> Floats:
-    """Cpk of each band, shape (bands, poses), from moments of shape (channels, poses)."""
+    """Cpk of each limit, shape (limits, poses), from moments of shape (channels, poses)."""
     return np.stack([
-        np.minimum(band.high - mean[band.output], mean[band.output] - band.low) / (3.0 * sigma[band.output])
-        for band in question.bands
+        np.minimum(limit.high - mean[limit.output], mean[limit.output] - limit.low) / (3.0 * sigma[limit.output])
+        for limit in question.limits
     ])  # fmt: skip

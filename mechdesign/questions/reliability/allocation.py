@@ -235,10 +235,8 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
     poses = [setting.pose for setting in model.task.settings]
     question, linear = model.task.question.at(model.task.nominal[:, poses]), model.linear(scales).take(poses)
     weights = np.zeros((len(question.channels), len(poses)))
-    for band in question.bands:
-        weights[band.output] += 1.0 / np.maximum(np.minimum(abs(band.low), abs(band.high)), _NARROWEST) ** 2
-    for disc in question.discs:
-        weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROWEST) ** 2
+    for limit in question.limits:
+        weights[[*limit.channels]] += 1.0 / np.maximum(np.minimum(abs(limit.low), abs(limit.high)), _NARROWEST) ** 2
     parts = np.nansum(linear.share() * (weights * linear.deviation() ** 2)[:, None], axis=0).T
     return np.asarray(parts / parts.sum(axis=1, keepdims=True))
 

@@ -44,7 +44,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     errors = Errors.of(study, poses)
     task = first_order(errors, solved.append)
     warnings = [*errors.doubts, *ambiguous_points(study, task.question)]
-    closer = places_between(study, task.question, poses) if task.question.limited else None
+    closer = places_between(study, task.question, poses) if task.question.limits else None
     if closer is not None:
         warnings += between_poses(task, first_order(errors.at(closer)))
     if kinds_of_forces(study):
@@ -154,7 +154,7 @@ def _followed(task: Task) -> int:
             why = f"there are only {count} poses" if section.shown > count else "this pose cannot be assembled"
             raise StudyError((task.study.problem(f"{why}; choose another", "reliability", "shown"),))
         return section.shown - 1
-    if not task.question.limited or len(assembled) < 2 or not any(METHODS[name].sampled for name in section.methods):
+    if not task.question.limits or len(assembled) < 2 or not any(METHODS[name].sampled for name in section.methods):
         return int(assembled[0]) if len(assembled) else -1
     estimates = methods.run("analytic", task).estimates
     return max(estimates, key=lambda pose: np.nan_to_num(estimates[pose].failure))

@@ -83,8 +83,7 @@ def _worst(task: Task) -> Floats:
     mean, covariance = linear.whole.shift().T, linear.whole.covariance()
     failure = ndtr(-task.closing.distance()).max(axis=0, initial=0.0)
     for rows in linear.alike():
-        for limit in question.single:
-            bands, discs = linear.limits(limit.bands, limit.discs, rows)
-            own = failure_probability(covariance[rows], bands, discs, mean[rows])
+        for limit in question.limits:
+            own = failure_probability(covariance[rows], linear.limits([limit], rows), mean[rows])
             failure[rows] = np.fmax(failure[rows], own)
     return np.where(task.assembled, failure, 1.0)

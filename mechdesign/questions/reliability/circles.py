@@ -10,7 +10,7 @@ from scipy.special import erfcx, ndtr
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.statistics import MAX_DEVIATION, outside
-from mechdesign.questions.reliability.question import Band, Disc
+from mechdesign.questions.reliability.question import Limit
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
@@ -68,32 +68,33 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
     -----
     In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
     """
-    if radius == np.inf:
-        return 0.0
-    a, b, m, n = _principal(covariance, mean)
-    if radius <= 0 or a == 0:
-        return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
-    if b < 1e-12 * a:
-        half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
-    height, weight = _across(radius, a, b, m, n)
-    return float(outside((-radius - m) / a, (radius - m) / a)
-                 + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))  # fmt: skip
+    return 0.0 if radius == np.inf else _chance(covariance, radius, np.zeros(2) if mean is None else mean, within=False)
 
 
 def disc_chance(covariance: Floats, radius: float, mean: Floats) -> float:
     """P(bivariate normal within a circle about zero), to all digits of a small one; see `disc_failure`."""
-    a, b, m, n = _principal(covariance, mean)
+    return _chance(covariance, radius, mean, within=True)
+
+
+def _chance(covariance: Floats, radius: float, mean: Floats, *, within: bool) -> float:
+    squares, axes = np.linalg.eigh(covariance)
+    b, a = np.sqrt(np.maximum(squares, 0.0))
+    # Sizes of the mean's parts along the principal axes.
+    n, m = np.abs(axes.T @ mean)
     if radius <= 0 or a == 0:
-        return float(np.hypot(m, n) <= radius > 0)
+        return float((a == 0 and np.hypot(m, n) <= radius > 0) == within)
     if b < 1e-12 * a:
         half = np.sqrt(radius**2 - n * n) if n <= radius else 0.0
-        return float(ndtr((half - m) / a) - ndtr((-half - m) / a))
+        low, high = (-half - m) / a, (half - m) / a
+        return float(ndtr(high) - ndtr(low) if within else outside(low, high) if half else 1.0)
     height, weight = _across(radius, a, b, m, n)
-    return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
+    if within:
+        return float(weight @ (ndtr((height - n) / b) - ndtr((-height - n) / b)))
+    beyond = outside((-radius - m) / a, (radius - m) / a)
+    return float(beyond + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))
 
 
-def standard_ends(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
+def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
     """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
     sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
     low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
@@ -102,14 +103,6 @@ def standard_ends(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats,
             np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
             np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
         )
-
-
-def _principal(covariance: Floats, mean: Floats | None) -> tuple[Any, Any, Any, Any]:
-    """Standard deviations along the principal axes, the larger first, and the sizes of the mean's parts along them."""
-    squares, axes = np.linalg.eigh(covariance)
-    b, a = np.sqrt(np.maximum(squares, 0.0))
-    n, m = (0.0, 0.0) if mean is None else np.abs(axes.T @ mean)
-    return a, b, m, n
 
 
 def _across(radius: float, a: Any, b: Any, m: Any, n: Any) -> tuple[Floats, Floats]:
@@ -135,7 +128,7 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
     return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
 
-def disc_and_band_failure(covariance: Floats, disc: Disc, band: Band, mean: Floats) -> float:
+def disc_and_band_failure(covariance: Floats, disc: Limit, band: Limit, mean: Floats) -> float:
     """Probability that normal errors at one pose leave a circle, or a ring, or that one other leaves its band.
 
     Notes
@@ -147,8 +140,8 @@ def disc_and_band_failure(covariance: Floats, disc: Disc, band: Band, mean: Floa
 
     over u = middle + half sin t, in which both roots at the rim are smooth.
     """
-    pair = [disc.x, disc.y]
-    spread, centre, radius, least = covariance[np.ix_(pair, pair)], mean[pair], float(disc.radius), float(disc.least)
+    pair = [*disc.channels]
+    spread, centre, radius, least = covariance[np.ix_(pair, pair)], mean[pair], float(disc.high), float(disc.low)
     beyond = disc_failure(spread, radius, centre) + (disc_chance(spread, least, centre) if least > 0 else 0.0)
     squares, axes = np.linalg.eigh(spread)
     wide = np.sqrt(max(float(squares[1]), 0.0))

@@ -46,6 +46,13 @@ CAPABILITY = TableKind.of("capability", "process capability of each limited outp
     ("ppm_low", "lower end of its interval, 99.7 %, where samples are counted"),
     ("ppm_high", "upper end of its interval, 99.7 %, where samples are counted"),
     ("unit", "unit of the five columns from lsl to sigma"), VALID)  # fmt: skip
+_INTERVAL = {"": "", "_low": ", lower end of its interval, 99.7 %", "_high": ", upper end of its interval, 99.7 %"}
+_SOBOL = (
+    ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]",
+     "Var(E[output | source])/Var(output)"),
+    ("total", "share that the source causes by itself and together with others",
+     "E[Var(output | all others)]/Var(output)"),
+)  # fmt: skip
 CONTRIBUTIONS = TableKind.of("contributions", "what the errors come from",
     TIMED, GIVEN, ("source", "parameter, dimension, drive, or clearance of a joint or coupling"), OUTPUT, ORDER,
     ("on", "links whose point the output is, where its pin has a clearance or gives; of several, midway"),
@@ -53,18 +60,8 @@ CONTRIBUTIONS = TableKind.of("contributions", "what the errors come from",
      "d output/d source"), ("derivative", "the same for one unit of the source as the study counts it, in `unit`"),
     ("unit", "unit of `derivative`: the output's over the source's"),
     ("share", "share of the output's variance, to the first order", "", "(s_i sigma_i)^2/sigma^2"),
-    ("sobol_first", "share of the output's variance that the source causes by itself [Sobol, 1993]", "",
-     "Var(E[output | source])/Var(output)"),
-    ("sobol_first_low", "share of the output's variance that the source causes by itself [Sobol, 1993], lower end of "
-     "its interval, 99.7 %"),
-    ("sobol_first_high", "share of the output's variance that the source causes by itself [Sobol, 1993], upper end of "
-     "its interval, 99.7 %"),
-    ("sobol_total", "share that the source causes by itself and together with others", "",
-     "E[Var(output | all others)]/Var(output)"),
-    ("sobol_total_low",
-     "share that the source causes by itself and together with others, lower end of its interval, 99.7 %"),
-    ("sobol_total_high",
-     "share that the source causes by itself and together with others, upper end of its interval, 99.7 %"))  # fmt: skip
+    *((f"sobol_{kind}{end}", f"{meaning}{words}", "", "" if end else formula)
+      for kind, meaning, formula in _SOBOL for end, words in _INTERVAL.items()))  # fmt: skip
 DENSITY = TableKind.of("density", "density of two errors: bivariate normal and simulation [S2, Figs. 4, 5]",
     GIVEN, ("<output>_error", "centre of the cell", "as the output"),
     ("x, y", "error of <output> about its mean, in deviations of the first order"),

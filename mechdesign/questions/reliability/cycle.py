@@ -41,7 +41,7 @@ def with_cycle(result: MethodResult, task: Task, before: Sequence[MethodResult])
     Partial
         On an interrupt, with the cycles counted so far.
     """
-    if not task.question.limited or not task.poses.followed:
+    if not task.question.limits or not task.poses.followed:
         return result
     method = METHODS[result.method]
     if not method.errors or not task.assembled.all():

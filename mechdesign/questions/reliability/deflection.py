@@ -18,7 +18,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.motion.rows import NOWHERE, Poses
+from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
@@ -149,26 +149,25 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
     return load if load.shape[1] == 1 else load[:, poses]
 
 
-def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
+def elasticity(study: Study, poses: Poses) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
-    stiffness, poses = study.stiffness, poses or NOWHERE
+    stiffness = study.stiffness
     if stiffness is None:
         return None, []
     section = poses.section(ReliabilitySection.of(study))
     loads = poses.section(stiffness).wrenches if section.load is None else [section.load]
-    notes = []
+    why = ""
     if len(loads) > 1:
-        notes.append(Caution(
-            "assumed",
+        why = (
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0] or (0.0, 0.0, 0.0))}]",
-        ))  # fmt: skip
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0] or (0.0, 0.0, 0.0))}]"
+        )
     elif loads == [None]:
-        notes.append(Caution(
-            "assumed",
+        why = (
             f"the load of the stiffness section does not act on {stiffness.at} alone: errors are those of the unloaded "
-            "mechanism",
-        ))  # fmt: skip
+        )
+        why += "mechanism"
+    notes = [Caution("assumed", why)] if why else []
     single = (loads[0] if len(loads) == 1 else None) or (0.0, 0.0, 0.0)
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, single)))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
@@ -201,28 +200,25 @@ def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> l
     positions = [(channel.name, channel.coordinate) for channel in channels
                  if channel.order == 0 and channel.coordinate is not None]  # fmt: skip
     warnings = []
-    lost = [channel.name for channel in channels if not loaded.knows(channel)]
+    lost = ", ".join(channel.name for channel in channels if not loaded.knows(channel))
     if lost:
-        warnings.append(Caution(
-            "incomplete",
-            f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
-            "mechanism",
-        ))  # fmt: skip
-    graph, section = loaded.mechanism.graph, loaded.question.given
+        words = (
+            f"the deflection under the load is not known of {lost}: their errors are those of the unloaded mechanism"
+        )
+        warnings.append(Caution("incomplete", words))
+    graph, section, assumed = loaded.mechanism.graph, loaded.question.given, list[str]()
     for point, links in links_meant(study.reliability, section, graph).items():
         about = [name for name, coordinate in positions if ("", graph.node(point)) in coordinate.ends]
         if about and len(links) > 1 and point in section.bearings and point != section.at:
             ends = " and ".join(f"{link}.{point}" for link in links)
-            warnings.append(Caution(
-                "assumed",
+            assumed.append(
                 f"{', '.join(about)}: the pin {point} gives, and {point} is midway between its ends {ends}; name one "
-                "of them where that is meant",
-            ))  # fmt: skip
+                "of them where that is meant"
+            )
     for link in filter(section.elastic.__contains__, loaded.lines):
         about = [name for name, coordinate in positions
                  if any(link in (turn.body, turn.reference) for turn in angles_of([coordinate]).values())]  # fmt: skip
         if about:
             ends = " to ".join(graph.nodes[node] for node in loaded.lines[link])
-            words = f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}"
-            warnings.append(Caution("assumed", words))
-    return warnings
+            assumed.append(f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}")
+    return [*warnings, *(Caution("assumed", words) for words in assumed)]

@@ -14,7 +14,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.margins import closures
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.question import PoseQuestion, evaluate
-from mechdesign.motion.rows import Poses
+from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cautions, elasticity
@@ -47,7 +47,7 @@ class Errors(PoseQuestion):
     curve = None  # poses alone count: solving makes the motion between them where angles have turns
 
     @classmethod
-    def of(cls, study: Study, poses: Poses) -> Self:
+    def of(cls, study: Study, poses: Poses = NOWHERE) -> Self:
         """Read what a study asks at some poses of one or several designs.
 
         Raises

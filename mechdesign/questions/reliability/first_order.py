@@ -20,7 +20,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import Band, Channel, Disc, columns_among, limits_at
+from mechdesign.questions.reliability.question import Channel, Limit, columns_among
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
 
@@ -86,11 +86,9 @@ class FirstOrder:
         """Poses at which `limits` are those of the same channels of `whole`."""
         return [slice(None)]
 
-    def limits(
-        self, bands: Sequence[Band], discs: Sequence[Disc], poses: Any
-    ) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
+    def limits(self, limits: Sequence[Limit], poses: Any) -> list[Limit]:
         """The limits of the channels, of errors, at some poses that are `alike`, as those of `whole`."""
-        return limits_at(bands, discs, poses)
+        return [limit.at(poses) for limit in limits]
 
     def own(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
         """Mean and covariance of the channels, from those of `whole`, in the shapes of `MethodResult.normal`."""

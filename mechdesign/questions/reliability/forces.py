@@ -7,7 +7,7 @@ that the loads, gravity or the sections of beams follow.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -93,15 +93,19 @@ def load_bends(study: Study) -> list[Bend]:
 
 @dataclass(frozen=True, eq=False)
 class ForceModel(PoseNumbers):
-    """The forces of a mechanism in motion, of designs or made mechanisms with `parameters` of their own.
+    """The forces of a mechanism in motion, of designs or made mechanisms with parameters of their `own`.
 
     Those that are `changed` themselves follow nothing. `times` are those of poses over time.
     """
 
     question: ForceQuestion
-    parameters: Mapping[str, Floats] = field(default_factory=dict)
+    own: Mapping[str, Floats]
     changed: frozenset[str] = frozenset()
     times: Floats | None = None
+
+    @property
+    def parameters(self) -> Mapping[str, Floats]:
+        return self.own
 
     @property
     def nominal(self) -> Mapping[str, float]:
@@ -115,8 +119,8 @@ class ForceModel(PoseNumbers):
 
     def take(self, rows: Sequence[int] | Ints) -> ForceModel:
         """The model at some of many poses."""
-        parameters = {name: np.asarray(at_rows(value, rows)) for name, value in self.parameters.items()}
-        return replace(self, parameters=parameters, times=None if self.times is None else self.times[rows])
+        own = {name: np.asarray(at_rows(value, rows)) for name, value in self.own.items()}
+        return replace(self, own=own, times=None if self.times is None else self.times[rows])
 
     def made(self, deviations: Mapping[str, Number]) -> ForceModel:
         """The model of made mechanisms, from deviations of parameters by their `FOLLOWED` names."""
@@ -129,7 +133,7 @@ class ForceModel(PoseNumbers):
             changed[name] = self.parameters.get(name, nominal[name]) + deviation
         values = parameters.values(changed)
         moved = {name: np.asarray(values[name]) for name in parameters.moved(changed)}
-        return replace(self, parameters={**self.parameters, **moved})
+        return replace(self, own={**self.own, **moved})
 
     def values(self, names: Sequence[str], linear: Linearization, rates: DriveRates) -> list[Value]:
         """Columns of dynamics at poses, in the study's units; nan where the drives do not hold the mechanism."""
@@ -175,24 +179,18 @@ class ForceModel(PoseNumbers):
         places = mechanism.description.places
         if name.startswith(FOLLOWED):
             return abs(self.nominal[name.removeprefix(FOLLOWED)]) or 1.0
-        if name in mechanism.drives:
-            kind: str = mechanism.quantity(name)
-        else:
-            kind = places[name].quantity if name in places else "length"
-        if kind == "angle":
-            return 1.0
-        if kind == "length":
-            return mechanism.size
+        kind: str = places[name].quantity if name in places else "length"
+        kind = mechanism.quantity(name) if name in mechanism.drives else kind
+        if kind in ("angle", "length"):
+            return 1.0 if kind == "angle" else mechanism.size
         return max(abs(place.nominal) for place in places.values() if place.quantity == kind) or 1.0
 
 
-def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
+def force_model(study: Study, poses: Poses) -> ForceModel | None:
     """The model of a study, or of designs at their poses; None where no force is asked."""
     if study.dynamics is None or not kinds_of_forces(study):
         return None
     question = ForceQuestion.of(study, moves=pace(study).rated)
-    if poses is None:
-        return ForceModel(question)
     return ForceModel(question, poses.parameters, poses.own.changed, poses.times)
 
 

@@ -139,8 +139,8 @@ def _conditions(choices: _Choices) -> tuple[list[Floats], Floats] | None:
         return None
     poses = [setting.pose for setting in model.task.settings]
     linear, question = model.task.linear.take(poses), model.task.question.at(model.task.nominal[:, poses])
-    bands = [(band.output, band.low, band.high) for band in question.bands]
-    bands += [(axis, -disc.radius, disc.radius) for disc in question.discs for axis in (disc.x, disc.y)]
+    bands = [(channel, -limit.high if limit.round else limit.low, limit.high)
+             for limit in question.limits for channel in limit.channels]  # fmt: skip
     mean, parts = linear.shift(), np.nan_to_num(linear.share() * (linear.deviation() ** 2)[:, None])
     variances: list[list[Floats]] = [[] for _ in free]
     most = []

@@ -16,7 +16,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
-from mechdesign.questions.reliability.question import Band, Disc, ReliabilityQuestion, limits_at
+from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
 
 # Length of a mean vector, in deviations of its components, up to which its length has a law of its own. Beyond it the
 # vector turns by less than 2 degrees, and its length is linear to 1/60 of a deviation.
@@ -72,17 +72,17 @@ class WithLengths(FirstOrder):
         patterns, rows = np.unique(self.short, axis=1, return_inverse=True)
         return [np.flatnonzero(rows.ravel() == k) for k in range(patterns.shape[1])]
 
-    def limits(
-        self, bands: Sequence[Band], discs: Sequence[Disc], poses: Any
-    ) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
-        bands, discs = limits_at(bands, discs, poses)
+    def limits(self, limits: Sequence[Limit], poses: Any) -> list[Limit]:
         places = {output: k for k, output in enumerate(self.outputs) if self.short[k, poses].any()}
-        count = len(self.components)
-        rings = [
-            Disc(count + 2 * k, count + 2 * k + 1, self.sizes[k, poses] + band.high, self.sizes[k, poses] + band.low)
-            for band in bands if (k := places.get(band.output)) is not None
-        ]  # fmt: skip
-        return tuple(band for band in bands if band.output not in places), (*discs, *rings)
+        count, linear, rings = len(self.components), list[Limit](), list[Limit]()
+        for limit in super().limits(limits, poses):
+            k = None if limit.round else places.get(limit.output)
+            if k is None:
+                linear.append(limit)
+                continue
+            ends = self.sizes[k, poses] + limit.low, self.sizes[k, poses] + limit.high
+            rings.append(Limit((count + 2 * k, count + 2 * k + 1), *ends))
+        return [*linear, *rings]
 
     def own(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
         count = len(self.components)

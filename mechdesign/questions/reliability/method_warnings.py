@@ -42,7 +42,7 @@ def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution
 def _outside(task: Task) -> list[Caution]:
     """Warnings of nominal values outside their own limits, each at its farthest pose."""
     cautions = []
-    for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
+    for limit, band in zip(task.question.limits, task.question.at(task.nominal).limits, strict=True):
         beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
         poses = np.flatnonzero(beyond > 0)
         if not len(poses):
@@ -95,7 +95,7 @@ def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     first, other = results[0].estimates, second.estimates
     apart = {
         pose: disagree(first[pose], other[pose]) for pose in (setting.pose for setting in settings)
-        if task.question.limited and max(first[pose].failure, other[pose].failure) > _CURVED_LEAST
+        if task.question.limits and max(first[pose].failure, other[pose].failure) > _CURVED_LEAST
     }  # fmt: skip
     pose = max(apart, key=apart.__getitem__, default=-1)
     if pose >= 0 and apart[pose] > _CURVED_FACTOR:

@@ -23,7 +23,7 @@ from mechdesign.questions.reliability.circles import (
 )
 from mechdesign.questions.reliability.engine.problem import CONFIDENCE
 from mechdesign.questions.reliability.first_order import FirstOrder, correlation
-from mechdesign.questions.reliability.question import Band, Disc, limits_at
+from mechdesign.questions.reliability.question import Limit
 
 # Points of a lattice.
 _LATTICE_POINTS = 8191
@@ -43,8 +43,8 @@ _POLYGON_SIDES = 64
 
 
 def made_failure(
-    linear: FirstOrder, closing: FirstOrder, bands: Sequence[Band], discs: Sequence[Disc],
-    mean: Floats | None = None, covariance: Floats | None = None,
+    linear: FirstOrder, closing: FirstOrder, limits: Sequence[Limit], mean: Floats | None = None,
+    covariance: Floats | None = None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Probability that a made mechanism breaks a limit or cannot be assembled, by normal errors, shape (poses,).
 
@@ -62,7 +62,7 @@ def made_failure(
     failure, doubt = np.full((2, len(mean)), np.nan)
     # The same lengths have a law of their own at all of these poses.
     for rows in linear.alike():
-        of_rows = estimated_failure(covariance[rows], *linear.limits(bands, discs, rows), mean[rows])
+        of_rows = estimated_failure(covariance[rows], linear.limits(limits, rows), mean[rows])
         failure[rows], doubt[rows] = of_rows
     # What is left where a limit breaks almost surely is all that assembly can add.
     parts = np.minimum(ndtr(-closing.distance()), 1.0 - failure)
@@ -72,23 +72,18 @@ def made_failure(
         both = linear.whole.beside(closing).take([pose])
         spread, middle = both.covariance()[0], both.shift()[:, 0]
         spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
-        limits, circles = linear.limits(bands, discs, [pose])
-        limits, circles = limits_at(limits, circles, 0)
-        margins = [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
-        failure[pose], doubt[pose] = estimated_failure(spread, [*limits, *margins], circles, middle)
+        here = [limit.at(0) for limit in linear.limits(limits, [pose])]
+        here += [Limit((count + k,), 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
+        failure[pose], doubt[pose] = estimated_failure(spread, here, middle)
     return failure, doubt
 
 
-def failure_probability(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
-) -> Floats:
+def failure_probability(covariance: Floats, limits: Sequence[Limit], mean: Floats | None = None) -> Floats:
     """Probability that normal errors break any limit, as `estimated_failure`."""
-    return estimated_failure(covariance, bands, discs, mean)[0]
+    return estimated_failure(covariance, limits, mean)[0]
 
 
-def estimated_failure(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
-) -> tuple[Floats, Floats]:
+def estimated_failure(covariance: Floats, limits: Sequence[Limit], mean: Floats | None = None) -> tuple[Floats, Floats]:
     """Probability that normal errors break any limit, shape (...); nan where a limited one's moments are not finite.
 
     With it half the width of its 99.7 % interval, 0 where it is integrated and not sampled.
@@ -97,14 +92,15 @@ def estimated_failure(
     ----------
     covariance : ndarray, shape (..., outputs, outputs)
         May be singular.
-    bands, discs
-        The limits; ends of bands may be of shape (...). One or two limited outputs are integrated with a relative error
+    limits
+        Their ends may be of shape (...). One or two limited outputs are integrated with a relative error
         of about 1e-14, a circle beside another output with about 1e-10; more by a randomised lattice with about 1e-5,
         or by sampling with about 1e-3 where failures are rare.
     mean : ndarray, shape (..., outputs), optional
         Zero if left out.
     """
     mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
+    bands, discs = _kinds(limits)
     if len(bands) <= 2 and not discs:
         ends = [standard_ends(band, covariance, mean) for band in bands]
         if len(ends) < 2:
@@ -114,13 +110,13 @@ def estimated_failure(
         low, high = (np.stack([end[k] for end in ends]) for k in (0, 1))
         pair_failure = rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
         return pair_failure, np.zeros_like(pair_failure)
-    limited = [band.output for band in bands] + [axis for disc in discs for axis in (disc.x, disc.y)]
+    limited = [channel for limit in limits for channel in limit.channels]
     finite = np.isfinite(covariance[..., limited, :][..., limited]).all(axis=(-2, -1))
     finite &= np.isfinite(mean[..., limited]).all(axis=-1)
     failure, doubt = np.full(finite.shape, np.nan), np.zeros(finite.shape)
     if len(discs) == 1 and not bands:
-        pair = [discs[0].x, discs[0].y]
-        radius, least = (np.broadcast_to(end, finite.shape)[finite] for end in (discs[0].radius, discs[0].least))
+        pair = [*discs[0].channels]
+        radius, least = (np.broadcast_to(end, finite.shape)[finite] for end in (discs[0].high, discs[0].low))
         spread, middle = covariance[finite][:, pair][..., pair], mean[finite][:, pair]
         beyond = disc_failures(spread, radius, middle)
         for row in np.flatnonzero(least > 0).tolist():
@@ -128,12 +124,18 @@ def estimated_failure(
         failure[finite] = np.minimum(beyond, 1.0)
         return failure, doubt
     for place in filter(np.asarray(finite).__getitem__, np.ndindex(failure.shape)):
-        failure[place], doubt[place] = _of_several(covariance[place], *limits_at(bands, discs, place), mean[place])
+        here = _kinds([limit.at(place) for limit in limits])
+        failure[place], doubt[place] = _of_several(covariance[place], *here, mean[place])
     return failure, doubt
 
 
+def _kinds(limits: Sequence[Limit]) -> tuple[list[Limit], list[Limit]]:
+    """Limits of single errors, and circles."""
+    return [limit for limit in limits if not limit.round], [limit for limit in limits if limit.round]
+
+
 def _of_several(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats
+    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], mean: Floats
 ) -> tuple[float, float]:  # fmt: skip
     """Probability that normal errors at one pose break any of several limits, and half its interval."""
     if len(bands) == len(discs) == 1:
@@ -146,19 +148,19 @@ def _of_several(
 
 
 def _rare(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats
+    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], mean: Floats
 ) -> tuple[float, float] | None:  # fmt: skip
     """Probability outside any of several limits where it is small; None where a lattice is better."""
     total = sum(float(outside(*standard_ends(band, covariance, mean))) for band in bands)
     nearer = []
     for disc in discs:
-        pair = [disc.x, disc.y]
-        total += disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
-        if disc.least > 0:
+        pair = [*disc.channels]
+        total += disc_failure(covariance[np.ix_(pair, pair)], disc.high, mean[pair])
+        if disc.low > 0:
             # A point within the circle is nearer to its middle than a line that touches it.
             away = mean[pair] / (np.hypot(*mean[pair]) or 1.0)
             sigma = np.sqrt(max(float(away @ covariance[np.ix_(pair, pair)] @ away), 0.0))
-            depth = disc.least - float(away @ mean[pair])
+            depth = disc.low - float(away @ mean[pair])
             total += float(ndtr(depth / sigma)) if sigma > 0 else float(depth > 0)
             nearer.append((disc, away))
     if total > _RARE:
@@ -170,12 +172,14 @@ def _rare(
     # A point outside a circle is beyond a side of the polygon in it.
     turns = 2 * np.pi * np.arange(_POLYGON_SIDES) / _POLYGON_SIDES
     for disc in discs:
+        (one, other), apothem = disc.channels, disc.high * np.cos(np.pi / _POLYGON_SIDES)
         for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
-            slopes.append(x * rows[disc.x] + y * rows[disc.y])
-            ends.append(disc.radius * np.cos(np.pi / _POLYGON_SIDES) - x * mean[disc.x] - y * mean[disc.y])
+            slopes.append(x * rows[one] + y * rows[other])
+            ends.append(apothem - x * mean[one] - y * mean[other])
     for disc, (x, y) in nearer:
-        slopes.append(-x * rows[disc.x] - y * rows[disc.y])
-        ends.append(x * mean[disc.x] + y * mean[disc.y] - disc.least)
+        one, other = disc.channels
+        slopes.append(-x * rows[one] - y * rows[other])
+        ends.append(x * mean[one] + y * mean[other] - disc.low)
     size = np.linalg.norm(slopes, axis=1)
     used = (size > 0) & np.isfinite(ends)
     flat = np.count_nonzero(used[: 2 * len(bands)])
@@ -183,8 +187,8 @@ def _rare(
     def broken(u: Floats, held: Flags) -> Flags:
         outside_any = np.asarray(held[:flat].any(axis=0))
         for disc in discs:
-            size = np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y)))
-            outside_any |= (size > disc.radius) | (size < disc.least)
+            size = np.hypot(*(mean[k] + rows[k] @ u for k in disc.channels))
+            outside_any |= (size > disc.high) | (size < disc.low)
         return outside_any
 
     return half_spaces(
@@ -234,7 +238,7 @@ def half_spaces(
 
 
 def _lattice(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], centre: Floats
+    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], centre: Floats
 ) -> tuple[float, float]:  # fmt: skip
     """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it.
 
@@ -242,8 +246,8 @@ def _lattice(
     """
     order: list[tuple[int, float, float, float, float]] = [(b.output, b.low, b.high, 0.0, 0.0) for b in bands]
     for disc in discs:
-        low, high = (sign * disc.radius - float(centre[disc.x]) for sign in (-1, 1))
-        order += [(disc.x, low, high, 0.0, 0.0), (disc.y, low, high, disc.radius, disc.least)]
+        low, high = (sign * disc.high - float(centre[disc.output]) for sign in (-1, 1))
+        order += [(disc.output, low, high, 0.0, 0.0), (disc.channels[1], low, high, disc.high, disc.low)]
     chosen = [output for output, *_ in order]
     root = _pivot_free_cholesky(covariance[np.ix_(chosen, chosen)])
     primes = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71], dtype=float)

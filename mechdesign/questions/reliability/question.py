@@ -88,42 +88,43 @@ def _judged(found: Iterable[Bend]) -> tuple[Bend, ...]:
 
 
 @dataclass(frozen=True)
-class Band:
-    """Limits low <= error <= high of the channel with the index `output`; either may be infinite, or an array of poses.
+class Limit:
+    """Limits low <= error <= high of a channel, or of two: of the length of their errors, a circle or ring about zero.
 
-    If `absolute`, they limit the value of the channel instead of its error.
+    Either end may be infinite, or an array of poses. If `absolute`, they limit the value of the channel itself.
     """
 
-    output: int
+    channels: tuple[int, ...]
     low: Any
     high: Any
     absolute: bool = False
 
+    @property
+    def round(self) -> bool:
+        """Whether it is a circle or ring."""
+        return len(self.channels) > 1
 
-@dataclass(frozen=True)
-class Disc:
-    """A circle about zero that limits the errors of the channels `x` and `y`; its radius may be an array of poses.
+    @property
+    def output(self) -> int:
+        """The first of its channels."""
+        return self.channels[0]
 
-    Errors within the circle of radius `least` about zero are beyond the limit, too.
-    """
-
-    x: int
-    y: int
-    radius: Any
-    least: Any = 0.0
+    def at(self, poses: Any) -> Limit:
+        """The limit at one pose or some, by an index of the arrays of poses."""
+        return replace(self, low=at_rows(self.low, poses), high=at_rows(self.high, poses))
 
 
 @dataclass(frozen=True, eq=False)
 class ReliabilityQuestion:
     """Channels (outputs order by order, all positions first, forces last), and the limits on their errors.
 
-    `pair` are the two limited channels, or without limits the two outputs, where there are exactly two.
+    Circles are the last of these. `pair` are the two limited channels, or without limits the two outputs, where there
+    are exactly two.
     """
 
     channels: tuple[Channel, ...]
-    bands: tuple[Band, ...]
-    discs: tuple[Disc, ...]
-    pair: tuple[int, int] | None
+    limits: tuple[Limit, ...] = ()
+    pair: tuple[int, int] | None = None
 
     @property
     def coordinates(self) -> list[Coordinate]:
@@ -169,97 +170,84 @@ class ReliabilityQuestion:
         return [(k, [next(places) for _ in bend.arguments], bend)
                 for k, channel in enumerate(self.channels) for bend in channel.bends]  # fmt: skip
 
-    @property
-    def limited(self) -> bool:
-        """Whether there are limits, and so a reliability."""
-        return bool(self.bands or self.discs)
-
     def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
         """The question at these poses, where limits are arrays of poses."""
-        bands, discs = limits_at(self.bands, self.discs, poses)
-        return replace(self, bands=bands, discs=discs)
+        return replace(self, limits=tuple(limit.at(poses) for limit in self.limits))
 
     @property
     def single(self) -> list[ReliabilityQuestion]:
-        """One question for each limit, in the order of `kept`."""
-        alone = [replace(self, bands=(band,), discs=()) for band in self.bands]
-        return alone + [replace(self, bands=(), discs=(disc,)) for disc in self.discs]
+        """One question for each limit."""
+        return [replace(self, limits=(limit,)) for limit in self.limits]
 
     def at(self, nominal: Sequence[Any] | Floats) -> ReliabilityQuestion:
         """The question with limits of errors only, at poses where the channels have these nominal values.
 
         An angle is taken at the turn nearest to the middle of its two absolute limits.
         """
-        bands = tuple(self._about(band, nominal[band.output]) if band.absolute else band for band in self.bands)
-        return replace(self, bands=bands)
+        return replace(self, limits=tuple(
+            self._about(limit, nominal[limit.output]) if limit.absolute else limit for limit in self.limits
+        ))  # fmt: skip
 
-    def _about(self, band: Band, value: Any) -> Band:
-        channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
+    def _about(self, limit: Limit, value: Any) -> Limit:
+        channel, middle = self.channels[limit.output], 0.5 * (limit.low + limit.high)
         if channel.order == 0 and channel.turns and np.isfinite(middle).all():
             value = value - TURN * np.round((value - middle) / TURN)
-        return Band(band.output, band.low - value, band.high - value)
+        return Limit(limit.channels, limit.low - value, limit.high - value)
 
     @cached_property
     def limited_channels(self) -> list[int]:
         """Indices of the channels that have limits."""
-        return sorted({b.output for b in self.bands} | {k for d in self.discs for k in (d.x, d.y)})
+        return sorted({channel for limit in self.limits for channel in limit.channels})
 
     @cached_property
     def narrowed(self) -> ReliabilityQuestion:
         """The question with the limited channels only."""
         place = {channel: k for k, channel in enumerate(self.limited_channels)}
-        return ReliabilityQuestion(
-            tuple(self.channels[k] for k in self.limited_channels),
-            tuple(replace(band, output=place[band.output]) for band in self.bands),
-            tuple(replace(disc, x=place[disc.x], y=place[disc.y]) for disc in self.discs),
-            None,
-        )
+        limits = (replace(limit, channels=tuple(place[k] for k in limit.channels)) for limit in self.limits)
+        return ReliabilityQuestion(tuple(self.channels[k] for k in self.limited_channels), tuple(limits))
 
     def kept(self, errors: Floats) -> Flags:
-        """Whether errors of shape (channels, n) keep each limit (bands, then discs), shape (limits, n).
+        """Whether errors of shape (channels, n) keep each limit, shape (limits, n).
 
         Errors of a mechanism that is not assembled are nan and keep no limit.
         """
-        kept = np.ones((len(self.bands) + len(self.discs), errors.shape[1]), dtype=bool)
-        for row, band in zip(kept, self.bands, strict=False):
-            error = errors[band.output]
-            row[:] = (error >= band.low) & (error <= band.high)
-        for row, disc in zip(kept[len(self.bands) :], self.discs, strict=True):
-            x, y = errors[disc.x], errors[disc.y]
-            row[:] = x * x + y * y <= disc.radius * disc.radius
+        kept = np.ones((len(self.limits), errors.shape[1]), dtype=bool)
+        for row, limit in zip(kept, self.limits, strict=True):
+            error = errors[limit.output]
+            if limit.round:
+                row[:] = error * error + errors[limit.channels[1]] ** 2 <= limit.high * limit.high
+            else:
+                row[:] = (error >= limit.low) & (error <= limit.high)
         return kept
 
     @property
-    def _ends(self) -> list[tuple[int, float, float]]:
-        """Finite ends of the bands: channel, end, and 1 for an upper or -1 for a lower end."""
-        return [(b.output, end, sign) for b in self.bands for end, sign in ((b.high, 1.0), (b.low, -1.0))
+    def _ends(self) -> list[tuple[Limit, float, float]]:
+        """Finite ends of the limits, and 1 for an upper or -1 for a lower one."""
+        return [(limit, end, sign) for limit in self.limits for end, sign in ((limit.high, 1.0), (limit.low, -1.0))
                 if np.isfinite(end)]  # fmt: skip
 
     def margins(self, errors: Floats) -> Floats:
         """Distances of errors, shape (channels, n), from the finite ends and circles, negative beyond, (margins, n)."""
-        bands = [sign * (end - errors[output]) for output, end, sign in self._ends]
-        return np.stack([*bands, *(disc.radius - np.hypot(errors[disc.x], errors[disc.y]) for disc in self.discs)])
+        return np.stack([
+            sign * (end - (np.hypot(*errors[[*limit.channels]]) if limit.round else errors[limit.output]))
+            for limit, end, sign in self._ends
+        ])  # fmt: skip
 
     def margin_slopes(self, errors: Floats, slopes: Floats) -> Floats:
         """Derivatives of the margins from those of the errors, shape (channels, dimension, n)."""
-        gradients = [-sign * slopes[output] for output, _, sign in self._ends]
-        for disc in self.discs:
-            x, y = errors[disc.x], errors[disc.y]
-            gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
+        gradients = []
+        for limit, _, sign in self._ends:
+            slope = slopes[limit.output]
+            if limit.round:
+                x, y = errors[[*limit.channels]]
+                slope = (x * slope + y * slopes[limit.channels[1]]) / np.hypot(x, y)
+            gradients.append(-sign * slope)
         return np.stack(gradients)
 
 
 def columns_among(channels: Sequence[Channel]) -> list[str]:
     """The columns of dynamics among channels."""
     return [channel.name for channel in channels if channel.coordinate is None]
-
-
-def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
-    """The limits at one pose or some, by an index of the arrays of poses."""
-    return (
-        tuple(replace(band, low=at_rows(band.low, poses), high=at_rows(band.high, poses)) for band in bands),
-        tuple(replace(disc, radius=at_rows(disc.radius, poses), least=at_rows(disc.least, poses)) for disc in discs),
-    )
 
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
@@ -286,21 +274,22 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
         vector = tuple(Channel(part, last, kinds[name]) for part in axes.get(name, ()))
         channels.append(Channel(name, last, kinds[name], None, vector, () if name.endswith("_energy") else bent))
     places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
-    bands, discs = list[Band](), list[Disc]()
+    asked = []
     for base, order, limit in limits:
         if limit.radius is not None:
-            discs.append(Disc(places[f"{base}.x", order], places[f"{base}.y", order], limit.radius))
+            asked.append(Limit((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius))
             continue
         output = places[base, order]
         factor = study.units.angle_factor if channels[output].turns else 1.0
         low, high = (bound if value is None else value * factor
                      for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True))  # fmt: skip
-        bands.append(Band(output, low, high, limit.absolute))
-    pair = [band.output for band in bands] if not discs else [discs[0].x, discs[0].y] if not bands else []
+        asked.append(Limit((output,), low, high, limit.absolute))
+    asked.sort(key=lambda limit: limit.round)
+    alone = len({limit.round for limit in asked}) < 2
+    pair = [k for limit in asked for k in limit.channels] if alone else []
     if not limited:
         pair = [k for k, channel in enumerate(channels) if channel.order in (0, last)]
-    alone = len(pair) == 2 and len(discs) < 2
-    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), (pair[0], pair[1]) if alone else None)
+    return ReliabilityQuestion(tuple(channels), tuple(asked), (pair[0], pair[1]) if len(pair) == 2 else None)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

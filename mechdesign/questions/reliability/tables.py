@@ -24,7 +24,7 @@ from mechdesign.questions.reliability.columns import (
 )
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.questions.reliability.first_order import correlation
-from mechdesign.questions.reliability.question import ReliabilityQuestion, holders
+from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, holders
 from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
@@ -49,6 +49,11 @@ def _channels(task: Task, channels: Ints) -> dict[str, Strings]:
     """Names of these channels, by columns."""
     output, order, _ = task.labels
     return {"output": output[channels], "order": order[channels]}
+
+
+def _rows(*shape: int) -> list[Ints]:
+    """The numbers along each axis of all rows of a table."""
+    return [index.ravel() for index in np.indices(shape)]
 
 
 def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[MethodResult]:
@@ -79,27 +84,27 @@ def judged(
         "moments": partial(moments, task, results), "reliability": partial(success, task, results),
         "capability": partial(capability, task, results), "contributions": partial(contributions, task, indices),
     }  # fmt: skip
-    limits = () if task.question.limited else ("reliability", "capability")
+    limits = () if task.question.limits else ("reliability", "capability")
     return (make() for name, make in makers.items() if name not in limits and (names is None or name in names))
 
 
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
     results = _with_moments(task, results)
-    means, covariances = zip(*(result.moments(task) for result in results), strict=True)
-    scale, linear = task.scale[:, None], task.linear
-    shape = (task.poses.count, len(results), len(scale))
-    pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean = np.stack(means)[method, channel, pose] * scale[channel, 0]
-    variance = np.stack(covariances)[method, pose, channel, channel]
-    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
-    nominal = (task.nominal * scale)[channel, pose]
-    low, high = linear.worst_ends()
+    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
+    scale, linear = task.scale, task.linear
+    pose, method, channel = _rows(task.poses.count, len(results), len(scale))
+    sigma = np.sqrt(np.maximum(covariances[method, pose, channel, channel], 0.0)) * scale[channel]
+
+    def column(values: Floats) -> Floats:
+        return np.asarray((values * scale[:, None])[channel, pose])
+
+    nominal, low, high = (column(values) for values in (task.nominal, *linear.worst_ends()))
     table = MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
         {}, method=np.array([result.method for result in results])[method], **_channels(task, channel), nominal=nominal,
-        mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
-        worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
-        unit=task.labels[2][channel], valid=task.reason[pose] == 0,
+        mean=nominal + means[method, channel, pose] * scale[channel], sigma=sigma,
+        worst_case=column(linear.worst_case()), worst_low=low, worst_high=high, unit=task.labels[2][channel],
+        valid=task.reason[pose] == 0,
     ))  # fmt: skip
     return replace(table, unassembled=dict.fromkeys(("mean", "sigma"), _lost(results, pose, method)))
 
@@ -154,32 +159,33 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     Limits of an error are added to the nominal value.
     """
     results, question = _with_moments(task, results), task.question.at(task.nominal)
-    single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
-    shape = (task.poses.count, len(results), len(single))
-    pose, method, limit = (index.ravel() for index in np.indices(shape))
+    limits, single = question.limits, task.question.single
+    shape = (task.poses.count, len(results), len(limits))
+    pose, method, limit = _rows(*shape)
+    rows, rounds = [limit.output for limit in limits], np.array([limit.round for limit in limits])
     scale = task.scale[rows]
     means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
     # Circles have no value and no limits of a value: nan.
-    nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
-    nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
-    mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
-    sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
-    for k, band in enumerate(question.bands):
-        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
+    sigma = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0))
+    parts = (task.nominal[rows].T[:, None], np.moveaxis(means[:, rows], 2, 0), sigma)
+    nominal, mean, sigma = (np.broadcast_to(np.where(rounds, np.nan, part * scale), shape) for part in parts)
+    low, high = np.empty((2, *shape))
+    for k, own in enumerate(limits):
+        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (own.low, own.high))
     both = np.isfinite(low) & np.isfinite(high)
     cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
     cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
-    upper = np.where(np.isfinite(high), nominal + high, np.nan)
-    for k, disc in enumerate(question.discs, bands):
-        upper[..., k] = np.reshape(disc.radius, (-1, 1))
+    upper = np.where(np.isfinite(high), np.where(rounds, 0.0, nominal) + high, np.nan)
     estimates = [_by_limit(task, result, single) for result in results]
     failure, least, most = (
         np.array([[[getattr(by_pose.get(row, _UNKNOWN), name) for by_pose in limits] for limits in estimates]
                   for row in range(len(nominal))])
         for name in ("failure", "low", "high")
     )  # fmt: skip
-    output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
-    output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
+    output, order, unit = (label[rows] for label in task.labels)
+    output = np.array(
+        [name.rpartition(".")[0] if own.round else name for name, own in zip(output, limits, strict=True)]
+    )
     table = CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
         {}, method=np.array([result.method for result in results])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
@@ -206,7 +212,7 @@ def _by_limit(task: Task, result: MethodResult, single: Sequence[ReliabilityQues
 def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
-    pose, channel, source = (index.ravel() for index in np.indices(share.shape))
+    pose, channel, source = _rows(*share.shape)
     names = np.array([source.name for source in task.sources.all])
     pins, study = [pin.quantity for pin in task.sources.pins], task.study
     turned = [study.units.angle_factor if quantity == "angle" else 1.0 for quantity in pins]
@@ -214,20 +220,15 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     # A parameter without a known unit appears by its name in the derivative's unit.
     below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
     below += [study.units.label(quantity) for quantity in pins]
-    units = np.array(
-        [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
-    )
+    units = np.array([[study.units.ratio(unit, of_source) for of_source in below] for unit in task.labels[2].tolist()])
     links = np.array([holders(task.study, channel) for channel in task.question.channels])
     table = CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
         share=share.ravel(), **_index_values(indices, share.shape),
     ))  # fmt: skip
-    lost = {
-        row: f"{own.invalid} of {own.samples} samples cannot be assembled"
-        for row, own in indices.items()
-        if own.invalid
-    }
+    lost = {row: f"{own.invalid} of {own.samples} samples cannot be assembled" * (own.invalid > 0)
+            for row, own in indices.items()}  # fmt: skip
     words = np.array([lost.get(row, "") for row in pose.tolist()], dtype=str)
     return replace(table, unassembled={name: words for name in table.names if name.startswith("sobol_")})
 
@@ -254,8 +255,8 @@ class Samples:
         Errors of the samples that can be assembled.
     kept : ndarray of bool, shape (n,)
         Whether a sample keeps every limit.
-    bands, discs
-        The limits of errors: (channel, lowest, highest error); (channel of x, channel of y, radius).
+    limits
+        Those of errors.
     pair : (int, int) or None
         The two channels whose density is drawn.
     mean, covariance : ndarray, shapes (channels,) and (channels, channels)
@@ -268,8 +269,7 @@ class Samples:
     units: Strings
     errors: Floats
     kept: Flags
-    bands: tuple[tuple[int, float, float], ...]
-    discs: tuple[tuple[int, int, float], ...]
+    limits: tuple[Limit, ...]
     pair: tuple[int, int] | None
     mean: Floats
     covariance: Floats
@@ -289,11 +289,11 @@ def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
     if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
         return None
     pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
+    limits = (replace(limit, low=limit.low * scale[limit.output], high=limit.high * scale[limit.output])
+              for limit in question.limits)  # fmt: skip
     return Samples(
-        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)),
-        tuple((b.output, b.low * scale[b.output], b.high * scale[b.output]) for b in question.bands),
-        tuple((d.x, d.y, d.radius) for d in question.discs), question.pair,
-        task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
+        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)), tuple(limits),
+        question.pair, task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
     )  # fmt: skip
 
 
@@ -302,7 +302,7 @@ def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
     built = [_density(task, sums), _histogram(task, sums)]
     followed = next(((row, part) for row, part in sorted(sums.items()) if len(part.trend)), None)
     if followed is not None:
-        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
+        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limits else None]
     return [table for table in built if table is not None]
 
 
@@ -368,7 +368,7 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
     """Mean of each output by the number of samples, at the pose that is shown [S3, Fig. 4]."""
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
-    step, channel = (index.ravel() for index in np.indices(means.shape))
+    step, channel = _rows(*means.shape)
     return CONVERGENCE.table(at_poses(task, np.full(len(step), row)) + CONVERGENCE.columns(
         {}, samples=trend[step, 1].astype(np.int64), **_channels(task, channel), mean=means.ravel(),
         unit=task.labels[2][channel],

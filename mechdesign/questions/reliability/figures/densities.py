@@ -136,16 +136,20 @@ def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
     It is a circle, or a rectangle that leaves the picture where a side is open or far; `reach` are the largest errors.
     """
     assert samples.pair is not None
-    if samples.discs:
-        radius = samples.discs[0][2]
+    if samples.limits and samples.limits[0].round:
+        radius = samples.limits[0].high
         words = f"limit: {radius:g} {samples.units[samples.pair[0]]}".rstrip() + " from no error"
         if radius >= _FAR_FROM_ERRORS * reach.max():
             return np.zeros((2, 0)), words, f"{words}, outside"
         turn = np.linspace(0.0, 2 * np.pi, 181)
         return radius * np.stack([np.cos(turn), np.sin(turn)]), words, ""
-    limits, sides, far = {channel: ends for channel, *ends in samples.bands}, list[list[float]](), list[str]()
+    limits, sides, far = (
+        {limit.output: (limit.low, limit.high) for limit in samples.limits},
+        list[list[float]](),
+        list[str](),
+    )
     for channel, size in zip(samples.pair, _FAR_FROM_ERRORS * reach, strict=True):
-        ends = limits.get(channel, [-np.inf, np.inf])
+        ends = limits.get(channel, (-np.inf, np.inf))
         sides.append([end if abs(end) < size else float(10.0 * np.copysign(size, end)) for end in ends])
         far += [f"{end:+g} {samples.units[channel]} of {samples.outputs[channel]}" for end in ends
                 if np.isfinite(end) and abs(end) >= size]  # fmt: skip

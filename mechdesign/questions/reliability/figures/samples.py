@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,94 +26,74 @@ _MAX_LINEAR_SAMPLES = 400_000
 _MAX_LINEAR_RATIO = 50.0
 
 
-class _Histogram(NamedTuple):
-    """One panel: bins of all samples and of those that fail, a normal density, and limits."""
-
-    name: str
-    unit: str
-    edges: Floats
-    counts: Floats
-    failed: Floats
-    normal: Floats | None
-    limits: tuple[float, float]
-
-
 @picture(ErrorsView, "histogram", order=40)
 def histogram_picture(view: ErrorsView) -> Picture | None:
     """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
     samples = view.sampled("histogram")
     if samples is None:
         return None
-    shown = _histograms(samples, view.result.tables["histogram"])
+    shown = _histograms(samples, view.result.tables["histogram"])[:MAX_PANELS]
     columns = min(len(shown), 2 if len(shown) == 4 else 3, fitting_panels())
     panels: list[Panel | None] = []
     for k in range(0, len(shown), columns):
-        blank = [None] * (columns - len(shown[k : k + columns]))
-        for logarithmic in (False, True):
-            panels += [*(_panel(one, logarithmic=logarithmic) for one in shown[k : k + columns]), *blank]
+        for row in zip(*shown[k : k + columns], strict=True):
+            panels += [*row, *[None] * (columns - len(row))]
     note = f"{look(view.method).words}, {samples.errors.shape[1]:,} samples"
-    note += f", {int((~samples.kept).sum()):,} of them fail" if samples.bands or samples.discs else ""
+    note += f", {int((~samples.kept).sum()):,} of them fail" if samples.limits else ""
     return Picture(f"Errors of made mechanisms {view.where}", panels,
                    (f"{note}; below: the same on a logarithmic axis",), columns)  # fmt: skip
 
 
-def _histograms(samples: Samples, table: Table) -> list[_Histogram]:
+def _histograms(samples: Samples, table: Table) -> list[tuple[Panel, Panel]]:
     """Distances that a circle limits, then the errors that vary."""
-    histograms = []
-    for x, y, radius in samples.discs:
-        distance = np.hypot(samples.errors[x], samples.errors[y])
-        edges = np.linspace(distance.min(), distance.max(), _BINS + 1)
-        name = f"{samples.outputs[x].rpartition('.')[0]}: distance from no error"
-        histograms.append(_counted(samples, name, x, distance, edges, None, (-np.inf, radius)))
-    bands = {channel: (low, high) for channel, low, high in samples.bands}
+    panels, ends = [], {limit.output: (limit.low, limit.high) for limit in samples.limits if not limit.round}
+    for limit in samples.limits:
+        if limit.round:
+            distance = np.hypot(*samples.errors[[*limit.channels]])
+            edges = np.linspace(distance.min(), distance.max(), _BINS + 1)
+            name = f"{samples.outputs[limit.output].rpartition('.')[0]}: distance from no error"
+            panels.append(_panels(samples, limit.output, name, distance, edges, None, (limit.low, limit.high)))
     for k, (output, order) in enumerate(zip(samples.outputs.tolist(), samples.orders.tolist(), strict=True)):
         rows = table.where(output=output, order=order)
         if rows.any():
-            edges, ends = np.append(table["low"][rows], table["high"][rows][-1]), bands.get(k, (-np.inf, np.inf))
-            name, normal = heading(output, order), table["normal"][rows]
-            histograms.append(_counted(samples, name, k, samples.errors[k], edges, normal, ends))
-    return histograms[:MAX_PANELS]
+            edges, normal = np.append(table["low"][rows], table["high"][rows][-1]), table["normal"][rows]
+            own, name = ends.get(k, (-np.inf, np.inf)), heading(output, order)
+            panels.append(_panels(samples, k, name, samples.errors[k], edges, normal, own))
+    return panels
 
 
-def _counted(
-    samples: Samples, name: str, channel: int, values: Floats, edges: Floats, normal: Floats | None,
+def _panels(
+    samples: Samples, channel: int, name: str, values: Floats, edges: Floats, normal: Floats | None,
     limits: tuple[float, float],
-) -> _Histogram:  # fmt: skip
-    counts, failed = (np.histogram(part, edges)[0] for part in (values, values[~samples.kept]))
-    return _Histogram(name, str(samples.units[channel]), edges, counts, failed, normal, limits)
-
-
-def _panel(shown: _Histogram, *, logarithmic: bool) -> Panel:
-    """The samples, those of them that fail, the normal density and the limits that are near."""
-    edges, unit = shown.edges, shown.unit
-    one = 1.0 / (shown.counts.sum() * (edges[1] - edges[0]))  # density of a single sample
+) -> tuple[Panel, Panel]:  # fmt: skip
+    """All samples, those that fail, a normal density and the limits that are near; below on a logarithmic axis."""
+    every, failed = (np.histogram(part, edges)[0] for part in (values, values[~samples.kept]))
+    unit, one = str(samples.units[channel]), 1.0 / (every.sum() * (edges[1] - edges[0]))  # density of a single sample
     marks: list[PanelMark] = [
         Steps(one * counts, edges, label=words, look={"color": color})
-        for words, counts, color in (("made mechanisms", shown.counts, style.SKY),
-                                     ("of these those that fail", shown.failed, style.VERMILION))
+        for words, counts, color in (("made mechanisms", every, style.SKY),
+                                     ("of these those that fail", failed, style.VERMILION))
         if counts.any()
     ]  # fmt: skip
-    top = one * float(shown.counts.max())
-    if shown.normal is not None:
-        marks.append(Trace((edges[1:] + edges[:-1]) / 2, shown.normal, label="normal, same mean and deviation",
+    top = one * float(every.max())
+    if normal is not None:
+        marks.append(Trace((edges[1:] + edges[:-1]) / 2, normal, label="normal, same mean and deviation",
                            look={"color": style.BLUE, "linewidth": 1.8}))  # fmt: skip
-        top = max(top, float(shown.normal.max()))
+        top = max(top, float(normal.max()))
     span = edges[-1] - edges[0]
-    near, far = apart(shown.limits, edges[0] - _FAR_FROM_HISTOGRAM * span, edges[-1] + _FAR_FROM_HISTOGRAM * span)
+    near, far = apart(limits, edges[0] - _FAR_FROM_HISTOGRAM * span, edges[-1] + _FAR_FROM_HISTOGRAM * span)
     sides = [edges[0], edges[-1], *(limit + side for limit in near for side in (-0.08 * span, 0.08 * span))]
-    ends = float(min(sides)), float(max(sides))
-    edge, beyond = (
-        {"color": style.VERMILION, "linestyle": (0, (5, 2))},
-        {"color": style.VERMILION, "alpha": 0.1, "zorder": 0},
-    )
-    marks.append(Lines(near, "x", label="limit of the error", look=edge))
-    marks += [Zone(limit, ends[bool(limit == shown.limits[1])], "x", look=beyond) for limit in near]
+    ends, red = (float(min(sides)), float(max(sides))), {"color": style.VERMILION}
+    marks.append(Lines(near, "x", label="limit of the error", look=red | {"linestyle": (0, (5, 2))}))
+    beyond = red | {"alpha": 0.1, "zorder": 0}
+    marks += [Zone(limit, ends[bool(limit == limits[1])], "x", look=beyond) for limit in near]
     density = f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""
-    if logarithmic:
-        return Panel(marks, Axis("error", unit, ends=ends), Axis("density", density, "log", (0.5 * one, 3.0 * top)))
     aside = f"limit {', '.join(f'{limit:+g}' for limit in far)} {unit}, outside" if far else ""
-    return Panel(
-        marks, Axis(ends=ends, numbers=False), Axis("density", density, ends=(0.0, 1.08 * top)), shown.name, aside
+    plain = Axis("density", density, ends=(0.0, 1.08 * top))
+    logarithmic = Axis("density", density, "log", (0.5 * one, 3.0 * top))
+    return (
+        Panel(marks, Axis(ends=ends, numbers=False), plain, name, aside),
+        Panel(marks, Axis("error", unit, ends=ends), logarithmic),
     )
 
 

@@ -38,5 +38,5 @@ class ErrorsView(PosesView):
         """The pose of the samples in words, and among several why it is shown."""
         samples = self.drawn.samples
         assert samples is not None
-        in_words = followed_in_words if samples.bands or samples.discs else pose_in_words
+        in_words = followed_in_words if samples.limits else pose_in_words
         return f"at {in_words(self.study, self.poses, samples.pose)}"

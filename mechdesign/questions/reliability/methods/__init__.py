@@ -45,7 +45,7 @@ def normal(task: Task, mean: Floats, covariance: Floats) -> MethodResult:
     The channels are those of the linear model's `whole`. Its estimates have no interval but that of limits
     whose common probability is sampled.
     """
-    estimates = of_normal(task, task.question, mean, covariance) if task.question.limited else {}
+    estimates = of_normal(task, task.question, mean, covariance) if task.question.limits else {}
     return MethodResult(estimates, normal=(mean, covariance))
 
 
@@ -60,7 +60,7 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
     rows = np.flatnonzero(task.assembled)
     question = question.take(rows).at(task.nominal[:, rows])
     linear, closing = task.linear.take(rows), task.closing.take(rows)
-    values = np.stack(made_failure(linear, closing, question.bands, question.discs, mean.T[rows], covariance[rows]))
+    values = np.stack(made_failure(linear, closing, question.limits, mean.T[rows], covariance[rows]))
     return {pose: Estimate(value, max(value - doubt, 0.0), min(value + doubt, 1.0), 0)
             for pose, (value, doubt) in zip(rows.tolist(), values.T.tolist(), strict=True)}  # fmt: skip
 
@@ -81,7 +81,7 @@ def pose_by_pose(task: Task, work: Callable[[Task, Setting], MethodResult]) -> M
 
 def of_limits(task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
     """Estimates by `work`, as `pose_by_pose`; an empty result where there are no limits."""
-    return pose_by_pose(task, partial(_estimated, work)) if task.question.limited else MethodResult()
+    return pose_by_pose(task, partial(_estimated, work)) if task.question.limits else MethodResult()
 
 
 def of_moments(task: Task, work: Callable[[Task, Setting], tuple[Floats, Floats]]) -> MethodResult:

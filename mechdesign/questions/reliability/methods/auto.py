@@ -49,7 +49,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
             drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
         return Sums.total(drawn).estimate
 
-    if not task.question.limited:
+    if not task.question.limits:
         plain(min(FEW, task.most))
         return MethodResult(sums={setting.pose: Sums.total(drawn)})
     rng = generator(task.seed, setting.pose, SEARCH, 2)

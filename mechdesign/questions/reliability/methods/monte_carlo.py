@@ -18,5 +18,5 @@ def run(task: Task) -> MethodResult:
 
 
 def _result(task: Task, sums: dict[int, Sums]) -> MethodResult:
-    estimates = {pose: part.estimate for pose, part in sums.items()} if task.question.limited else {}
+    estimates = {pose: part.estimate for pose, part in sums.items()} if task.question.limits else {}
     return MethodResult(estimates, sums)

@@ -22,15 +22,14 @@ def prepare(study: Study) -> Evaluate:
     StudyError
         Where nothing is limited, or a velocity whose drives' rates are not known.
     """
-    from mechdesign.motion.rows import NOWHERE
     from mechdesign.questions.kinematics.rates import constant_rates
     from mechdesign.questions.reliability.errors import Errors
     from mechdesign.questions.reliability.forces import pace
     from mechdesign.questions.reliability.lengths import model_of
     from mechdesign.questions.reliability.probability import made_failure
 
-    errors = Errors.of(study, NOWHERE)
-    if not errors.question.limited:
+    errors = Errors.of(study)
+    if not errors.question.limits:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
@@ -43,8 +42,7 @@ def prepare(study: Study) -> Evaluate:
 
     def evaluate(configuration: Configuration) -> Floats:
         nominal, linear, margins, _ = errors.linearized(configuration, rates)
-        bands = question.at(nominal).bands
-        return 1.0 - made_failure(model_of(question, linear, nominal), margins, bands, question.discs)[0]
+        return 1.0 - made_failure(model_of(question, linear, nominal), margins, question.at(nominal).limits)[0]
 
     return of_configurations(evaluate)
 

@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 
 def prepare(study: Study) -> Evaluate:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
-    from mechdesign.motion.rows import NOWHERE
     from mechdesign.questions.kinematics.rates import DriveRates
     from mechdesign.questions.reliability.errors import Errors
     from mechdesign.questions.reliability.question import Channel, ReliabilityQuestion
 
     point = WorkspaceSection.of(study).point
     channels = tuple(Channel.of(study.mechanism.coordinate(f"{point}.{axis}")) for axis in "xy")
-    errors = replace(Errors.of(study, NOWHERE), question=ReliabilityQuestion(channels, (), (), None))
+    errors = replace(Errors.of(study), question=ReliabilityQuestion(channels))
 
     def evaluate(configuration: Configuration) -> Floats:
         linear = errors.linearized(configuration, DriveRates((), ()))[1]
