@@ -16,7 +16,6 @@ from mechdesign.mechanism.elements.joints import AnyJoint, Prismatic
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.questions.reliability.copula import Correlation
-from mechdesign.questions.reliability.fit_laws import fit_law
 from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, MeasuredLaw
 from mechdesign.questions.reliability.schema.clearances import Clearance
