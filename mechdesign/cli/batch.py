@@ -44,7 +44,8 @@ from mechdesign.study.loaded import StudySource
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK
-from mechdesign.work.processes import TaskProcess, Tell, Work, inherit
+from mechdesign.work.processes import TaskProcess, Tell, Work
+from mechdesign.work.start import inherit
 from mechdesign.work.threads import one_thread
 
 if TYPE_CHECKING:

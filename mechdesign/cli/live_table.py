@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
 from mechdesign.progress import Progress
 from mechdesign.work import interrupts
-from mechdesign.work.processes import Tell
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Rows
@@ -42,7 +41,7 @@ class ProgressNote:
 class Reported(Progress):
     """Progress that sends a note at most every `_OFTEN` seconds."""
 
-    def __init__(self, command: str, tell: Tell) -> None:
+    def __init__(self, command: str, tell: Callable[[ProgressNote], None]) -> None:
         self._command = command
         self._tell = tell
         self._stage = ""

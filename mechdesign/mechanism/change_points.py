@@ -14,7 +14,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.roots import lowest
+from mechdesign.numerics.roots import dips
 
 # A closure, a difference of squared lengths, touches zero where it is below this part of its largest value.
 TOUCHING = 1e-10
@@ -112,7 +112,10 @@ class ChangePoints:
         which, row = np.nonzero(low)
         if not len(row):
             return np.empty(0)
-        lanes = np.arange(len(row))
-        place, value = lowest(lambda at: self._closures(index, at)[which, lanes], samples[row], samples[row + 2])
+        around = row + np.arange(3)[:, None]
+        place, value = dips(
+            lambda some, at: self._closures(index, at)[which[some], np.arange(len(some))],
+            samples[around], table[which, around], np.full(len(row), -np.inf),
+        )  # fmt: skip
         scale = np.nanmax(np.abs(table), axis=1)[which]
         return np.unique(place[np.abs(value) <= TOUCHING * scale])

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 
@@ -54,13 +53,15 @@ def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floa
         open_ = (gap.max(axis=1) > COMPLEMENTARITY) | (residual > RESIDUAL)
         if not open_.any():
             break
-        newton = _Newton(bent, rows, dual, primal, slack, multipliers)
+        weighted = (multipliers / slack)[:, :, None] * rows
+        matrix = bent + np.swapaxes(rows, 1, 2) @ weighted + REGULAR * np.eye(rows.shape[2])
+        newton = partial(_step, matrix, rows, dual, primal, slack, multipliers)
         try:
-            _, change, rise = newton.step(gap)
+            _, change, rise = newton(gap)
             mean = gap.mean(axis=1)
             predicted = (slack + _longest(slack, change) * change) * (multipliers + _longest(multipliers, rise) * rise)
             centre = (np.maximum(predicted.mean(axis=1), 0.0) / mean) ** 3 * mean
-            steps = newton.step(gap + change * rise - centre[:, None])
+            steps = newton(gap + change * rise - centre[:, None])
         except np.linalg.LinAlgError:
             break
         open_ &= np.all([np.isfinite(move).all(axis=1) for move in steps], axis=0)
@@ -70,32 +71,14 @@ def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floa
     return z, multipliers
 
 
-@dataclass(frozen=True)
-class _Newton:
-    """Newton's method on the conditions of an optimum; the residuals `dual` and `primal` have the shapes of `solve`."""
-
-    bent: Floats
-    rows: Floats
-    dual: Floats
-    primal: Floats
-    slack: Floats
-    multipliers: Floats
-
-    @cached_property
-    def _across(self) -> Floats:
-        return np.swapaxes(self.rows, 1, 2)
-
-    @cached_property
-    def _matrix(self) -> Floats:
-        weights = (self.multipliers / self.slack)[:, :, None]
-        return np.asarray(self.bent + self._across @ (weights * self.rows) + REGULAR * np.eye(self.rows.shape[2]))
-
-    def step(self, reduction: Floats) -> tuple[Floats, Floats, Floats]:
-        """Changes of the point, slacks and multipliers that lower the slacks times multipliers by `reduction`."""
-        right = -self.dual - _times(self._across, (self.multipliers * self.primal - reduction) / self.slack)
-        move = np.asarray(np.linalg.solve(self._matrix, right[:, :, None])[:, :, 0])
-        change = -self.primal - _times(self.rows, move)
-        return move, change, (-reduction - self.multipliers * change) / self.slack
+def _step(
+    matrix: Floats, rows: Floats, dual: Floats, primal: Floats, slack: Floats, multipliers: Floats, reduction: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Newton's changes of the point, slacks and multipliers that lower the slacks times multipliers by `reduction`."""
+    right = -dual - _times(np.swapaxes(rows, 1, 2), (multipliers * primal - reduction) / slack)
+    move = np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+    change = -primal - _times(rows, move)
+    return move, change, (-reduction - multipliers * change) / slack
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:

@@ -18,8 +18,6 @@ MAX_ROOT_STEPS = 80
 SHORT = (1e-3, 0.1)
 # The golden section of an interval.
 GOLDEN = (math.sqrt(5) - 1) / 2
-# Golden sections that shrink a bracket to 1e-10: the value is exact then, as a function is flat at its minimum.
-GOLDEN_SECTIONS = 50
 # Largest number of successive parabolas.
 MAX_PARABOLAS = 24
 # Accuracy of a minimum's place, as a fraction of the place or of its bracket.
@@ -93,26 +91,6 @@ def bracketed_roots(
         done = (fx == 0) | near | (np.abs(b[active] - a[active]) <= tolerance[active])
         active = active[~done]
     return root
-
-
-def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Places and values, shape (n,), of the minima between `low` and `high` of functions that fall and then rise.
-
-    `function` gives the values of all functions at places of shape (n,), never nan.
-    """
-    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_left, at_right = function(left), function(right)
-    for _ in range(GOLDEN_SECTIONS):
-        lower = at_left < at_right
-        low, high = np.where(lower, low, left), np.where(lower, right, high)
-        left, right = (
-            np.where(lower, high - GOLDEN * (high - low), right),
-            np.where(lower, left, low + GOLDEN * (high - low)),
-        )
-        new = function(np.where(lower, left, right))
-        at_left, at_right = np.where(lower, new, at_right), np.where(lower, at_left, new)
-    place = low + (high - low) / 2
-    return place, function(place)
 
 
 def dips(

@@ -13,7 +13,6 @@ from importlib import import_module
 from typing import ParamSpec, TypeVar
 
 from mechdesign.work.pool import LostWorkerError, Pool
-from mechdesign.work.processes import Processes
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -31,6 +30,8 @@ def importing(module: str, jobs: int) -> Iterator[None]:
     if jobs == 1 or module in sys.modules:
         yield
         return
+    from mechdesign.work.processes import Processes
+
     try:
         process = Processes(1)
     except OSError:

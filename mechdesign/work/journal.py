@@ -7,21 +7,19 @@ digest of the batch; a computation that is started again reads finished batches 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import time
-import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from mechdesign.errors import OutputError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.records import remove_recorded, write_recorded
+from mechdesign.work.blocks import packed, unpacked
 
 NAME = "unfinished.npz"
 # Least seconds between two versions of the file, and the least ratio of this time to that of writing it.
@@ -57,15 +55,13 @@ class Journal:
 
     def _read(self) -> bool:
         try:
-            with np.load(io.BytesIO(self.path.read_bytes()), allow_pickle=False) as content:
-                if str(content["origin"]) != self._origin:
-                    return False
-                digests, counts, rows = content["digests"], content["counts"], content["rows"]
-                self.words = json.loads(str(content["words"]))
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
+            head, blocks = unpacked(self.path)
+            if head["origin"] != self._origin:
+                return False
+            self._stored = list(zip(map(bytes.fromhex, head["digests"]), blocks, strict=True))
+            self.words = head["words"]
+        except (ValueError, KeyError, TypeError):
             return False
-        blocks = np.split(rows, np.cumsum(counts)[:-1])
-        self._stored = [(key.tobytes(), block) for key, block in zip(digests, blocks, strict=True)]
         self._stored.reverse()
         return bool(self._stored)
 
@@ -102,18 +98,10 @@ class Journal:
         rows = [*self._rows, *(block for _, block in reversed(self._stored))]
         if not rows:
             return
-        stream = io.BytesIO()
-        np.savez(
-            stream,
-            origin=np.array(self._origin),
-            digests=np.frombuffer(b"".join(digests), dtype=np.uint8).reshape(-1, 16),
-            counts=np.array([len(block) for block in rows]),
-            rows=np.concatenate(rows),
-            words=np.array(json.dumps(self.words)),
-        )
+        head = {"origin": self._origin, "digests": [key.hex() for key in digests], "words": self.words}
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_recorded(self.path, stream.getvalue())
+            write_recorded(self.path, packed(head, rows))
         except OSError as error:
             raise OutputError(f"{self.path}: could not be written: {error.strerror or error}") from error
         self._written = time.monotonic()

@@ -11,17 +11,20 @@ import platform
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import cache, cached_property, lru_cache, partial
 from itertools import islice
 from operator import length_hint
-from typing import Any, Generic, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, cast
 
 from mechdesign.errors import MechdesignError
 from mechdesign.versions import installed
 from mechdesign.work import interrupts
-from mechdesign.work.processes import Processes, inherit
+from mechdesign.work.start import inherit
 from mechdesign.work.threads import keep_freed_memory, one_thread
+
+if TYPE_CHECKING:
+    from mechdesign.work.processes import Processes
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
@@ -58,14 +61,20 @@ class Pool:
     @staticmethod
     def local(count: int, *, threads: bool = False) -> Pool:
         """Processes or threads of this machine; a single one is this process."""
-        open_ = partial(ThreadPoolExecutor, count, "mechdesign") if threads else partial(Processes, count)
         patience = math.inf if count == 1 else 0.0 if threads else _FORKED if inherit() else _FRESH
-        return Pool(open_, count, patience, threads=threads)
+        return Pool(partial(_opened, count, threads=threads), count, patience, threads=threads)
 
     @property
     def width(self) -> int:
         """Number of workers."""
         return self._width
+
+    @property
+    def processes(self) -> Processes | None:
+        """The executor, if it is of processes that this one has begun."""
+        from mechdesign.work.processes import Processes
+
+        return self.executor if isinstance(self.executor, Processes) else None
 
     def work(self, seconds: float) -> None:
         """This process has worked alone; open the executor if that is enough."""
@@ -96,11 +105,13 @@ class Pool:
 
     def drop(self, tasks: Sequence[Future[Any]]) -> None:
         """Let go of tasks: processes of this machine that are at one are killed, others finish it."""
-        if not isinstance(self.executor, Processes):
-            for task in tasks:
-                task.cancel()
-        elif not all(task.done() for task in tasks):
-            self.executor.kill()
+        if all(task.done() for task in tasks):
+            return
+        if self.processes is not None:
+            self.processes.kill()
+            return
+        for task in tasks:
+            task.cancel()
 
     def close(self) -> None:
         """Drop the tasks not begun and wait for those under way."""
@@ -111,6 +122,17 @@ class Pool:
         except TypeError:
             # The executor of dask does not know `cancel_futures`.
             self.executor.shutdown(wait=False)
+
+
+def _opened(count: int, *, threads: bool) -> Executor:
+    """An executor of this machine. What starts processes is imported here: many commands start none."""
+    if threads:
+        from concurrent.futures import ThreadPoolExecutor
+
+        return ThreadPoolExecutor(count, "mechdesign")
+    from mechdesign.work.processes import Processes
+
+    return Processes(count)
 
 
 class _Task(NamedTuple):
@@ -142,7 +164,7 @@ class ChunkMap(Generic[Item, Value]):
     def _work(self) -> Callable[[list[Item]], tuple[list[Value], float]]:
         if self._pool.threads:
             return partial(_timed, self._function)
-        version = None if isinstance(self._pool.executor, Processes) else _version()
+        version = None if self._pool.processes is not None else _version()
         return partial(_perform, version, pickle.dumps(self._function, protocol=5))
 
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:

@@ -11,27 +11,16 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import BaseContext
 from types import ModuleType
 from typing import Any
 
 from mechdesign.work import interrupts
+from mechdesign.work.start import inherit, start_method
 
 # Reports the progress of a task.
 Tell = Callable[[Any], None]
 # From the number of a task, and the function that reports its progress, to its value.
 Work = Callable[[int, Tell], Any]
-
-
-def context() -> BaseContext:
-    """How processes start: as was chosen for this one; else forked on Linux, where that is quick and safe."""
-    chosen = multiprocessing.get_start_method(allow_none=True)
-    return multiprocessing.get_context(chosen or ("fork" if sys.platform == "linux" else None))
-
-
-def inherit() -> bool:
-    """Whether new processes have what this one has in its memory, and begin in no time."""
-    return context().get_start_method() == "fork"
 
 
 class Processes(ProcessPoolExecutor):
@@ -44,7 +33,7 @@ class Processes(ProcessPoolExecutor):
     """
 
     def __init__(self, count: int, settle_in: Callable[..., None] = interrupts.leave_to_parent, *given: Any) -> None:
-        super().__init__(count, context(), _begin, (settle_in, *given))
+        super().__init__(count, multiprocessing.get_context(start_method()), _begin, (settle_in, *given))
         others = multiprocessing.active_children()
         try:
             with interrupts.undisturbed(), warnings.catch_warnings(), nullcontext() if inherit() else _without_script():

@@ -6,24 +6,19 @@ those of all shards.
 
 from __future__ import annotations
 
-import io
 import json
 import re
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import BadZipFile
-
-import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.errors import OutputError, StudyError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.records import remove_recorded, write_recorded
+from mechdesign.work.blocks import packed, unpacked
 
 Item = TypeVar("Item")
 Block = tuple[Floats, str]
@@ -85,22 +80,11 @@ def write(directory: Path, shard: Shard, origin: Mapping[str, Any], blocks: Sequ
     OutputError
         If it cannot be written.
     """
-    stream = io.BytesIO()
-    np.savez(
-        stream,
-        head=_text({"shard": [shard.number, shard.count], "origin": origin}),
-        counts=np.array([len(table) for table, _ in blocks], dtype=np.intp),
-        rows=np.concatenate([table for table, _ in blocks]) if blocks else np.zeros((0, 0)),
-        words=_text([words for _, words in blocks]),
-    )
+    head = {"shard": [shard.number, shard.count], "origin": origin, "words": [words for _, words in blocks]}
     try:
-        write_recorded(directory / FILE, stream.getvalue(), whole=False)
+        write_recorded(directory / FILE, packed(head, [rows for rows, _ in blocks]), whole=False)
     except OSError as error:
         raise OutputError(f"{directory}: the shard could not be written: {error.strerror or error}") from error
-
-
-def _text(data: Any) -> NDArray[np.uint8]:
-    return np.frombuffer(json.dumps(data).encode(), dtype=np.uint8)
 
 
 def files_in(directory: Path) -> list[Path]:
@@ -170,13 +154,10 @@ def is_current(directory: Path, origin: Mapping[str, Any]) -> bool:
 
 def _read(path: Path) -> _Kept:
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
-            head, words = (json.loads(content[name].tobytes()) for name in ("head", "words"))
-            counts, rows = content["counts"], content["rows"]
+        head, tables = unpacked(path)
         shard = Shard(*map(int, head["shard"]))
-        tables = np.split(rows, np.cumsum(counts))[: len(words)]
-        if path.parent.name != shard.folder or not isinstance(head["origin"], dict) or len(counts) != len(words):
+        if path.parent.name != shard.folder or not isinstance(head["origin"], dict):
             raise ValueError
-        return _Kept(shard, head["origin"], list(zip(tables, map(str, words), strict=True)))
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error, RecursionError):
+        return _Kept(shard, head["origin"], list(zip(tables, map(str, head["words"]), strict=True)))
+    except (ValueError, KeyError, TypeError):
         raise StudyError(f"{path}: is not a whole shard; remove {path.parent} and compute it anew") from None

@@ -19,7 +19,7 @@ ORDER = (
     ("mechdesign.study.text",),
     ("mechdesign.motion",),
     ("mechdesign.study.building",),
-    ("mechdesign.questions.reliability.laws",),
+    ("mechdesign.questions.reliability.laws", "mechdesign.questions.reliability.fit_laws"),
     (
         "mechdesign.study.schema",
         *(f"mechdesign.questions.{name}.schema" for name in COMMANDS), "mechdesign.experiments.schema",

@@ -23,7 +23,7 @@ from mechdesign.questions.reliability.laws import (
     Uniform,
 )
 from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
-from mechdesign.questions.reliability.pin_laws import PIN_LAWS, PinLaw
+from mechdesign.questions.reliability.pin_laws import PIN_LAWS, PlaceLaw
 from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.reliability.simulation import generator
 from mechdesign.questions.reliability.study_sources import find_sources
@@ -45,7 +45,7 @@ U = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + 0.5 * np.diff(EDGES)[:, None] * N
 DENSITY = (0.5 * np.diff(EDGES)[:, None] * WEIGHTS).ravel() * np.exp(-0.5 * U * U) / np.sqrt(2 * np.pi)
 
 
-def drawn_by(law: Marginal | PinLaw, seed: int, parts: int = 1) -> Floats:
+def drawn_by(law: Marginal | PlaceLaw, seed: int, parts: int = 1) -> Floats:
     """Draws of a law; of places of pins both parts."""
     out = np.empty((parts, SAMPLES))
     law.draw(generator(seed, 0, 0), out if parts > 1 else out[0])

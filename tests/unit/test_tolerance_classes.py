@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.questions.reliability.laws import fit_law
+from mechdesign.questions.reliability.fit_laws import fit_law
 from mechdesign.questions.reliability.schema.iso_tolerances import (
     ToleranceClassError,
     angle_deviations,

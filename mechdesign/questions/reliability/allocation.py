@@ -127,17 +127,17 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
         return Result("allocation", {}, failed=_unreachable(rounds[-1]))
     last = min(confirmed, key=_Round.cost) if confirmed else rounds[-1]
     where, by_model, by_simulation = last.worst()
-    goal, failed = _goal(last), ""
+    asked, failed = f"{float(aim.shown(np.array(aim.goal))):.15g}", ""
     if not confirmed:
         failed = (
-            f"allocate: the {aim.noun} asked, {goal.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
+            f"allocate: the {aim.noun} asked, {asked}, is not confirmed at {where}: with tolerances "
             f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}; ask for a little less"
         )
     before = sum(start[k].price(start[k].given) for k in free.tolist())
     notes = [Caution(
         "allocated",
-        f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {goal}, and at "
-        f"{where}, the worst pose, it is {by_model} by the analytic model and {by_simulation} by {last.method}",
+        f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {aim.noun} of {asked}, "
+        f"and at {where}, the worst pose, it is {by_model} by the analytic model and {by_simulation} by {last.method}",
         "confirmation", pose=where,
     )]  # fmt: skip
     if len(rounds) > 1:
@@ -151,7 +151,9 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
     text, others = rewritten(
-        study, allocated_data(study, start, last.scales), f"Tolerances of {study.name}, the cheapest for a {goal}"
+        study,
+        allocated_data(study, start, last.scales),
+        f"Tolerances of {study.name}, the cheapest for a {aim.noun} of {asked}",
     )
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))
@@ -193,12 +195,6 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
         corrected = targets - np.minimum(last.levels()[1], _LEVEL_STEP) if model.steps else _corrected(rounds)
         targets = np.where(wrong, corrected, targets)
     return rounds
-
-
-def _goal(last: _Round) -> str:
-    """The target in words."""
-    aim = last.model.aim
-    return f"{aim.noun} of {float(aim.shown(np.array(aim.goal))):.15g}"
 
 
 def _corrected(rounds: Sequence[_Round]) -> Floats:

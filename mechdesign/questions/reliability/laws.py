@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Self
@@ -27,14 +27,14 @@ from mechdesign.study.text.reading import failure
 SIGMAS = 3.0
 
 
-def _normal_cdf(u: Floats | float) -> Floats:
+def normal_cdf(u: Floats | float) -> Floats:
     """Probability that a standard normal variable is below `u`."""
     from scipy.special import ndtr
 
     return np.asarray(ndtr(u))
 
 
-def _normal_quantile(share: Floats | float) -> Floats:
+def normal_quantile(share: Floats | float) -> Floats:
     """Quantile of the standard normal law, at least one-dimensional."""
     from scipy.special import ndtri
 
@@ -128,7 +128,7 @@ class Marginal(ABC):
     def at(self, u: Floats) -> Floats:
         """Deviations at values `u` of a standard normal variable, in the shape of `u`; increasing in `u`."""
 
-    def _from_ends(self, u: Floats, inward: Floats) -> Floats:
+    def from_ends(self, u: Floats, inward: Floats) -> Floats:
         """Deviations at a distance `inward` from the end of the tolerance on the side of `u`, to full precision."""
         return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
 
@@ -184,8 +184,8 @@ class TruncatedNormal(Marginal):
         from scipy.special import ndtri
 
         # By the lower tail, where small probabilities keep their digits.
-        tail = _normal_cdf(-SIGMAS)
-        below = ndtri(tail + _normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
+        tail = normal_cdf(-SIGMAS)
+        below = ndtri(tail + normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
         return np.asarray(self.mean + self.sigma * np.copysign(below, u))
 
 
@@ -203,7 +203,7 @@ class Uniform(Marginal):
         out += self.low
 
     def at(self, u: Floats) -> Floats:
-        return self._from_ends(u, (self.high - self.low) * _normal_cdf(-np.abs(u)))
+        return self.from_ends(u, (self.high - self.low) * normal_cdf(-np.abs(u)))
 
 
 class Triangular(Marginal):
@@ -227,14 +227,14 @@ class Triangular(Marginal):
 
     @property
     def kinks(self) -> Floats:
-        return _normal_quantile((self.mode - self.low) / (self.high - self.low) if self.high > self.low else 0.5)
+        return normal_quantile((self.mode - self.low) / (self.high - self.low) if self.high > self.low else 0.5)
 
     def draw(self, rng: np.random.Generator, out: Floats) -> None:
         out[:] = self.low if self.high == self.low else rng.triangular(self.low, self.mode, self.high, len(out))
 
     def at(self, u: Floats) -> Floats:
         width, rise = self.high - self.low, self.mode - self.low
-        below, above = _normal_cdf(u), _normal_cdf(-u)
+        below, above = normal_cdf(u), normal_cdf(-u)
         climb = self.low + np.sqrt(below * width * rise)
         fall = self.high - np.sqrt(above * width * (width - rise))
         return np.asarray(np.where(below * width < rise, climb, fall))
@@ -262,54 +262,6 @@ class Lognormal(Marginal):
 
 
 @dataclass(frozen=True)
-class _OfFit(Marginal):
-    """Hole minus shaft, both of the same law over their tolerances; `hole` is the hole's share of the sum of both."""
-
-    hole: float = 0.5
-
-    @property
-    def sigma(self) -> Number:
-        return super().sigma * math.hypot(self.hole, 1.0 - self.hole)
-
-
-class NormalFit(_OfFit, Normal):
-    """Clearance of a fit whose hole and shaft are normal."""
-
-
-class UniformFit(_OfFit):
-    """Clearance of a fit whose hole and shaft are uniform: trapezoidal."""
-
-    reach = Uniform.reach
-
-    @property
-    def moments(self) -> tuple[Number, Number, Number, Number]:
-        hole, shaft = (0.5 * (self.high - self.low) * part / self.reach for part in (self.hole, 1.0 - self.hole))
-        return self.mean, self.sigma**2, 0.0, Uniform.fourth * (hole**4 + shaft**4) + 6.0 * (hole * shaft) ** 2
-
-    @property
-    def kinks(self) -> Floats:
-        edge = 0.5 * min(self.hole, 1.0 - self.hole) / max(self.hole, 1.0 - self.hole)
-        return _normal_quantile(np.array([edge, 1.0 - edge]))
-
-    def at(self, u: Floats) -> Floats:
-        width, wider, narrower = self.high - self.low, max(self.hole, 1.0 - self.hole), min(self.hole, 1.0 - self.hole)
-        tail = _normal_cdf(-np.abs(u))
-        rising = np.sqrt(2.0 * wider * narrower * tail)
-        inward = width * np.where(2.0 * wider * tail < narrower, rising, 0.5 * narrower + wider * tail)
-        return self._from_ends(u, inward)
-
-
-# Laws of fits, by the law of both the hole and the shaft.
-FITS: Mapping[str, type[_OfFit]] = {Normal.name: NormalFit, Uniform.name: UniformFit}
-
-
-def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Marginal:
-    """Law of a radial clearance about its mean, from half the diameter tolerances of the hole and the shaft."""
-    reach = 0.5 * (hole + shaft)
-    return FITS[distribution](-reach, reach, nominal, hole / (hole + shaft))
-
-
-@dataclass(frozen=True)
 class Beta(Marginal):
     """Beta over the tolerance, with two shape parameters: equal ones are symmetric, (1, 1) is uniform."""
 
@@ -334,9 +286,9 @@ class Beta(Marginal):
     def at(self, u: Floats) -> Floats:
         from scipy.special import betaincinv
 
-        (a, b), width, tail = self.shape, self.high - self.low, _normal_cdf(-np.abs(u))
+        (a, b), width, tail = self.shape, self.high - self.low, normal_cdf(-np.abs(u))
         inward = width * np.where(u < 0, betaincinv(a, b, tail), betaincinv(b, a, tail))
-        return self._from_ends(u, inward)
+        return self.from_ends(u, inward)
 
 
 @dataclass(frozen=True)
@@ -365,13 +317,13 @@ class MeasuredLaw(Marginal):
 
     @property
     def kinks(self) -> Floats:
-        return _normal_quantile(self._shares)
+        return normal_quantile(self._shares)
 
     def draw(self, rng: np.random.Generator, out: Floats) -> None:
         out[:] = self._quantile(rng.random(len(out)))
 
     def at(self, u: Floats) -> Floats:
-        return self._quantile(_normal_cdf(u))
+        return self._quantile(normal_cdf(u))
 
     def _quantile(self, share: Floats) -> Floats:
         return np.asarray(self.low + np.interp(share, self._shares, self.ordered))

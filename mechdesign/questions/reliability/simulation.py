@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial, reduce
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
@@ -143,23 +142,21 @@ def problem_of(setting: Setting, sources: Sources) -> LimitStates:
     setting = setting.narrowed()
     question = setting.question
 
-    def margins(u: Floats) -> Floats:
-        errors, valid = errors_of(setting, sources.made(sources.at(u, directed=True)), u.shape[1])
-        distances = question.margins(errors)
-        distances[:, ~valid] = np.nan
-        return distances
-
-    def gradients(u: Floats) -> tuple[Floats, Floats]:
+    def solved(u: Floats) -> tuple[Made, Floats, Floats]:
         made = sources.made(sources.at(u, directed=True))
         errors, valid = errors_of(setting, made, u.shape[1])
+        distances = question.margins(errors)
+        distances[:, ~valid] = np.nan
+        return made, errors, distances
+
+    def gradients(u: Floats) -> tuple[Floats, Floats]:
+        made, errors, distances = solved(u)
         names = [name for part in made for name in part]
         forces = None if setting.forces is None else setting.forces.made(made.parameters)
         by_name = derivatives(
             setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic, forces
         )
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _SOURCE_STEP))
-        distances = question.margins(errors)
-        distances[:, ~valid] = np.nan
         return distances, question.margin_slopes(errors, by_variable)
 
     def varying(u: Floats) -> Floats:
@@ -167,11 +164,12 @@ def problem_of(setting: Setting, sources: Sources) -> LimitStates:
         parts = sources.made(sources.at(u, directed=True))
         return np.array([np.broadcast_to(value, (u.shape[1],)) for part in parts for value in part.values()])
 
+    limits = LimitStates(len(sources.owners), lambda u: solved(u)[2], gradients, sources.circles)
     try:
-        gradients(np.zeros((len(sources.owners), 1)))
+        gradients(np.zeros((limits.dimension, 1)))
     except MechanismError:
-        return LimitStates(len(sources.owners), margins, circles=sources.circles)
-    return LimitStates(len(sources.owners), margins, gradients, sources.circles)
+        return LimitStates(limits.dimension, lambda u: solved(u)[2], circles=sources.circles)
+    return limits
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
@@ -229,11 +227,6 @@ class Sums:
         """Probability of failure from counted failures."""
         return counted(self.failures, self.samples, self.samples - self.valid, self.samples)
 
-    @staticmethod
-    def total(parts: Sequence[Sums]) -> Sums:
-        """The sum of consecutive chunks."""
-        return reduce(Sums.__add__, parts)
-
     def __add__(self, other: Sums) -> Sums:
         offset = np.concatenate([[self.samples, self.valid, self.failures], self.errors])
         return Sums(
@@ -251,15 +244,11 @@ class Sums:
 
 
 def simulate(
-    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, sums: dict[int, Sums],
-    jobs: int | None = 1, progress: Progress = NULL,
-) -> None:  # fmt: skip
-    """Fill `sums` by pose: every chunk at all poses before the next one, so that an interrupt keeps every pose."""
+    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, jobs: int | None = 1
+) -> Iterator[tuple[int, Sums]]:
+    """Sums of every chunk, and its pose: each chunk at all poses before the next, so that an interrupt keeps them."""
     work = partial(_simulated, settings, sources, seed, samples)
-    items = range(-(-samples // CHUNK) * len(settings))
-    for pose, part in map_chunks(work, items, jobs, travels=True):
-        sums[pose] = sums[pose] + part if pose in sums else part
-        progress.update(part.samples)
+    return map_chunks(work, range(-(-samples // CHUNK) * len(settings)), jobs, travels=True)
 
 
 def _simulated(
@@ -271,13 +260,11 @@ def _simulated(
 
 
 def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, count: int) -> Sums:
-    """Draw `count` made mechanisms at one pose and sum their errors."""
+    """Sums of the errors of `count` made mechanisms at one pose.
+
+    The first chunks also have the density, the trend and the errors.
+    """
     made = sources.made(sources.draw(generator(seed, setting.pose, chunk), count))
-    return sums_of(setting, made, count, chunk)
-
-
-def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
-    """Sums over made mechanisms; the first chunks also have the density, the trend and the errors."""
     errors, valid = errors_of(setting, made, count)
     kept = setting.question.kept(errors)
     within = np.asarray(kept.all(axis=0))

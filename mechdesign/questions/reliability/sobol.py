@@ -173,9 +173,17 @@ def _replicate(
     settings: Sequence[Setting], sources: Sources, linear: FirstOrder, rows: Sequence[Sequence[int]], seed: int,
     points: int, item: tuple[int, int],
 ) -> Replicate:  # fmt: skip
-    place, replicate = item
-    rng = generator(seed, settings[place].pose, _STREAM, replicate)
-    return sample(_both_models(settings[place], sources, linear), rows, len(sources.owners), points, rng)
+    setting, replicate = settings[item[0]], item[1]
+    slopes = linear.components[:, :, setting.pose]
+    if not np.isfinite(slopes).all():
+        slopes = np.zeros_like(slopes)
+
+    def both_models(u: Floats) -> Floats:
+        drawn = sources.at(u)
+        errors, valid = errors_of(setting, sources.made(drawn), u.shape[1])
+        return np.stack([np.where(valid, errors, np.nan), slopes @ sources.components(drawn)])
+
+    return sample(both_models, rows, len(sources.owners), points, generator(seed, setting.pose, _STREAM, replicate))
 
 
 def uncorrelated(sources: Sources) -> set[str]:
@@ -205,19 +213,6 @@ def doubts(task: Task, indices: Mapping[int, SobolIndices]) -> list[Caution]:
             "contributions", pose=task.where(pose),
         ))  # fmt: skip
     return notes
-
-
-def _both_models(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
-    slopes = linear.components[:, :, setting.pose]
-    if not np.isfinite(slopes).all():
-        slopes = np.zeros_like(slopes)
-
-    def model(u: Floats) -> Floats:
-        drawn = sources.at(u)
-        errors, valid = errors_of(setting, sources.made(drawn), u.shape[1])
-        return np.stack([np.where(valid, errors, np.nan), slopes @ sources.components(drawn)])
-
-    return model
 
 
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:

@@ -16,7 +16,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED
 from mechdesign.questions.reliability.laws import Marginal, at_rows
-from mechdesign.questions.reliability.pin_laws import PIN_LAWS, SLIDE_LAWS, PinLaw, SlideLaw
+from mechdesign.questions.reliability.pin_laws import PIN_LAWS, SLIDE_LAWS, PlaceLaw
 from mechdesign.study import Study
 
 
@@ -93,7 +93,7 @@ class Pin:
         return replace(self, radius=at_rows(self.radius, rows), law=law, directions=directions)
 
     @property
-    def laws(self) -> Mapping[str, PinLaw] | Mapping[str, SlideLaw]:
+    def laws(self) -> Mapping[str, PlaceLaw]:
         """Laws of the place by name."""
         return SLIDE_LAWS if self.kind == "slide" else PIN_LAWS
 

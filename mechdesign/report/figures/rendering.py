@@ -15,7 +15,7 @@ from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.marks import Picture
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import ChunkMap, LostWorkerError, Pool
-from mechdesign.work.processes import inherit
+from mechdesign.work.start import inherit
 
 # Draws one picture: the bytes of its files by their names.
 Drawing = Callable[[], dict[str, bytes]]

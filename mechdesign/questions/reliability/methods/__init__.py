@@ -79,11 +79,6 @@ def pose_by_pose(task: Task, work: Callable[[Task, Setting], MethodResult]) -> M
     return result
 
 
-def of_limits(task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
-    """Estimates by `work`, as `pose_by_pose`; an empty result where there are no limits."""
-    return pose_by_pose(task, partial(_estimated, work)) if task.question.limits else MethodResult()
-
-
 def of_moments(task: Task, work: Callable[[Task, Setting], tuple[Floats, Floats]]) -> MethodResult:
     """Result as of `normal`, from the mean, shape (channels,), and the covariance by `work`, as `pose_by_pose`."""
     mean = np.full((len(task.question.rows), task.poses.count), np.nan)
@@ -107,7 +102,3 @@ def _at_poses(task: Task, work: Callable[[Task, Setting], Value]) -> Iterator[tu
 
 def _at(work: Callable[[Task, Setting], Value], task: Task, place: int) -> Value:
     return work(task, task.settings[place])
-
-
-def _estimated(work: Callable[[Task, Setting], Estimate], task: Task, setting: Setting) -> MethodResult:
-    return MethodResult({setting.pose: work(task, setting)})

@@ -41,23 +41,25 @@ def run(task: Task) -> MethodResult:
 
 
 def _at_pose(task: Task, setting: Setting) -> MethodResult:
+    # Sums of all samples so far, after each chunk.
     drawn: list[Sums] = []
 
     def plain(count: int) -> Estimate:
-        while (done := sum(part.samples for part in drawn)) < count:
+        while (done := drawn[-1].samples if drawn else 0) < count:
             size = min(PILOT if not drawn else FEW, count - done)
-            drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
-        return Sums.total(drawn).estimate
+            part = simulate_chunk(setting, task.sources, task.seed, len(drawn), size)
+            drawn.append(drawn[-1] + part if drawn else part)
+        return drawn[-1].estimate
 
+    pose = setting.pose
     if not task.question.limits:
         plain(min(FEW, task.most))
-        return MethodResult(sums={setting.pose: Sums.total(drawn)})
+        return MethodResult(sums={pose: drawn[-1]})
     rng = generator(task.seed, setting.pose, SEARCH, 2)
     # All poses share about `task.most` plain samples.
     problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
     estimate, used, tried = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
-    pose = setting.pose
-    return MethodResult({pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: tried})
+    return MethodResult({pose: estimate}, {pose: drawn[-1]}, {pose: used}, {pose: tried})
 
 
 def climb(

@@ -19,7 +19,7 @@ from mechdesign.questions.reliability.engine.descent import descend, sizes
 from mechdesign.questions.reliability.engine.design_points import DesignPoints, find
 from mechdesign.questions.reliability.engine.mixture import Mixture
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates
-from mechdesign.questions.reliability.methods import SEARCH, of_limits
+from mechdesign.questions.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.questions.reliability.probability import half_spaces
 from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.simulation import Setting, generator, problem_of
@@ -41,12 +41,13 @@ _LEAST_SHARE = 0.02
 
 def run(task: Task) -> MethodResult:
     """Probability of failure at every pose."""
-    return of_limits(task, _at_pose)
+    return pose_by_pose(task, _at_pose) if task.question.limits else MethodResult()
 
 
-def _at_pose(task: Task, setting: Setting) -> Estimate:
+def _at_pose(task: Task, setting: Setting) -> MethodResult:
     problem = problem_of(setting, task.sources)
-    return form(problem, find(problem, generator(task.seed, setting.pose, SEARCH, 0)))
+    points = find(problem, generator(task.seed, setting.pose, SEARCH, 0))
+    return MethodResult({setting.pose: form(problem, points)})
 
 
 def rung(

@@ -8,6 +8,8 @@ sampling, 2000.]
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -28,9 +30,9 @@ from mechdesign.questions.reliability.engine.problem import (
     reached,
     weighted,
 )
-from mechdesign.questions.reliability.methods import SEARCH, of_limits
+from mechdesign.questions.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.questions.reliability.schema.section import Precision
-from mechdesign.questions.reliability.simulation import Setting, Sums, generator, problem_of, simulate
+from mechdesign.questions.reliability.simulation import Setting, generator, problem_of, simulate
 from mechdesign.questions.reliability.task import MethodResult, Task
 
 # Most rounds of learning; samples of a round for each dimension, further ones for each dimension and part, and the
@@ -69,19 +71,18 @@ _MAX_LOG_DENSITY = 600.0
 
 def run(task: Task) -> MethodResult:
     """Probability of failure at every pose; where no sample failed, the bound that plain samples give."""
-    return of_limits(task, _at_pose)
+    return pose_by_pose(task, _at_pose) if task.question.limits else MethodResult()
 
 
-def _at_pose(task: Task, setting: Setting) -> Estimate:
+def _at_pose(task: Task, setting: Setting) -> MethodResult:
     problem = problem_of(setting, task.sources)
     rng = generator(task.seed, setting.pose, SEARCH, 1)
     estimate = importance_sampling(problem, find(problem, rng), rng, task.samples)
-    if estimate.failures:
-        return estimate
-    sums: dict[int, Sums] = {}
-    simulate([setting], task.sources, task.seed, task.samples, sums)
-    estimate = sums[setting.pose].estimate
-    return replace(estimate, evaluations=estimate.evaluations + problem.evaluations)
+    if not estimate.failures:
+        parts = simulate([setting], task.sources, task.seed, task.samples)
+        estimate = reduce(add, (part for _, part in parts)).estimate
+        estimate = replace(estimate, evaluations=estimate.evaluations + problem.evaluations)
+    return MethodResult({setting.pose: estimate})
 
 
 def importance_sampling(

@@ -11,7 +11,9 @@ def run(task: Task) -> MethodResult:
     sums: dict[int, Sums] = {}
     task.progress.start(len(task.settings) * task.samples, "samples")
     try:
-        simulate(task.settings, task.sources, task.seed, task.samples, sums, task.jobs, task.progress)
+        for pose, part in simulate(task.settings, task.sources, task.seed, task.samples, task.jobs):
+            sums[pose] = sums[pose] + part if pose in sums else part
+            task.progress.update(part.samples)
     except KeyboardInterrupt:
         raise Partial(_result(task, sums)) from None
     return _result(task, sums)

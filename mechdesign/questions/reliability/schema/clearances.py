@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import model_validator
 
 from mechdesign.mechanism.elements.couplings import play
-from mechdesign.questions.reliability.laws import FITS, LAWS, Marginal, fit_law
+from mechdesign.questions.reliability.fit_laws import FITS, fit_law
+from mechdesign.questions.reliability.laws import LAWS, Marginal
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.schema.variation import Dimension, Tolerance, millimetre
