@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 from typing import Any, Literal
 
 import numpy as np
@@ -283,18 +284,23 @@ def _spring(scene: Still, spring: Spring) -> list[Shape]:
         cylinder = [complex(x, y) for x, y in ((0.08, -4), (0.6, -4), (0.6, 4), (0.08, 4), (0.08, -4))]
         return [Strut(places, points, ((0j, 1 + 0j),), **looks | {"width": 2.4}),
                 Strut(places, points, (cylinder,), fill="#DDDDDD", **looks | {"layer": 0.15})]  # fmt: skip
-    coil = [0.12 + 0j, *(complex(0.12 + 0.76 * (k + 0.5) / _WINDINGS, COIL * (-1) ** k) for k in range(_WINDINGS)),
-            0.88 + 0j]  # fmt: skip
+    *leads, zigzag = coil(0.12, 0.88)
     cup = [complex(x, y) for x, y in ((0.68, -COIL), (0.32, -COIL), (0.32, COIL), (0.68, COIL))]
     piston = [complex(0.55, -0.7 * COIL), complex(0.55, 0.7 * COIL)]
     dashpot = [[0.12 + 0j, 0.32 + 0j], cup, piston, [0.55 + 0j, 0.88 + 0j]]
-    parts = [[coil]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
-    outlines: list[list[complex]] = [[0j, 0.12 + 0j], [0.88 + 0j, 1 + 0j]]
+    parts = [[zigzag]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
+    outlines = leads
     for part, aside in zip(parts, (0.0,) if len(parts) == 1 else (1.4 * COIL, -1.4 * COIL), strict=True):
         outlines += [[corner + 1j * aside for corner in line] for line in part]
     if len(parts) > 1:
         outlines += [[complex(end, 1.4 * COIL), complex(end, -1.4 * COIL)] for end in (0.12, 0.88)]
     return [Strut(places, points, outlines, **looks)]
+
+
+def coil(begin: float, end: float) -> list[list[complex]]:
+    """Outlines of a `Strut`: two straight ends, and a zigzag between two shares of the way."""
+    windings = ((begin + (end - begin) * (k + 0.5) / _WINDINGS, COIL * (-1) ** k) for k in range(_WINDINGS))
+    return [[0j, complex(begin)], [complex(end), 1 + 0j], [complex(begin), *starmap(complex, windings), complex(end)]]
 
 
 def _torsion(scene: Still, spring: Spring) -> list[Shape]:
