@@ -15,7 +15,7 @@ from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
 from mechdesign.report.figures import style
-from mechdesign.report.figures.scene import CamPair, Guide, Still, Wheels, hull, spring_points
+from mechdesign.report.figures.scene import Guide, Outline, Still, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -30,7 +30,6 @@ _CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
 _PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
-_RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _STEEL = "#777777"
 _GHOST = "#777777"
 LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
@@ -128,13 +127,13 @@ class Strut:
 Shape = Line | Symbol | Strut
 
 
-def lighter(color: str, share: float = 0.62) -> Color:
+def lighter(color: Color, share: float = 0.62) -> Color:
     """A colour mixed with white."""
     red, green, blue = (1 - (1 - part) * (1 - share) for part in to_rgb(color))
     return red, green, blue
 
 
-def darker(color: str, share: float = 0.3) -> Color:
+def darker(color: Color, share: float = 0.3) -> Color:
     """A colour mixed with black, for text."""
     red, green, blue = (part * (1 - share) for part in to_rgb(color))
     return red, green, blue
@@ -175,47 +174,27 @@ def mechanism_shapes(scene: Still) -> list[Shape]:
             shapes.append(Symbol(place, 0.5, (_rectangle(PIN, PIN),), fill=style.INK, point=point))
         elif kind == "tracer":
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
-    for wheels in scene.wheels:
-        shapes += _wheels(wheels, colors, scene.span)
-    for pair in scene.cams:
-        shapes += _cam(pair, colors)
+    for outline in scene.outlines:
+        shapes += _outline(outline, colors[outline.link])
     for spring in scene.description.springs.values():
         shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
     return shapes
 
 
-def _wheels(wheels: Wheels, colors: Mapping[str, str], span: float) -> list[Shape]:
-    """Pitch circles with a mark that turns, the line of a rack, or the two sides of a belt."""
-    shapes: list[Shape] = []
-    circle = np.exp(1j * np.linspace(0, 2 * np.pi, 73))
-    for link, axis, radius in zip(wheels.links, wheels.axes, wheels.radii, strict=True):
-        if radius:
-            rim = (axis + radius * circle).tolist()
-            shapes.append(Line(rim, colors[link], 1.2, 0.05, link, dashes="-" if wheels.strands else _PITCH))
-        else:
-            ends = wheels.touch - _RACK * span * wheels.along, wheels.touch + _RACK * span * wheels.along
-            shapes.append(Line(ends, colors[link], 1.2, 0.05, link, dashes=_PITCH))
-    return shapes + [Line(strand, style.INK, 1.4, 0.06) for strand in wheels.strands]
-
-
-def _cam(pair: CamPair, colors: Mapping[str, str]) -> list[Shape]:
-    """A cam as a plate, or the lines of a groove, and the roller or the flat face on it."""
-    follower, cam = pair.links
-    shapes: list[Shape] = []
-    for profile in pair.profiles:
-        width = _PROFILE if pair.solid else _PROFILE / 2
-        shapes.append(Line(profile, colors[cam], width, PLATES - 0.1, cam, filled=pair.solid))
-        if pair.solid:
-            shapes.append(Line(profile, lighter(colors[cam], 0.8), 0.1, PLATES - 0.05, cam, filled=True))
-    if pair.face is not None:
-        shapes.append(Line(pair.face, colors[follower], BAR / 2, 0.05, follower))
-    elif pair.radius:
-        rim = (pair.center + pair.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 49))).tolist()
-        shapes += [
-            Line(rim, "white", 0.1, 0.02, follower, filled=True),
-            Line(rim, colors[follower], 1.6, 0.05, follower),
-        ]
-    return shapes
+def _outline(outline: Outline, color: Color) -> list[Shape]:
+    """A pitch circle, the line of a rack, a pulley, a side of a belt, a cam as a plate or groove, or its follower."""
+    looks: dict[str, list[tuple[Color, float, float]]] = {
+        "pitch": [(color, 1.2, 0.05)], "rim": [(color, 1.2, 0.05)], "strand": [(style.INK, 1.4, 0.06)],
+        "disc": [(color, _PROFILE, PLATES - 0.1), (lighter(color, 0.8), 0.1, PLATES - 0.05)],
+        "groove": [(color, _PROFILE / 2, PLATES - 0.1)],
+        "roller": [("white", 0.1, 0.02), (color, 1.6, 0.05)], "face": [(color, BAR / 2, 0.05)],
+    }  # fmt: skip
+    dashes: Dashes = _PITCH if outline.kind == "pitch" else "-"
+    return [
+        Line(outline.places.tolist(), shade, width, layer, outline.link, dashes=dashes,
+             filled=outline.kind == "disc" or shade == "white")
+        for shade, width, layer in looks[outline.kind]
+    ]  # fmt: skip
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:

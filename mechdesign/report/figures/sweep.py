@@ -13,13 +13,12 @@ from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.motion import radians
 from mechdesign.motion.solving import anchors_of
-from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.poses import Shown, pose_in_words
 from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.scene import Scene, Still
 from mechdesign.study import Study
 
-_POSES = 100  # from which is taken what wheels and cams reach
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
 _SAME_POSE = 1e-3
 _FEW_POSES = 60  # fewer would show a curve as chords
@@ -111,8 +110,7 @@ class Sweep(Shown):
                    *self.traces.values()]  # fmt: skip
         for still in self.scene.some(self.valid[[0, -1]] if len(self.valid) else ()):
             reached += [np.array(guide.ends) for guide in still.guides]
-        if self.mechanism.meshes or self.mechanism.cams:
-            reached += [np.array(still.round) for still in self.scene.some(self.valid[evenly(len(self.valid), _POSES)])]
+        reached += [np.ravel(outline.places[self.valid]) for outline in self.scene.outlines]
         return np.concatenate(reached)
 
     @property
