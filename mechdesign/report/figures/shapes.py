@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import starmap
 from typing import Any, Literal
@@ -27,12 +28,13 @@ SPRING_COLOR = "#444444"
 COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turns to either side
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
-TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
+_TICK, _TICK_SPACING = 4.95 * cmath.exp(0.75j * math.pi), 5.5  # strokes of a hatched rail, for one along x
 _PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
 _STEEL = "#777777"
 _GHOST = "#777777"
 LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
+Paper = Callable[[complex], complex]
 Color = str | tuple[float, float, float]
 Dashes = Literal["-"] | tuple[float, tuple[float, ...]]  # for Matplotlib: dashes and gaps in widths of the line
 
@@ -62,6 +64,15 @@ class Line:
     cap: Literal["round", "butt", "projecting"] = "round"
     dashes: Dashes = "-"
     rail: complex = 0j
+
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """The line in points, and the strokes of a rail, which a short one has not; `at` gives those of a place."""
+        places = [at(place) + self.rail * size for place in self.places]
+        way = places[-1] - places[0]
+        steps = np.arange(_TICK_SPACING, abs(way) - _TICK_SPACING * (abs(way) <= 2 * _TICK_SPACING), _TICK_SPACING)
+        along = way / (abs(way) or 1.0)
+        feet = (places[0] + steps * along).tolist() if self.rail else []
+        return [places, *([foot, foot + _TICK * along] for foot in feet)]
 
 
 @dataclass(frozen=True)
@@ -94,6 +105,12 @@ class Symbol:
     point: str = ""
     link: str = GROUND
 
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """Its outlines in points, of a circle some places; `at` gives those of a place."""
+        place, way = at(self.place), size * self.direction
+        around = self.outlines or [(self.radius * np.exp(0.5j * np.pi * np.arange(5))).tolist()]
+        return [[place + way * corner for corner in line] for line in around]
+
 
 @dataclass(frozen=True)
 class Strut:
@@ -117,11 +134,11 @@ class Strut:
     fill: Color | None = None
     cap: Literal["round", "butt", "projecting"] = "round"
 
-    def drawn(self, begin: complex, end: complex) -> list[list[complex]]:
-        """Its outlines on paper between these places there."""
-        way = end - begin
-        left = 1j * way / abs(way) if way else 0j
-        return [[begin + corner.real * way + corner.imag * left for corner in line] for line in self.outlines]
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """Its outlines in points; `at` gives those of a place."""
+        begin, end = map(at, self.places)
+        left = 1j * size * (end - begin) / (abs(end - begin) or 1.0)
+        return [[begin + corner.real * (end - begin) + corner.imag * left for corner in line] for line in self.outlines]
 
 
 Shape = Line | Symbol | Strut
