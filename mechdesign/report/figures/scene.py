@@ -49,7 +49,7 @@ class Guide:
         return self.origin + low * self.along, self.origin + high * self.along
 
 
-class Outline(NamedTuple):
+class RoundPart(NamedTuple):
     """A round part of a link: in a pose its places, shape (n,), in a scene those of all poses, (poses, n).
 
     Kinds are the ``pitch`` circle of a wheel or line of a rack, the ``rim`` of a pulley, a straight ``strand`` of a
@@ -70,7 +70,7 @@ class Still:
     rotations: Mapping[str, complex]
     guides: tuple[Guide, ...]
     span: float
-    outlines: tuple[Outline, ...] = ()
+    outlines: tuple[RoundPart, ...] = ()
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
@@ -179,9 +179,9 @@ class Scene:
         return ranges
 
     @cached_property
-    def outlines(self) -> list[Outline]:
+    def outlines(self) -> list[RoundPart]:
         """Pitch circles, racks and belts of wheels, cams and what touches them."""
-        configuration, outlines = self.configuration, list[Outline]()
+        configuration, outlines = self.configuration, list[RoundPart]()
 
         def along(place: Vector, way: Vector, shares: Complexes | Floats) -> Complexes:
             return self._all(place)[:, None] + self._all(way)[:, None] * shares
@@ -191,23 +191,23 @@ class Scene:
             for link, node, radius in zip(mesh.links, mesh.axes, mesh.radii(configuration), strict=True):
                 drawn = along(configuration.nodes[node], radius, _CIRCLE) if np.any(radius) else along(
                     touch, way, _RACK * self.span * np.array([-1.0, 1.0]))  # fmt: skip
-                outlines.append(Outline(link, "rim" if mesh.belt else "pitch", drawn))
+                outlines.append(RoundPart(link, "rim" if mesh.belt else "pitch", drawn))
             for side in (1.0, -1.0) if mesh.belt else ():
                 begin, end, _ = mesh.strand(configuration, side)
-                outlines.append(Outline(GROUND, "strand", along(begin, end - begin, np.array([0.0, 1.0]))))
+                outlines.append(RoundPart(GROUND, "strand", along(begin, end - begin, np.array([0.0, 1.0]))))
         for cam in self.mechanism.cams:
             follower, disc = cam.links
             kind: Literal["disc", "groove"] = "disc" if cam.sides == ("outer",) and cam.closed else "groove"
             for profile in cam.outlines:
                 finite = profile[np.isfinite(profile)]
                 few = finite[evenly(len(finite), _OUTLINE)]
-                outlines.append(Outline(disc, kind, along(*self.mechanism.frame(disc, configuration), few)))
+                outlines.append(RoundPart(disc, kind, along(*self.mechanism.frame(disc, configuration), few)))
             center, radius = configuration.nodes[cam.node], cam.roller(configuration)
             if cam.flat:
                 ends = np.array(cam.face) + _FACE * (cam.face[1] - cam.face[0]) * np.array([-1.0, 1.0])
-                outlines.append(Outline(follower, "face", along(center, cam.along_face(configuration), ends)))
+                outlines.append(RoundPart(follower, "face", along(center, cam.along_face(configuration), ends)))
             elif np.any(radius):
-                outlines.append(Outline(follower, "roller", along(center, radius, _CIRCLE)))
+                outlines.append(RoundPart(follower, "roller", along(center, radius, _CIRCLE)))
         return outlines
 
     def at(self, k: int) -> Still | None:

@@ -16,7 +16,7 @@ from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
 from mechdesign.report.figures import style
-from mechdesign.report.figures.scene import Guide, Outline, Still, hull, spring_points
+from mechdesign.report.figures.scene import Guide, RoundPart, Still, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -198,7 +198,7 @@ def mechanism_shapes(scene: Still) -> list[Shape]:
     return shapes
 
 
-def _outline(outline: Outline, color: Color) -> list[Shape]:
+def _outline(outline: RoundPart, color: Color) -> list[Shape]:
     """A pitch circle, the line of a rack, a pulley, a side of a belt, a cam as a plate or groove, or its follower."""
     looks: dict[str, list[tuple[Color, float, float]]] = {
         "pitch": [(color, 1.2, 0.05)], "rim": [(color, 1.2, 0.05)], "strand": [(style.INK, 1.4, 0.06)],
@@ -334,7 +334,7 @@ def ghost_shapes(scene: Still, dashes: Dashes) -> list[Shape]:
 
 
 def bodies(scene: Still) -> list[tuple[str, list[complex]]]:
-    """Outline of each moving rigid link, the largest first so that none hides another."""
+    """RoundPart of each moving rigid link, the largest first so that none hides another."""
     outlines = []
     for name, link in scene.description.links.items():
         if name != GROUND:
