@@ -79,7 +79,7 @@ def test_the_picture_has_the_same_bytes_again_and_no_metadata(study):
 
 
 def test_joints_stand_where_the_mechanism_has_them(study):
-    figure = style.new_figure(5, layout=None)
+    figure = style.new_figure(5)
     axes = figure.add_subplot()
     axes.set(xlim=(-60, 180), ylim=(-80, 80))
     configuration = study.mechanism.plan(("theta",)).solve([np.radians(60.0)])
@@ -92,7 +92,7 @@ def test_joints_stand_where_the_mechanism_has_them(study):
 
 
 def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
-    figure = style.new_figure(5, layout=None)
+    figure = style.new_figure(5)
     axes = figure.add_subplot()
     configuration = study.mechanism.plan(("B.x",)).solve([1000.0])
     Posed(pose(study.mechanism, configuration)).draw(axes)

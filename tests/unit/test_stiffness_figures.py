@@ -12,7 +12,6 @@ from helpers.stiffness import ARM, FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.stiffness.figures.springs import Coil
 from mechdesign.report.figures import style
 from mechdesign.report.figures.layout import draw
 from mechdesign.report.figures.mechanism import mechanism_picture
@@ -118,18 +117,18 @@ def test_each_load_is_drawn_alone_and_legs_stay_on_their_pins() -> None:
             assert np.hypot(*(ends - pin).T).min() < 1e-6
 
 
-def test_coil_runs_from_its_point_to_its_anchor() -> None:
-    coil = Coil("", 1 + 1j, 4 + 5j, 1 + 1j, 2.0, False)
-    assert coil.path[[0, -1]] == pytest.approx([1 + 1j, 4 + 5j])
-    across = ((coil.path - coil.place) * np.conj(3 + 4j) / 5).imag
-    assert abs(across).max() == pytest.approx(0.24, rel=1e-2)
-
-
-@pytest.mark.parametrize(("inside", "side"), [(2 + 0j, 1), (-2 + 0j, -1)])
-def test_the_stiffness_of_a_spring_stands_away_from_the_others(inside: complex, side: int) -> None:
-    upright = Coil("", 0j, 3j, 0j, 1.0, False, inside).label
-    assert upright.heading is not None
-    assert np.exp(1j * upright.heading) == pytest.approx(-side)
+@pytest.mark.slow
+def test_the_stiffness_of_a_spring_stands_beside_its_middle_away_from_the_others() -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.stiffness(study)
+    with style.context():
+        (axes,) = figure_of(study, result, "springs").axes
+    named = [text for text in axes.texts if text.get_text().endswith("N/m")]
+    assert len(named) == 2
+    middle = sum(complex(*text.xy) for text in named) / 2
+    for text in named:
+        away = (complex(*text.xy) - middle).conjugate() * complex(*text.xyann)
+        assert away.real > 0
 
 
 @pytest.mark.parametrize(

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
-from matplotlib.patheffects import Normal, TickedStroke
-from matplotlib.transforms import Affine2D, Affine2DBase, ScaledTranslation, Transform
+from matplotlib.transforms import Affine2D
 
-from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import callouts, shapes, style
-from mechdesign.report.figures.labels import Label, covered, place_labels, rows
+from mechdesign.report.figures.labels import Label, covered, paper, place_labels, rows
 from mechdesign.report.figures.marks import LateMark
 from mechdesign.report.figures.scene import Still
-from mechdesign.report.figures.shapes import Line, Shape, Strut, Symbol
+from mechdesign.report.figures.shapes import Line, Shape, Symbol
 
 _WIDE, _SMALL = 0.6, 0.7  # part of the page below which a panel has smaller symbols, and their size
 
@@ -83,83 +80,32 @@ def _size(axes: Axes) -> float:
 
 def draw(axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0) -> None:
     """Draw shapes; `order` lifts them above drawings of lower order."""
-    size = _size(axes)
-    for shape in drawn:
-        if isinstance(shape, Symbol):
-            axes.add_artist(
-                PathPatch(_path(shape), transform=_at(axes, shape, size), facecolor=shape.fill or "none",
-                          edgecolor=shape.edge or "none", lw=shape.width, linestyle=shape.dashes, alpha=alpha,
-                          zorder=order + shape.layer, clip_on=True)
-            )  # fmt: skip
-        elif isinstance(shape, Strut):
-            axes.add_artist(
-                PathPatch(_lines(shape.outlines), transform=_Between(axes, shape.places, size), lw=shape.width * size,
-                          facecolor=shape.fill or "none", edgecolor=shape.color, capstyle=shape.cap, joinstyle="round",
-                          alpha=alpha, zorder=order + shape.layer, clip_on=True)
-            )  # fmt: skip
-        elif shape.filled:
-            axes.add_patch(
-                Polygon(rows(np.array(shape.places)), closed=True, facecolor=shape.color, edgecolor=shape.color,
-                        lw=shape.width * size, joinstyle="round", alpha=alpha, zorder=order + shape.layer)
-            )  # fmt: skip
-        else:
-            axes.add_line(_line(axes, shape, order, alpha, size))
-
-
-def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Line2D:
-    artist = Line2D(
-        *rows(np.array(line.places)).T, lw=line.width * size, color=line.color, alpha=alpha, zorder=order + line.layer,
-        linestyle=line.dashes, solid_capstyle=line.cap, solid_joinstyle="round",
-    )  # fmt: skip
-    if line.rail:
-        figure = axes.get_figure(root=True)
-        assert figure is not None
-        shift = line.rail * size / 72
-        artist.set_transform(axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans))
-        spacing = shapes.TICK_SPACING
-        ends = axes.transData.transform(rows(np.array(line.places)))
-        # A rail without room for a tick has none.
-        if 72 / figure.dpi * np.hypot(*np.ptp(ends, axis=0)) > 2 * spacing:
-            ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
-            artist.set_path_effects([ticks, Normal()])
-    return artist
-
-
-def _path(symbol: Symbol) -> Path:
-    if symbol.radius:
-        return Path.circle(radius=symbol.radius)
-    return _lines(symbol.outlines, closed=symbol.fill is not None)
-
-
-def _lines(outlines: Iterable[Sequence[complex]], *, closed: bool = False) -> Path:
-    """Lines as one path."""
-    lines = (rows(np.array([*line, *line[:closed]])) for line in outlines)
-    return Path.make_compound_path(*(Path(line, closed=closed) for line in lines))
-
-
-class _Between(Affine2DBase):
-    """From shares of the way between two places of the drawing, and points on paper across, to pixels."""
-
-    def __init__(self, axes: Axes, places: tuple[complex, complex], size: float) -> None:
-        super().__init__()
-        self.axes, self.places, self.size = axes, places, size
-        self.set_children(axes.transData)
-
-    def get_matrix(self) -> Floats:
-        """The matrix for the limits of the axes now."""
-        begin, end = self.axes.transData.transform(rows(np.array(self.places)))
-        way = end - begin
-        figure = self.axes.get_figure(root=True)
-        assert figure is not None
-        left = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0) * self.size * figure.dpi / 72
-        return np.array([[way[0], left[0], begin[0]], [way[1], left[1], begin[1]], [0.0, 0.0, 1.0]])
-
-
-def _at(axes: Axes, symbol: Symbol, size: float) -> Transform:
-    """Transform from points on paper to the place and direction of a symbol."""
-    figure = axes.get_figure(root=True)
+    size, figure = _size(axes), axes.get_figure(root=True)
     assert figure is not None
-    # The stubs ask for an affine transform; any that maps the place to pixels will do.
-    moved = ScaledTranslation(symbol.place.real, symbol.place.imag, axes.transData)  # type: ignore[arg-type]
-    turned = Affine2D().rotate(cmath.phase(symbol.direction)).scale(size / 72)
-    return turned + figure.dpi_scale_trans + moved
+    points = Affine2D().scale(1 / 72) + figure.dpi_scale_trans
+
+    def at(place: complex) -> complex:
+        return complex(*paper(axes, np.array([place]))[0])
+
+    for shape in drawn:
+        look: dict[str, Any] = {"alpha": alpha, "zorder": order + shape.layer, "clip_on": True}
+        if isinstance(shape, Symbol):
+            look |= {"linewidth": shape.width, "edgecolor": shape.edge or "none", "linestyle": shape.dashes}
+        else:
+            look |= {"linewidth": shape.width * size, "edgecolor": shape.color, "joinstyle": "round"}
+        if isinstance(shape, Line) and not shape.rail:
+            # In places of the drawing, as curves are.
+            outline, closed = rows(np.array(shape.places)), shape.filled
+            look |= {"facecolor": shape.color if closed else "none", "linestyle": shape.dashes, "capstyle": shape.cap}
+            axes.add_patch(Polygon(outline, closed=closed, **look))
+            continue
+        if not isinstance(shape, Symbol):
+            look["capstyle"] = shape.cap
+        fill = None if isinstance(shape, Line) else shape.fill
+        closed = fill is not None
+        lines = (rows(np.array([*line, *line[:closed]])) for line in shape.on_paper(at, size))
+        path = Path.make_compound_path(*(Path(line, closed=closed) for line in lines))
+        if isinstance(shape, Symbol) and shape.radius:
+            place = at(shape.place)
+            path = Path.circle((place.real, place.imag), size * shape.radius)
+        axes.add_artist(PathPatch(path, transform=points, facecolor=fill or "none", **look))

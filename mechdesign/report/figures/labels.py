@@ -23,7 +23,6 @@ _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
 _NET = 4.5  # spacing (points) of the net on what names must not cover
 _SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
-HATCHED = 10.0  # width of a hatched line, points
 _CLEARLY = 2.0  # points by which a name must be nearer to what it names than to another
 _UNCLEAR = 4.0  # cost of a name that is not
 _NO_ROOM = 5.5  # cost from which an optional name is left out
@@ -182,8 +181,7 @@ def covered(axes: Axes) -> Floats:
     lines: list[tuple[Complexes, float, bool]] = []
     artists: list[Line2D | Patch] = [*axes.lines, *axes.patches]
     for artist in artists:
-        # The strokes of a hatched line stand beside it.
-        width = HATCHED if artist.get_path_effects() else artist.get_linewidth()
+        width = artist.get_linewidth()
         if not width or (artist.get_alpha() or 1.0) < _PALE:
             continue
         filled = isinstance(artist, Patch) and bool(to_rgba(artist.get_facecolor())[3])

@@ -76,7 +76,7 @@ def draw(picture: Picture) -> Figure:
     """
     columns = _columns(picture)
     rows = -(-len(picture.panels) // columns)
-    figure = style.new_figure(2.0 * rows, layout=None)
+    figure = style.new_figure(2.0 * rows)
     cells, entries = [*_cells(figure, picture, columns)], dict[str, Any]()
     several = Counter(map(id, picture.marks()))
     for cell in cells:

@@ -7,20 +7,22 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from mechdesign.mechanism import Mechanism, plates
 from mechdesign.mechanism.algebra import Vector
-from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.elements.joints import Fixed, Slot
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
-from mechdesign.numerics.arrays import Complexes, evenly
+from mechdesign.numerics.arrays import Complexes, Floats, evenly
 
 _OUTLINE = 241  # places of the drawn profile of a cam
+_CIRCLE = np.exp(1j * np.linspace(0, 2 * np.pi, 73))
+_RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _FACE = 0.15  # by which a flat face is drawn longer at both ends, as a part of what the cam touches
 
 
@@ -47,47 +49,16 @@ class Guide:
         return self.origin + low * self.along, self.origin + high * self.along
 
 
-@dataclass(frozen=True)
-class Wheels:
-    """Pitch circles of two links, or of a wheel and the line of a rack, where they touch.
+class RoundPart(NamedTuple):
+    """A round part of a link: in a pose its places, shape (n,), in a scene those of all poses, (poses, n).
 
-    `radii` and `axes` are those of both links; the radius of a rack is 0, and its axis where it slides. A belt has two
-    straight parts, `strands`.
+    Kinds are the ``pitch`` circle of a wheel or line of a rack, the ``rim`` of a pulley, a straight ``strand`` of a
+    belt, the ``disc`` or a ``groove`` of a cam, the ``roller`` or flat ``face`` of its follower.
     """
 
-    links: tuple[str, str]
-    axes: tuple[complex, complex]
-    radii: tuple[float, float]
-    touch: complex
-    along: complex
-    strands: tuple[tuple[complex, complex], ...] = ()
-
-    @property
-    def ends(self) -> list[complex]:
-        """The rightmost, uppermost, leftmost and lowest places of the circles."""
-        pairs = zip(self.axes, self.radii, strict=True)
-        return [axis + radius * way for axis, radius in pairs for way in (1, 1j, -1, -1j)]
-
-
-@dataclass(frozen=True)
-class CamPair:
-    """Profiles of a cam, and the roller or the ends of the flat face of its follower.
-
-    `links` are follower and cam, which is a `solid` disc, or has a groove or an open profile.
-    """
-
-    links: tuple[str, str]
-    profiles: tuple[tuple[complex, ...], ...]
-    solid: bool
-    center: complex
-    radius: float
-    face: tuple[complex, complex] | None
-
-    @property
-    def ends(self) -> list[complex]:
-        """Places that they reach."""
-        around = [self.center + self.radius * way for way in (1, 1j, -1, -1j)]
-        return [*(place for profile in self.profiles for place in profile), *(self.face or around)]
+    link: str
+    kind: Literal["pitch", "rim", "strand", "disc", "groove", "roller", "face"]
+    places: Complexes
 
 
 @dataclass(frozen=True)
@@ -99,8 +70,7 @@ class Still:
     rotations: Mapping[str, complex]
     guides: tuple[Guide, ...]
     span: float
-    wheels: tuple[Wheels, ...] = ()
-    cams: tuple[CamPair, ...] = ()
+    outlines: tuple[RoundPart, ...] = ()
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
@@ -108,14 +78,9 @@ class Still:
 
     @property
     def places(self) -> Complexes:
-        """Points, ends of the guides, and what wheels, cams and rollers reach."""
-        return np.array([*self.points.values(), *(end for guide in self.guides for end in guide.ends), *self.round])
-
-    @property
-    def round(self) -> list[complex]:
-        """Places that wheels, cams and rollers reach."""
-        pairs: list[Wheels | CamPair] = [*self.wheels, *self.cams]
-        return [end for pair in pairs for end in pair.ends]
+        """Points, ends of the guides, and the round parts."""
+        ends = [end for guide in self.guides for end in guide.ends]
+        return np.concatenate([[*self.points.values(), *ends], *(outline.places for outline in self.outlines)])
 
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
@@ -214,26 +179,36 @@ class Scene:
         return ranges
 
     @cached_property
-    def _wheels(self) -> list[tuple[tuple[str, str], bool, list[Complexes]]]:
-        """Links of each pair of wheels, whether a belt goes round them, and arrays of what `Wheels` has."""
-        pairs = []
-        for mesh in self.mechanism.meshes:
-            sides = [mesh.strand(self.configuration, side)[:2] for side in (1.0, -1.0) if mesh.belt]
-            values = [*(self.configuration.nodes[node] for node in mesh.axes), *mesh.radii(self.configuration),
-                      *mesh.contact(self.configuration), *(end for side in sides for end in side)]  # fmt: skip
-            pairs.append((mesh.links, mesh.belt, [*map(self._all, values)]))
-        return pairs
+    def outlines(self) -> list[RoundPart]:
+        """Pitch circles, racks and belts of wheels, cams and what touches them."""
+        configuration, outlines = self.configuration, list[RoundPart]()
 
-    @cached_property
-    def _cams(self) -> list[list[Complexes]]:
-        """Of each cam origin and direction of its frame, centre, radius and direction of the face of its follower."""
-        cams = []
+        def along(place: Vector, way: Vector, shares: Complexes | Floats) -> Complexes:
+            return self._all(place)[:, None] + self._all(way)[:, None] * shares
+
+        for mesh in self.mechanism.meshes:
+            touch, way = mesh.contact(configuration)
+            for link, node, radius in zip(mesh.links, mesh.axes, mesh.radii(configuration), strict=True):
+                drawn = along(configuration.nodes[node], radius, _CIRCLE) if np.any(radius) else along(
+                    touch, way, _RACK * self.span * np.array([-1.0, 1.0]))  # fmt: skip
+                outlines.append(RoundPart(link, "rim" if mesh.belt else "pitch", drawn))
+            for side in (1.0, -1.0) if mesh.belt else ():
+                begin, end, _ = mesh.strand(configuration, side)
+                outlines.append(RoundPart(GROUND, "strand", along(begin, end - begin, np.array([0.0, 1.0]))))
         for cam in self.mechanism.cams:
-            face = cam.along_face(self.configuration) if cam.flat else 0j
-            values = [*self.mechanism.frame(cam.links[1], self.configuration), self.configuration.nodes[cam.node],
-                      cam.roller(self.configuration), face]  # fmt: skip
-            cams.append([*map(self._all, values)])
-        return cams
+            follower, disc = cam.links
+            kind: Literal["disc", "groove"] = "disc" if cam.sides == ("outer",) and cam.closed else "groove"
+            for profile in cam.outlines:
+                finite = profile[np.isfinite(profile)]
+                few = finite[evenly(len(finite), _OUTLINE)]
+                outlines.append(RoundPart(disc, kind, along(*self.mechanism.frame(disc, configuration), few)))
+            center, radius = configuration.nodes[cam.node], cam.roller(configuration)
+            if cam.flat:
+                ends = np.array(cam.face) + _FACE * (cam.face[1] - cam.face[0]) * np.array([-1.0, 1.0])
+                outlines.append(RoundPart(follower, "face", along(center, cam.along_face(configuration), ends)))
+            elif np.any(radius):
+                outlines.append(RoundPart(follower, "roller", along(center, radius, _CIRCLE)))
+        return outlines
 
     def at(self, k: int) -> Still | None:
         """The pose of an index, or None where it cannot be assembled."""
@@ -248,14 +223,8 @@ class Scene:
             slider = None if isinstance(joint, Slot) else joint.slider
             guides.append(Guide(name, joint.line.link, joint.point, slider, complex(origin[k]), complex(along[k]),
                                 points[joint.point], (low - room, high + room)))  # fmt: skip
-        wheels = []
-        for links, _, values in self._wheels:
-            one, other, first, second, touch, way, *strands = (complex(own[k]) for own in values)
-            wheels.append(Wheels(links, (one, other), (first.real, second.real), touch, way,
-                                 tuple(zip(strands[::2], strands[1::2], strict=True))))  # fmt: skip
-        cams = tuple(_cam_pair(cam, *(complex(own[k]) for own in values))
-                     for cam, values in zip(self.mechanism.cams, self._cams, strict=True))  # fmt: skip
-        return Still(description, points, rotations, tuple(guides), self.span, tuple(wheels), cams)
+        outlines = (outline._replace(places=outline.places[k]) for outline in self.outlines)
+        return Still(description, points, rotations, tuple(guides), self.span, tuple(outlines))
 
     def some(self, indices: Iterable[int]) -> list[Still]:
         """Those of some poses that can be assembled."""
@@ -272,20 +241,6 @@ def sketched(mechanism: Mechanism) -> Still:
     still = pose(mechanism, mechanism.sketch_configuration)
     assert still is not None
     return still
-
-
-def _cam_pair(cam: CamFollower, start: complex, turn: complex, center: complex, radius: complex, along: complex
-) -> CamPair:  # fmt: skip
-    """A cam and its follower in a pose."""
-    few = [outline[np.isfinite(outline)] for outline in cam.outlines]
-    few = [outline[evenly(len(outline), _OUTLINE)] for outline in few]
-    profiles = tuple(tuple((start + turn * outline).tolist()) for outline in few)
-    face = None
-    if cam.flat:
-        first, last = cam.face
-        more = _FACE * (last - first)
-        face = center + (first - more) * along, center + (last + more) * along
-    return CamPair(cam.links, profiles, cam.sides == ("outer",) and cam.closed, center, radius.real, face)
 
 
 def hull(places: Sequence[complex]) -> list[complex]:

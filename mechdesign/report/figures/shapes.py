@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +16,7 @@ from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
 from mechdesign.report.figures import style
-from mechdesign.report.figures.scene import CamPair, Guide, Still, Wheels, hull, spring_points
+from mechdesign.report.figures.scene import Guide, RoundPart, Still, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -26,13 +28,13 @@ SPRING_COLOR = "#444444"
 COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turns to either side
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
-TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
+_TICK, _TICK_SPACING = 4.95 * cmath.exp(0.75j * math.pi), 5.5  # strokes of a hatched rail, for one along x
 _PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
-_RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _STEEL = "#777777"
 _GHOST = "#777777"
 LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
+Paper = Callable[[complex], complex]
 Color = str | tuple[float, float, float]
 Dashes = Literal["-"] | tuple[float, tuple[float, ...]]  # for Matplotlib: dashes and gaps in widths of the line
 
@@ -62,6 +64,15 @@ class Line:
     cap: Literal["round", "butt", "projecting"] = "round"
     dashes: Dashes = "-"
     rail: complex = 0j
+
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """The line in points, and the strokes of a rail, which a short one has not; `at` gives those of a place."""
+        places = [at(place) + self.rail * size for place in self.places]
+        way = places[-1] - places[0]
+        steps = np.arange(_TICK_SPACING, abs(way) - _TICK_SPACING * (abs(way) <= 2 * _TICK_SPACING), _TICK_SPACING)
+        along = way / (abs(way) or 1.0)
+        feet = (places[0] + steps * along).tolist() if self.rail else []
+        return [places, *([foot, foot + _TICK * along] for foot in feet)]
 
 
 @dataclass(frozen=True)
@@ -94,6 +105,12 @@ class Symbol:
     point: str = ""
     link: str = GROUND
 
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """Its outlines in points, of a circle some places; `at` gives those of a place."""
+        place, way = at(self.place), size * self.direction
+        around = self.outlines or [(self.radius * np.exp(0.5j * np.pi * np.arange(5))).tolist()]
+        return [[place + way * corner for corner in line] for line in around]
+
 
 @dataclass(frozen=True)
 class Strut:
@@ -117,23 +134,23 @@ class Strut:
     fill: Color | None = None
     cap: Literal["round", "butt", "projecting"] = "round"
 
-    def drawn(self, begin: complex, end: complex) -> list[list[complex]]:
-        """Its outlines on paper between these places there."""
-        way = end - begin
-        left = 1j * way / abs(way) if way else 0j
-        return [[begin + corner.real * way + corner.imag * left for corner in line] for line in self.outlines]
+    def on_paper(self, at: Paper, size: float = 1.0) -> list[list[complex]]:
+        """Its outlines in points; `at` gives those of a place."""
+        begin, end = map(at, self.places)
+        left = 1j * size * (end - begin) / (abs(end - begin) or 1.0)
+        return [[begin + corner.real * (end - begin) + corner.imag * left for corner in line] for line in self.outlines]
 
 
 Shape = Line | Symbol | Strut
 
 
-def lighter(color: str, share: float = 0.62) -> Color:
+def lighter(color: Color, share: float = 0.62) -> Color:
     """A colour mixed with white."""
     red, green, blue = (1 - (1 - part) * (1 - share) for part in to_rgb(color))
     return red, green, blue
 
 
-def darker(color: str, share: float = 0.3) -> Color:
+def darker(color: Color, share: float = 0.3) -> Color:
     """A colour mixed with black, for text."""
     red, green, blue = (part * (1 - share) for part in to_rgb(color))
     return red, green, blue
@@ -174,47 +191,27 @@ def mechanism_shapes(scene: Still) -> list[Shape]:
             shapes.append(Symbol(place, 0.5, (_rectangle(PIN, PIN),), fill=style.INK, point=point))
         elif kind == "tracer":
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
-    for wheels in scene.wheels:
-        shapes += _wheels(wheels, colors, scene.span)
-    for pair in scene.cams:
-        shapes += _cam(pair, colors)
+    for outline in scene.outlines:
+        shapes += _outline(outline, colors[outline.link])
     for spring in scene.description.springs.values():
         shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
     return shapes
 
 
-def _wheels(wheels: Wheels, colors: Mapping[str, str], span: float) -> list[Shape]:
-    """Pitch circles with a mark that turns, the line of a rack, or the two sides of a belt."""
-    shapes: list[Shape] = []
-    circle = np.exp(1j * np.linspace(0, 2 * np.pi, 73))
-    for link, axis, radius in zip(wheels.links, wheels.axes, wheels.radii, strict=True):
-        if radius:
-            rim = (axis + radius * circle).tolist()
-            shapes.append(Line(rim, colors[link], 1.2, 0.05, link, dashes="-" if wheels.strands else _PITCH))
-        else:
-            ends = wheels.touch - _RACK * span * wheels.along, wheels.touch + _RACK * span * wheels.along
-            shapes.append(Line(ends, colors[link], 1.2, 0.05, link, dashes=_PITCH))
-    return shapes + [Line(strand, style.INK, 1.4, 0.06) for strand in wheels.strands]
-
-
-def _cam(pair: CamPair, colors: Mapping[str, str]) -> list[Shape]:
-    """A cam as a plate, or the lines of a groove, and the roller or the flat face on it."""
-    follower, cam = pair.links
-    shapes: list[Shape] = []
-    for profile in pair.profiles:
-        width = _PROFILE if pair.solid else _PROFILE / 2
-        shapes.append(Line(profile, colors[cam], width, PLATES - 0.1, cam, filled=pair.solid))
-        if pair.solid:
-            shapes.append(Line(profile, lighter(colors[cam], 0.8), 0.1, PLATES - 0.05, cam, filled=True))
-    if pair.face is not None:
-        shapes.append(Line(pair.face, colors[follower], BAR / 2, 0.05, follower))
-    elif pair.radius:
-        rim = (pair.center + pair.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 49))).tolist()
-        shapes += [
-            Line(rim, "white", 0.1, 0.02, follower, filled=True),
-            Line(rim, colors[follower], 1.6, 0.05, follower),
-        ]
-    return shapes
+def _outline(outline: RoundPart, color: Color) -> list[Shape]:
+    """A pitch circle, the line of a rack, a pulley, a side of a belt, a cam as a plate or groove, or its follower."""
+    looks: dict[str, list[tuple[Color, float, float]]] = {
+        "pitch": [(color, 1.2, 0.05)], "rim": [(color, 1.2, 0.05)], "strand": [(style.INK, 1.4, 0.06)],
+        "disc": [(color, _PROFILE, PLATES - 0.1), (lighter(color, 0.8), 0.1, PLATES - 0.05)],
+        "groove": [(color, _PROFILE / 2, PLATES - 0.1)],
+        "roller": [("white", 0.1, 0.02), (color, 1.6, 0.05)], "face": [(color, BAR / 2, 0.05)],
+    }  # fmt: skip
+    dashes: Dashes = _PITCH if outline.kind == "pitch" else "-"
+    return [
+        Line(outline.places.tolist(), shade, width, layer, outline.link, dashes=dashes,
+             filled=outline.kind == "disc" or shade == "white")
+        for shade, width, layer in looks[outline.kind]
+    ]  # fmt: skip
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:
@@ -283,18 +280,23 @@ def _spring(scene: Still, spring: Spring) -> list[Shape]:
         cylinder = [complex(x, y) for x, y in ((0.08, -4), (0.6, -4), (0.6, 4), (0.08, 4), (0.08, -4))]
         return [Strut(places, points, ((0j, 1 + 0j),), **looks | {"width": 2.4}),
                 Strut(places, points, (cylinder,), fill="#DDDDDD", **looks | {"layer": 0.15})]  # fmt: skip
-    coil = [0.12 + 0j, *(complex(0.12 + 0.76 * (k + 0.5) / _WINDINGS, COIL * (-1) ** k) for k in range(_WINDINGS)),
-            0.88 + 0j]  # fmt: skip
+    *leads, zigzag = coil(0.12, 0.88)
     cup = [complex(x, y) for x, y in ((0.68, -COIL), (0.32, -COIL), (0.32, COIL), (0.68, COIL))]
     piston = [complex(0.55, -0.7 * COIL), complex(0.55, 0.7 * COIL)]
     dashpot = [[0.12 + 0j, 0.32 + 0j], cup, piston, [0.55 + 0j, 0.88 + 0j]]
-    parts = [[coil]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
-    outlines: list[list[complex]] = [[0j, 0.12 + 0j], [0.88 + 0j, 1 + 0j]]
+    parts = [[zigzag]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
+    outlines = leads
     for part, aside in zip(parts, (0.0,) if len(parts) == 1 else (1.4 * COIL, -1.4 * COIL), strict=True):
         outlines += [[corner + 1j * aside for corner in line] for line in part]
     if len(parts) > 1:
         outlines += [[complex(end, 1.4 * COIL), complex(end, -1.4 * COIL)] for end in (0.12, 0.88)]
     return [Strut(places, points, outlines, **looks)]
+
+
+def coil(begin: float, end: float) -> list[list[complex]]:
+    """Outlines of a `Strut`: two straight ends, and a zigzag between two shares of the way."""
+    windings = ((begin + (end - begin) * (k + 0.5) / _WINDINGS, COIL * (-1) ** k) for k in range(_WINDINGS))
+    return [[0j, complex(begin)], [complex(end), 1 + 0j], [complex(begin), *starmap(complex, windings), complex(end)]]
 
 
 def _torsion(scene: Still, spring: Spring) -> list[Shape]:
@@ -332,7 +334,7 @@ def ghost_shapes(scene: Still, dashes: Dashes) -> list[Shape]:
 
 
 def bodies(scene: Still) -> list[tuple[str, list[complex]]]:
-    """Outline of each moving rigid link, the largest first so that none hides another."""
+    """RoundPart of each moving rigid link, the largest first so that none hides another."""
     outlines = []
     for name, link in scene.description.links.items():
         if name != GROUND:

@@ -159,52 +159,16 @@ class NotebookFigure(Figure):
             return encoded(self)
 
 
-def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
+def new_figure(height: float) -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
-    figure = NotebookFigure(figsize=(width(), height), layout=layout)
+    figure = NotebookFigure(figsize=(width(), height))
     FigureCanvasAgg(figure)
     return figure
-
-
-def page(
-    count: int, columns: int, tall: float, *, left: float, right: float, top: float, bottom: float,
-    across: float = 0.0, down: float = 0.0, **shared: Any,
-) -> tuple[Figure, list[Axes]]:  # fmt: skip
-    """Some panels of a height in rows; heights, margins and the gaps between columns and rows in inches.
-
-    Without a layout engine, which would take twice as long as drawing.
-    """
-    rows = -(-count // columns)
-    height = top + rows * tall + (rows - 1) * down + bottom
-    wide = (width() - left - right - (columns - 1) * across) / columns
-    figure = new_figure(height, layout=None)
-    figure.subplots_adjust(
-        left / width(), bottom / height, 1 - right / width(), 1 - top / height, across / wide, down / tall
-    )
-    panels = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
-    for surplus in panels[count:]:
-        surplus.remove()
-    return figure, list(panels[:count])
 
 
 def line(size: float) -> float:
     """Height of a line of type of a size (points), inches."""
     return 1.2 * size / 72
-
-
-def grow(figure: Figure, above: float = 0.0, below: float = 0.0) -> None:
-    """More room (inches) above and below all of a page without a layout engine; panels keep their sizes."""
-    if not above and not below:
-        return
-    before, after = figure.get_figheight(), figure.get_figheight() + above + below
-    boxes = [(axes, axes.get_position()) for axes in figure.axes]
-    figure.set_figheight(after)
-    low, high = ((end * before + below) / after for end in (figure.subplotpars.bottom, figure.subplotpars.top))
-    figure.subplots_adjust(bottom=low, top=high)
-    for axes, box in boxes:
-        axes.set_position((box.x0, (box.y0 * before + below) / after, box.width, box.height * before / after))
-    for text in figure.texts:
-        text.set_y((text.get_position()[1] * before + below) / after)
 
 
 def folded(words: str, size: float, room: float) -> str:

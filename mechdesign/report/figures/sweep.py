@@ -13,13 +13,12 @@ from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.motion import radians
 from mechdesign.motion.solving import anchors_of
-from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
+from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.poses import Shown, pose_in_words
 from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.scene import Scene, Still
 from mechdesign.study import Study
 
-_POSES = 100  # from which is taken what wheels and cams reach
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
 _SAME_POSE = 1e-3
 _FEW_POSES = 60  # fewer would show a curve as chords
@@ -68,26 +67,14 @@ class Sweep(Shown):
         names = self.poses.groups[0].names
         plan = self.mechanism.plan(names)
         parts = -(-_TRACE_POSES // count)
-        values = [radians(self.study.units, coordinate, self._between(name, parts))
-                 for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
-        anchors = anchors_of(self.study.motion(self.poses), plan)
         ends = np.append(self.rows, self.poses.line) if self.poses.closed else self.rows
         s = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
-        solved = plan.solve(values, start=None if anchors is None else anchors.at(np.zeros(len(s), dtype=np.intp), s))
+        line, anchors = np.zeros(len(s), dtype=np.intp), anchors_of(self.study.motion(self.poses), plan)
+        there = self.poses.along(line, s).values
+        values = [radians(self.study.units, coordinate, there[name])
+                  for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
+        solved = plan.solve(values, start=None if anchors is None else anchors.at(line, s))
         return {name: np.where(solved.valid, solved.point(name), complex(np.nan, np.nan)) for name in self.places}
-
-    def _between(self, name: str, parts: int) -> Floats:
-        """Values of a given coordinate at the poses and evenly between each two; on a bent path by cubics."""
-        poses, ends = self.poses, self.rows[np.arange(len(self.rows) + self.poses.closed) % len(self.rows)]
-        values = poses.values[name][ends]
-        begin = end = steps = np.diff(values)
-        if poses.times is None and np.any(poses.bends.get(name, 0.0)):
-            bent = [poses.values[coordinate][ends] for coordinate, bends in poses.bends.items() if np.any(bends)]
-            slopes, length = poses.slopes[name][ends], np.linalg.norm(np.diff(bent), axis=0)
-            begin, end = slopes[:-1] * length, slopes[1:] * length
-        t = np.arange(parts)[:, None] / parts
-        cubic = values[:-1] + t * steps + t * (1 - t) * ((1 - t) * (begin - steps) - t * (end - steps))
-        return np.append(cubic.T.ravel(), values[-1])
 
     @cached_property
     def scene(self) -> Scene:
@@ -111,8 +98,7 @@ class Sweep(Shown):
                    *self.traces.values()]  # fmt: skip
         for still in self.scene.some(self.valid[[0, -1]] if len(self.valid) else ()):
             reached += [np.array(guide.ends) for guide in still.guides]
-        if self.mechanism.meshes or self.mechanism.cams:
-            reached += [np.array(still.round) for still in self.scene.some(self.valid[evenly(len(self.valid), _POSES)])]
+        reached += [np.ravel(outline.places[self.valid]) for outline in self.scene.outlines]
         return np.concatenate(reached)
 
     @property

@@ -21,7 +21,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import callouts, shapes
 from mechdesign.report.figures.framing import fit
-from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions, rows
+from mechdesign.report.figures.labels import Label, Position, net, positions, rows
 from mechdesign.report.figures.panels import round_down
 from mechdesign.report.figures.scene import Still
 from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol
@@ -107,13 +107,17 @@ class Sketcher:
         way = place - self.scene.points[self.scene.link_points(link)[0]]
         return (way / self.scene.rotations[link] * self.sheet.scale).conjugate()
 
+    def _on_paper(self, place: complex) -> complex:
+        """A place in the drawing's units, its y axis up."""
+        return self.sheet.at(place).conjugate()
+
     def _line(self, line: Line) -> None:
         """A line or plate that moves with its link, or a rail."""
-        parent, places = self.root, [self.sheet.at(place) + line.rail.conjugate() for place in line.places]
+        parent, lines = self.root, [[place.conjugate() for place in part] for part in line.on_paper(self._on_paper)]
         if line.link != GROUND:
             parent = self._group(self.scene.link_points(line.link)[0], line.link)
-            places = [self._local(line.link, place) for place in line.places]
-        way = f"M{'L'.join(map(_pair, places))}{'z' * line.filled}" + (_ticks(*places) if line.rail else "")
+            lines = [[self._local(line.link, place) for place in line.places]]
+        way = "".join(f"M{'L'.join(map(_pair, part))}" for part in lines) + "z" * line.filled
         look = {"fill": to_hex(line.color)} if line.filled else {}
         path = add(parent, "path", d=way, stroke=to_hex(line.color), stroke_width=line.width, **look)
         dashed(path, line.dashes, line.width)
@@ -121,7 +125,7 @@ class Sketcher:
     def _strut(self, strut: Strut) -> None:
         """A part of a telescopic leg, or a spring."""
         way = ",".join(" ".join(_digits(corner) for corner in line) for line in strut.outlines)
-        lines = strut.drawn(*(self.sheet.at(place).conjugate() for place in strut.places))
+        lines = strut.on_paper(self._on_paper)
         path = "".join(f"M{'L'.join(_pair(corner.conjugate()) for corner in line)}" for line in lines)
         base, tip = strut.points
         look = {"fill": to_hex(strut.fill)} if strut.fill else {}
@@ -198,15 +202,8 @@ class Sketcher:
 
     def _outline(self, shape: Shape) -> tuple[Complexes, float, bool]:
         """The area that a shape covers: its outline on paper, its line width, and whether it is filled."""
-        if isinstance(shape, Line):
-            outline = self.sheet.all(np.array(shape.places)).conj() + shape.rail
-            return outline, HATCHED if shape.rail else shape.width, shape.filled
-        if isinstance(shape, Strut):
-            lines = shape.drawn(*(self.sheet.at(place).conjugate() for place in shape.places))
-            return np.concatenate(lines), shape.width, False
-        outlines = shape.outlines or ([1, 1j, -1, -1j] * np.array(shape.radius),)
-        around = self.sheet.at(shape.place).conjugate() + np.concatenate(outlines) * shape.direction
-        return around, shape.width, shape.fill is not None
+        filled = shape.filled if isinstance(shape, Line) else shape.fill is not None
+        return np.concatenate(shape.on_paper(self._on_paper)), shape.width, filled
 
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
@@ -253,11 +250,3 @@ def _shift(place: complex) -> str:
 
 def _turned(direction: complex) -> str:
     return f"rotate({_number(-math.degrees(cmath.phase(direction)))})"
-
-
-def _ticks(begin: complex, end: complex) -> str:
-    """The strokes of a hatched rail."""
-    along = (end - begin) / abs(end - begin)
-    stroke = _pair(shapes.TICK * along * cmath.exp(-1j * math.radians(shapes.TICK_ANGLE)))
-    steps = np.arange(shapes.TICK_SPACING, abs(end - begin), shapes.TICK_SPACING).tolist()
-    return "".join(f"M{_pair(begin + step * along)}l{stroke}" for step in steps)

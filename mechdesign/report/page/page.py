@@ -204,7 +204,7 @@ def thumbnail(study: Study) -> str:
             scene = sketched(study.mechanism)
             width, height = (pixels / style.DPI for pixels in _THUMBNAIL)
             window = fit(scene.points.values(), width, height, 0.25)
-            figure = style.new_figure(height, layout=None)
+            figure = style.new_figure(height)
             figure.set_size_inches(width, height)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             axes.set_axis_off()

@@ -76,7 +76,7 @@ def free_bodies_picture(view: DynamicsView) -> Picture | None:
     words += f"; of {len(bearing)} links those {len(shown)} with the largest forces" * (len(shown) < len(bearing))
     whole, centers = shapes.mechanism_shapes(scene), mass_centers(view.study, drawn.shown.configuration, index)
     outside = [action for action in acting if action.link != GROUND and _outside(action, acting)]
-    reached = np.array([*scene.points.values(), *scene.round])
+    reached = np.concatenate([[*scene.points.values()], *(outline.places for outline in scene.outlines)])
     parts = [("Mechanism", whole, reached, outside, [*centers.values()])]
     for name in shown:
         body, mine = _alone(scene, name, whole), [action for action in acting if action.link == name]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import cycle
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
@@ -18,43 +15,73 @@ from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.callouts import point_labels
-from mechdesign.report.figures.drawing import Posed, write
+from mechdesign.report.figures.drawing import Posed, draw, write
 from mechdesign.report.figures.labels import Label
 from mechdesign.report.figures.marks import Late, PanelMark, Picture, Trace
 from mechdesign.report.figures.panels import drawn_plane, quantity
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Still, hull, pose
-from mechdesign.study import Study
+from mechdesign.report.figures.shapes import Line, Shape, Strut, Symbol, coil
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
-_COIL_SWING = 0.12  # half the width of a coil over its length
-_COIL_TURNS = 7
 _SHARES = (0.5, 0.3, 0.75)  # of a spring's length, where the labels of some stand
 _ALONG = np.array([0.0, 0.06, -0.06, 0.12, -0.12])  # and beside these
-_ORDER = 5.0  # above the mechanism
 LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
 
 @picture(StiffnessView, "springs", order=10)
 def springs_picture(view: StiffnessView) -> Picture | None:
-    """The equivalent springs at the first pose, as coils."""
+    """The equivalent springs at the first pose, as coils, each with its stiffness away from the other springs."""
     study, drawn = view.study, view.drawn.first
-    if drawn is None:
+    scene = pose(study.mechanism, drawn.configuration) if drawn is not None else None
+    if drawn is None or scene is None or not (springs := [*_springs(drawn, scene)]):
         return None
-    scene = pose(study.mechanism, drawn.configuration)
-    coils = _coils(study, drawn, scene) if scene is not None else []
-    if scene is None or not coils:
-        return None
-    posed = Posed(scene, names=False, drives=False)
-    labels = [coil.label for coil in coils] + point_labels(scene)
-    marks = [posed, Late(partial(draw_coils, coils)), Late(partial(write, labels=labels))]
-    ends = np.array([end for coil in coils for end in (coil.place, coil.anchor)])
+    inside = sum(spring.place + spring.anchor for spring in springs) / (2 * len(springs))
+    # On a narrow page labels of neighbours would stand above each other between both.
+    shares, labels = cycle(_SHARES if style.narrow() else (0.5,)), []
+    for spring, share in zip(springs, shares, strict=False):
+        span, unit = spring.anchor - spring.place, study.units.label("stiffness")
+        out = 1j * span * np.copysign(1, ((spring.place + 0.5 * span - inside) * (1j * span).conjugate()).real)
+        anchors = tuple(spring.place + part * span for part in share + _ALONG)
+        words = quantity(spring.stiffness, unit)
+        labels.append(Label(words, anchors, style.VERMILION, 16, float(np.angle(out)), 9.5))
+    shapes = [shape for spring in springs for shape in spring.shapes(_COIL_LENGTH * scene.span)]
+    marks = [Posed(scene, names=False, drives=False), Late(partial(draw, drawn=shapes, order=5.0)),
+             Late(partial(write, labels=[*labels, *point_labels(scene)]))]  # fmt: skip
+    ends = np.array([end for spring in springs for end in (spring.place, spring.anchor)])
     return posed_picture(view, drawn, [scene.places, ends], "Equivalent springs", marks)
 
 
-def _coils(study: Study, drawn: DrawnPose, scene: Still) -> list[Coil]:
-    legs, length = drawn.body.legs or (), _COIL_LENGTH * scene.span
-    coils, own = [], drawn.springs
+class LegSpring(NamedTuple):
+    """A spring from the point where it holds to its anchor; `tip` is the end of its leg.
+
+    The anchor of a grounded one is a joint of the ground, which the mechanism's drawing shows already.
+    """
+
+    stiffness: float
+    place: complex
+    anchor: complex
+    tip: complex
+    grounded: bool
+
+    def shapes(self, length: float) -> Iterator[Shape]:
+        """A coil with its middle so long, its anchor hatched, and a dashed line to where the leg ends."""
+        span = self.anchor - self.place
+        if abs(self.place - self.tip) > 1e-3 * abs(span):
+            yield Line((self.tip, self.place), style.VERMILION, 1.1, 0.0, dashes=(0, (4, 3)))
+        half = min(0.7, length / abs(span)) / 2
+        for color, width in (("white", 3.6), (style.VERMILION, 1.5)):
+            yield Strut((self.place, self.anchor), ("", ""), coil(0.5 - half, 0.5 + half), color, width, 0.1)
+        yield Symbol(self.place, 0.3, radius=2.5, fill=style.VERMILION, edge="white")
+        if not self.grounded:
+            hatch = [(complex(0, y), complex(4, y + 4)) for y in range(-10, 11, 4)]
+            yield Symbol(self.anchor, 0.1, ((-12j, 12j), *hatch), edge=style.VERMILION, width=1.3,
+                         direction=span / abs(span))  # fmt: skip
+
+
+def _springs(drawn: DrawnPose, scene: Still) -> Iterator[LegSpring]:
+    """The equivalent springs of the legs."""
+    legs, length, own = drawn.body.legs or (), _COIL_LENGTH * scene.span, drawn.springs
     columns = (own.leg, own.place, own.angle, own.stiffness)
     for k, place, angle, stiffness in zip(*(column.tolist() for column in columns), strict=True):
         if np.isnan(angle):
@@ -63,80 +90,11 @@ def _coils(study: Study, drawn: DrawnPose, scene: Still) -> list[Coil]:
         base, tip = scene.points[leg.base], scene.points[leg.tip]
         inward = ((base - place) * along.conjugate()).real
         grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
-        if grounded:
-            anchor = base
-        else:
+        if not grounded:
             # Its line passes the leg's base: away from the body.
             body = scene.points[drawn.body.section.point]
-            anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
-        text = quantity(stiffness, study.units.label("stiffness"))
-        coils.append(Coil(text, place, anchor, tip, length, grounded))
-    inside = sum((coil.place + coil.anchor) / 2 for coil in coils) / max(len(coils), 1)
-    # On a narrow page labels of neighbours would stand above each other between both.
-    shares = cycle(_SHARES if style.narrow() else (0.5,))
-    return [replace(coil, inside=inside, share=share) for coil, share in zip(coils, shares, strict=False)]
-
-
-@dataclass(frozen=True)
-class Coil:
-    """A spring from the point where it holds to its anchor; `tip` is the end of its leg, `length` of its coiled middle.
-
-    The anchor of a grounded one is a joint of the ground, which the mechanism's drawing shows already.
-    """
-
-    text: str
-    place: complex
-    anchor: complex
-    tip: complex
-    length: float
-    grounded: bool
-    inside: complex = 0j  # a place among all springs
-    share: float = 0.5  # of the way from place to anchor, where its label stands best
-
-    @property
-    def path(self) -> Complexes:
-        """The drawn line."""
-        span = self.anchor - self.place
-        share = np.linspace(0, 1, 600)
-        part = min(0.7, self.length / abs(span))
-        inside = np.clip((share - 0.5) / part + 0.5, 0, 1)
-        wave = _COIL_SWING * self.length * np.sin(2 * np.pi * _COIL_TURNS * inside)
-        return self.place + span * (share + 1j * wave / abs(span))
-
-    @property
-    def label(self) -> Label:
-        """Its stiffness, beside its middle, away from the other springs."""
-        span = self.anchor - self.place
-        aside = 1j * span
-        if ((self.place + 0.5 * span - self.inside) * aside.conjugate()).real < 0:
-            aside = -aside
-        anchors = tuple(self.place + share * span for share in self.share + _ALONG)
-        return Label(self.text, anchors, style.VERMILION, 16, float(np.angle(aside)), 9.5)
-
-
-def draw_coils(coils: Sequence[Coil], axes: Axes) -> None:
-    """Coil springs along their lines, each with a hatched anchor, and a dashed line to where the leg ends."""
-    for coil in coils:
-        if abs(coil.place - coil.tip) > 1e-3 * abs(coil.anchor - coil.place):
-            _line(axes, np.array([coil.tip, coil.place]), 1.1, 0.0, linestyle=(0, (4, 3)))
-        _line(axes, coil.path, 3.6, 0.05, color="white")
-        _line(axes, coil.path, 1.5, 0.1)
-        axes.plot(
-            [coil.place.real], [coil.place.imag], "o", markersize=5, color=style.VERMILION, markeredgecolor="white",
-            zorder=_ORDER + 0.3,
-        )  # fmt: skip
-        if coil.grounded:
-            continue
-        along = coil.length * (coil.anchor - coil.place) / abs(coil.anchor - coil.place)
-        bar = 0.2j * along
-        _line(axes, np.array([coil.anchor - bar, coil.anchor + bar]), 1.6, 0.1)
-        for foot in coil.anchor + np.linspace(-1, 1, 6) * bar:
-            _line(axes, np.array([foot, foot + (0.1 + 0.07j) * along]), 1.0, 0.1)
-
-
-def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
-    options: dict[str, Any] = {"color": style.VERMILION, "solid_capstyle": "round", "solid_joinstyle": "round"} | look
-    axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_ORDER + lift, **options))
+            base = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
+        yield LegSpring(stiffness, place, base, tip, grounded)
 
 
 @picture(StiffnessView, "free", order=30)
