@@ -20,7 +20,7 @@ from mechdesign.mechanism.derivatives import Linearization, regularity
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.motion.motion import Motion, SolvedPoses, in_study_units, radians
-from mechdesign.motion.question import PoseQuestion, unfilled
+from mechdesign.motion.question import MotionQuestion, unfilled
 from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
@@ -62,7 +62,7 @@ AT_REST: Mapping[str, object] = {"rates": {}, "accelerations": {}, "speed": None
 
 
 @dataclass(frozen=True, eq=False)
-class MovedQuestion(PoseQuestion):
+class MovedQuestion(MotionQuestion):
     """A question about a mechanism that moves.
 
     Parameters
@@ -129,8 +129,7 @@ class MovedQuestion(PoseQuestion):
         smooth = _through_change_points(self, part, arrays)
         line, row = part.poses.places_along
         rows = (line * self.whole.line + row).astype(np.intp)
-        errors = targets.errors(self.study, self.whole, arrays, rows)
-        return {**arrays, THROUGH: smooth, **{error.name: error.values for error in errors}}
+        return {**arrays, THROUGH: smooth, **targets.errors(self.study, self.whole, arrays, rows)}
 
     @property
     def drives(self) -> list[Coordinate]:
