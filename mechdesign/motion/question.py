@@ -26,8 +26,8 @@ from mechdesign.statistics import Request
 from mechdesign.work.chunks import map_chunks
 
 
-class MotionQuestion(ABC):
-    """A question about a motion, with all that `mechdesign.motion.answer` asks of it."""
+class PoseQuestion(ABC):
+    """A question at poses of a motion."""
 
     command: ClassVar[str]
     #: The table whose rows are the poses, which warnings name.
@@ -87,6 +87,10 @@ class MotionQuestion(ABC):
     def totals(self, values: PoseValues) -> Floats:
         """What is added up over the poses, design by design."""
         return np.zeros(())
+
+
+class MotionQuestion(PoseQuestion):
+    """A question about a motion, with all that `mechdesign.motion.answer` asks of it."""
 
     @abstractmethod
     def along(self, requests: Collection[Request]) -> AlongMotion | None:
@@ -160,20 +164,20 @@ class PoseValues:
             self.arrays[name][rows] = values
 
 
-def unfilled(question: MotionQuestion) -> PoseValues:
+def unfilled(question: PoseQuestion) -> PoseValues:
     """Values of a question at none of its poses yet."""
     values = PoseValues(question, np.zeros(question.poses.count, dtype=np.int8))
     values.put(np.zeros(0, dtype=np.intp), question.unknown())
     return values
 
 
-def solved(question: MotionQuestion, jobs: int | None = 1) -> Iterator[SolvedPoses]:
+def solved(question: PoseQuestion, jobs: int | None = 1) -> Iterator[SolvedPoses]:
     """The poses of a question, solved."""
     return solve_poses(question.motion, question.watched, jobs, question.curve)
 
 
 def evaluate(
-    question: MotionQuestion, jobs: int | None = 1, also: Callable[[SolvedPoses], object] = lambda part: None
+    question: PoseQuestion, jobs: int | None = 1, also: Callable[[SolvedPoses], object] = lambda part: None
 ) -> PoseValues:
     """Ask a question at every pose; `also` is called with the solved poses, part by part.
 
@@ -190,7 +194,7 @@ def evaluate(
     return values
 
 
-def pieces(question: MotionQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, PoseValues]]:
+def pieces(question: PoseQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, PoseValues]]:
     """Solved poses of one kind, and what the question has there, part by part; what is held is a few parts."""
     for part in solved(question, jobs):
         own = question.at(part.poses)

@@ -17,7 +17,7 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.answer import alone
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.question import Passage, PoseValues, Remark
+from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
@@ -79,7 +79,7 @@ class DrawnForces(DrawnPoses):
         yield from (Vectors(kind, unit, vectors) for kind, vectors in forces.items())
 
 
-class Dynamics(DynamicQuestion):
+class Dynamics(DynamicQuestion, MotionQuestion):
     """What drives it, what does it bear?"""
 
     command: ClassVar[str] = "dynamics"

@@ -14,7 +14,7 @@ from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.motion.ends import Change
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.question import Passage, PoseValues, Remark
+from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
@@ -52,7 +52,7 @@ class Events:
         return max(self.shapes, key=len)
 
 
-class Kinematics(KinematicQuestion):
+class Kinematics(KinematicQuestion, MotionQuestion):
     """How does it move?"""
 
     command: ClassVar[str] = "kinematics"

@@ -20,7 +20,7 @@ from mechdesign.mechanism.derivatives import Linearization, regularity
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.motion.motion import Motion, SolvedPoses, in_study_units, radians
-from mechdesign.motion.question import MotionQuestion, unfilled
+from mechdesign.motion.question import PoseQuestion, unfilled
 from mechdesign.motion.rows import GivenRows, Poses
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
@@ -62,7 +62,7 @@ AT_REST: Mapping[str, object] = {"rates": {}, "accelerations": {}, "speed": None
 
 
 @dataclass(frozen=True, eq=False)
-class MovedQuestion(MotionQuestion):
+class MovedQuestion(PoseQuestion):
     """A question about a mechanism that moves.
 
     Parameters
