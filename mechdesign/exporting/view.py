@@ -18,8 +18,7 @@ from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.plates import Sizes
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.kinematics.question import KinematicQuestion
-from mechdesign.questions.kinematics.values import KinematicValues
+from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.poses import pose_in_words, study_poses
 from mechdesign.study import Study
 from mechdesign.study.text.reading import Context, read_number
@@ -145,13 +144,13 @@ class PosedStudy:
         return "the pose of the sketch" if self.at is None else self.at
 
     @cached_property
-    def question(self) -> KinematicQuestion | None:
+    def question(self) -> Kinematics | None:
         """What the study asks of its motion; None where it gives no poses, and none can be assumed."""
         try:
             poses = study_poses(self.study, "kinematics")
         except StudyError:
             return None
-        return KinematicValues.of(self.study, poses)
+        return Kinematics.of(self.study, poses)
 
     @property
     def unmoved(self) -> tuple[Caution, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,11 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.along import AlongMotion
-from mechdesign.motion.answer import MotionQuestion, answer
+from mechdesign.motion.answer import answer
 from mechdesign.motion.followed import courses_of
 from mechdesign.motion.group import Answers, DesignGroup
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.question import evaluate
+from mechdesign.motion.question import MotionQuestion, evaluate
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.dynamics.analysis import Dynamics
@@ -33,6 +33,7 @@ from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.study.text.units import Amount
 from mechdesign.study.variants import remeasured
 from mechdesign.work.threads import one_thread
 
@@ -48,7 +49,7 @@ TABLES: Mapping[str, Collection[str]] = {
 
 
 # Questions that many designs are asked at once.
-TOGETHER: Mapping[str, Callable[[Study, Poses], MotionQuestion[Any]]] = {
+TOGETHER: Mapping[str, Callable[[Study, Poses], MotionQuestion]] = {
     "kinematics": Kinematics.of, "stiffness": Stiffness.of, "dynamics": Dynamics.of
 }  # fmt: skip
 
@@ -96,11 +97,12 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
     """
     if in_time(study, command) or remeasured(study, names):
         return False
-    # The nodes of a workspace follow each design's own boundary, change points its own motion.
+    # The nodes of a workspace follow each design's own boundary, change points its own motion, a spline its own points.
     sections = [section for section in (getattr(study, command), study.kinematics) if section is not None]
-    return not any(section.at_nodes for section in sections) and not any(
-        study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
-    )
+    splines = [path for section in sections for path in (section.path or {}).values() if path.spline]
+    if any(section.at_nodes for section in sections) or any(path.with_numbers(Amount) is not path for path in splines):
+        return False
+    return not any(study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups)
 
 
 def grouped(

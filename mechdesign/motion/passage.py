@@ -2,126 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import counted
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.configuration import joined
 from mechdesign.motion.motion import Motion, SolvedPoses
-from mechdesign.motion.question import PoseQuestion, PoseValues, evaluate, pieces
+from mechdesign.motion.question import Mark, MotionQuestion, Passage, PoseValues, Remark, evaluate, pieces
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import POSES_AT_ONCE
 from mechdesign.numerics.arrays import Flags, Ints, evenly
 from mechdesign.progress import Progress
-from mechdesign.results import LongTable, Scope, Table
 
 # Poses of a motion that a picture can show.
 MAX_SHOWN_POSES = 2001
 
 
-@dataclass(frozen=True)
-class Remark:
-    """What is to be said of some poses of a design: a kind of warning, and its sentence.
-
-    Parameters
-    ----------
-    words : str
-        ``{number}`` of ``{count}`` poses, or of ``{poses}``; ``{are}`` and ``{lie}`` are their number with the verb.
-    table : str
-        Whose rows are the poses; left out: that of the question.
-    least : float
-        Part of the poses below which nothing is said.
-    first : bool
-        Whether the sentence names the first of the poses.
-    """
-
-    kind: str
-    words: str
-    table: str = ""
-    least: float = 0.0
-    first: bool = True
-
-
-class Mark(NamedTuple):
-    """How many poses of a design something is to be said of, and the row of the first."""
-
-    number: int
-    first: int
-
-    @classmethod
-    def of(cls, where: Flags, begin: int = 0) -> Mark:
-        """The mark of some poses; the first has the row `begin`."""
-        return cls(int(np.count_nonzero(where)), begin + int(where.argmax()))
-
-    def caution(self, remark: Remark, question: PoseQuestion, design: int = 0) -> Caution | None:
-        """The warning about these poses; None where they are too few."""
-        number, row = self
-        count = question.poses.count // question.poses.designs
-        if number < max(remark.least * count, 1):
-            return None
-        pose = question.motion.in_words(row + design * count)
-        are, lie = ("1 pose is", "1 pose lies") if number == 1 else (f"{number} poses are", f"{number} poses lie")
-        words = remark.words.format(number=number, count=count, poses=counted(count, "pose"), are=are, lie=lie)
-        words += f"; the first: {pose}" if remark.first else ""
-        return Caution(remark.kind, words, remark.table or question.lead, row, pose)
-
-
-@dataclass(frozen=True, eq=False)
-class Passage:
-    """What is known of a motion after one pass over all its poses.
-
-    Attributes
-    ----------
-    values : PoseValues
-        At all poses; of a long motion at those with the extremes of each column, those where validity changes, and as
-        many between as a picture needs.
-    shown : SolvedPoses
-        The poses that a picture shows, of those of the values.
-    reason : int8 array, shape (poses,)
-        Of all poses; see `mechdesign.mechanism.Reason`.
-    marks : list of mapping of Remark to Mark
-        By design, what is to be said of how many of all poses.
-    solved : list of SolvedPoses
-        The poses themselves, of designs with dimensions of their own; else empty.
-    """
-
-    question: Any
-    values: PoseValues
-    shown: SolvedPoses
-    reason: NDArray[np.int8]
-    marks: Sequence[Mapping[Remark, Mark]]
-    solved: Sequence[SolvedPoses]
-
-    def cautions(self, design: int) -> list[Caution]:
-        """Warnings about poses of a design."""
-        marks = self.marks[design].items()
-        said = (mark.caution(remark, self.question, design) for remark, mark in marks if remark.words)
-        return [caution for caution in said if caution is not None]
-
-    @property
-    def long(self) -> bool:
-        """Whether the values are not those of all poses."""
-        return self.values.question is not self.question
-
-    def table(self, make: Callable[[PoseValues], Table], jobs: int | None, scope: Scope | None) -> Table:
-        """A table with as many rows for each pose of a long motion; its rows are made anew where they are wanted."""
-        like = replace(make(self.values), scope=scope)
-        rows = len(like) // len(self.values.reason)
-        return LongTable(like, rows * self.question.poses.count, partial(self.blocks, make, jobs))
-
-    def blocks(self, make: Callable[[PoseValues], Table], jobs: int | None) -> Iterator[Table]:
-        """A table with a row a pose in parts."""
-        return (make(values) for _, values in pieces(self.question, jobs))
-
-
-def pass_over(question: PoseQuestion, progress: Progress, jobs: int | None) -> Passage:
+def pass_over(question: MotionQuestion, progress: Progress, jobs: int | None) -> Passage:
     """Ask a question at every pose once; of a long motion only some of what it has is kept.
 
     Raises
@@ -165,7 +65,7 @@ def pass_over(question: PoseQuestion, progress: Progress, jobs: int | None) -> P
     return Passage(question, whole, shown, reason, [totals], [])
 
 
-def _long(question: PoseQuestion) -> bool:
+def _long(question: MotionQuestion) -> bool:
     """Whether poses are too many to be held with all their columns, and all of one kind and one design."""
     poses = question.poses
     single = len(poses.groups) == 1 and poses.designs == 1 and not poses.rule.regions

@@ -6,7 +6,6 @@ That of a point has, at every place, the length of the way to it and the directi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -215,43 +214,6 @@ class Spline(PointPath):
         x = self._parameter(s)
         piece = np.clip(np.searchsorted(self.fine, x, side="right") - 1, 0, len(self.fine) - 2)
         return self.length[piece] + _spline_lengths(self.curve, self.fine[piece], x)
-
-
-@dataclass(frozen=True, eq=False)
-class SplineOfEach(PointPath):
-    """A path of its own for each design, with as many poses."""
-
-    paths: Sequence[PointPath]
-
-    @property
-    def closed(self) -> bool:
-        return self.paths[0].closed
-
-    def take(self, designs: Ints) -> PointPath:
-        return SplineOfEach(self.count, [self.paths[k] for k in designs.tolist()])
-
-    @property
-    def corners(self) -> Floats:
-        return np.unique(np.concatenate([path.corners for path in self.paths]))
-
-    def at(self, line: Ints, s: Floats) -> Complexes:
-        return self._gathered(line, lambda path, some: (path.at(some, s[some]),))[0]
-
-    def course(self, line: Ints, s: Floats) -> tuple[Complexes, Complexes, Floats]:
-        unit, bend, pace = self._gathered(line, lambda path, some: path.course(some, s[some]))
-        return unit, bend, pace.real
-
-    def way(self, line: Ints, s: Floats) -> Floats:
-        return self._gathered(line, lambda path, some: (path.way(some, s[some]),))[0].real
-
-    def _gathered(self, line: Ints, values: Callable[[PointPath, Ints], tuple[NDArray[Any], ...]]) -> list[Complexes]:
-        """What `values` gives for each path at the places of its design, put together."""
-        order = np.argsort(line, kind="stable")
-        begins = np.searchsorted(line[order], np.arange(1, len(self.paths)))
-        places = np.split(order, begins)
-        parts = [values(path, some) for path, some in zip(self.paths, places, strict=True)]
-        back = np.argsort(order)
-        return [np.concatenate(columns).astype(complex)[back] for columns in zip(*parts, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -319,23 +319,22 @@ class Path(Rows):
         return super().pace(line, s, swept) if self.path is None else self.paths[self.path].course(line, s)[2]
 
 
-class PoseNumbers(ABC):
+class PoseNumbers:
     """Numbers of a study at poses, where parameters may differ from pose to pose."""
 
-    @property
-    @abstractmethod
-    def parameters(self) -> Mapping[str, Floats]:
-        """Parameters that differ from the study's own, at each pose, in the study's units."""
+    if TYPE_CHECKING:
 
-    @property
-    @abstractmethod
-    def nominal(self) -> Mapping[str, float]:
-        """Every parameter of the study's own design."""
+        @property
+        def parameters(self) -> Mapping[str, Floats]:
+            """Parameters that differ from the study's own, at each pose, in the study's units."""
 
-    @property
-    @abstractmethod
-    def times(self) -> Floats | None:
-        """Time of each pose of a motion over time."""
+        @property
+        def nominal(self) -> Mapping[str, float]:
+            """Every parameter of the study's own design."""
+
+        @property
+        def times(self) -> Floats | None:
+            """Time of each pose of a motion over time."""
 
     def of(self, number: float) -> Number:
         """A number of the study: an array where it follows parameters that differ."""

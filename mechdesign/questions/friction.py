@@ -15,7 +15,7 @@ from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.statics import Balance, Reaction
-from mechdesign.motion.passage import Remark
+from mechdesign.motion.question import Remark
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.model import Description
-from mechdesign.motion.paths import EvenValues, PointPath, Polyline, Round, Spline, SplineOfEach
+from mechdesign.motion.paths import EvenValues, PointPath, Polyline, Round, Spline
 from mechdesign.motion.rows import MAX_POSES, OWN, DesignNumbers, GivenRows, Grid, Path, Poses, Rows
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
@@ -187,8 +187,8 @@ def _course(name: str, given: PathSection, folder: Folder, value: Callable[[floa
         chords = np.abs(np.diff(places, axis=1))
         if places.shape[1] < 3 or not (chords > APART * chords.sum(axis=1, keepdims=True)).all():
             raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
-        splines = [Spline.through(place, given.points) for place in places]
-        return splines[0] if len(splines) == 1 else SplineOfEach(splines[0].count, splines)
+        # Designs whose points differ are studies of their own.
+        return Spline.through(places[0], given.points)
     if table.shape[2] == 1:
         return np.asarray(table[..., 0])
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))

@@ -15,10 +15,9 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.motion.answer import Between, MotionQuestion, alone
+from mechdesign.motion.answer import alone
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.passage import Passage, Remark
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
@@ -53,15 +52,6 @@ _UNDEFINED = Remark("undefined", "")  # whose sentence depends on what has no va
 
 
 @dataclass(frozen=True, eq=False)
-class Forced(Between):
-    """Forces along motions; tables, and warnings about what follows from the forces."""
-
-    along: KinematicAlong | None
-    made: Mapping[str, Table]
-    warnings: Sequence[Caution]
-
-
-@dataclass(frozen=True, eq=False)
 class DrawnForces(DrawnPoses):
     """The solved poses of a motion, and what acts on the mechanism in them."""
 
@@ -89,7 +79,7 @@ class DrawnForces(DrawnPoses):
         yield from (Vectors(kind, unit, vectors) for kind, vectors in forces.items())
 
 
-class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
+class Dynamics(DynamicQuestion, MotionQuestion):
     """What drives it, what does it bear?"""
 
     command: ClassVar[str] = "dynamics"
@@ -132,16 +122,18 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
             tables["extremes"] = extremes_table(values, along, extremes)
         return tables, along
 
-    def between(self, passage: Passage) -> Forced:
+    def between(self, passage: Passage) -> tuple[KinematicAlong | None, tuple[Mapping[str, Table], Sequence[Caution]]]:
+        """The motion with forces; all tables, and warnings about what follows from the forces."""
         normals = [Request(name, end=-1) for name in lift_off.contacts(self.acting).values()]
         tables, along = self.chosen(passage.values, (*A_ROW_A_POSE, "extremes"), requests=normals)
         further, warnings = further_tables(passage.values, along)
-        return Forced(along, {**tables, **further}, warnings)
+        return along, ({**tables, **further}, warnings)
 
-    def tables(self, passage: Passage, between: Forced) -> Mapping[str, Table]:
-        return between.made
+    def tables(self, passage: Passage) -> Mapping[str, Table]:
+        tables: Mapping[str, Table] = passage.between[0]
+        return tables
 
-    def say(self, passage: Passage, between: Forced, design: int) -> tuple[list[Caution], list[str]]:
+    def say(self, passage: Passage, design: int) -> tuple[list[Caution], list[str]]:
         poses, study, marks = self.poses, self.study, passage.marks[design]
         count, friction, gaps = poses.count // poses.designs, self.acting.friction, list[str]()
         warnings = passage.cautions(design)
@@ -149,8 +141,8 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
             message = f"{self._undefined(mark.first)} at {mark.number} of {count} poses: forces are nan there"
             warnings.append(Caution("undefined", message, "dynamics", mark.first))
         for coupling, remark, _ in lift_off.lifted(passage.values):
-            if between.along is not None and not marks[remark].number:
-                warnings += lift_off.between(self.acting, between.along, coupling, design)
+            if passage.along is not None and not marks[remark].number:
+                warnings += lift_off.between(self.acting, passage.along, coupling, design)
         jumps = velocity_jumps(self, study.mechanism.description.masses, design)
         if len(jumps):
             warnings.append(jumps_in_words(self, jumps, "dynamics", design))
@@ -163,10 +155,10 @@ class Dynamics(DynamicQuestion, MotionQuestion[Forced]):
             shares = "equilibrium leaves open how a chain of slides and clamps shares them"
             message = f"moments of {chains} are nan: {shares}; {settled}"
             warnings.append(Caution("undefined", message, "joint_forces"))
-        return [*warnings, *assumed(study), *between.warnings], gaps
+        return [*warnings, *assumed(study), *passage.between[1]], gaps
 
-    def drawn(self, passage: Passage, between: Forced) -> DrawnForces:
-        return DrawnForces(shown_of(self.study, passage), passage.values, between.along)
+    def drawn(self, passage: Passage) -> DrawnForces:
+        return DrawnForces(shown_of(self.study, passage), passage.values, passage.along)
 
     def _undefined(self, row: int) -> str:
         """What leaves the forces at a row without a value: the slope of a coupling, or else a load."""

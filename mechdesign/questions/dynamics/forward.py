@@ -12,8 +12,8 @@ from mechdesign.columns import Column
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
-from mechdesign.motion.passage import MAX_SHOWN_POSES, Mark
-from mechdesign.motion.question import PoseValues, unfilled
+from mechdesign.motion.passage import MAX_SHOWN_POSES
+from mechdesign.motion.question import Mark, PoseValues, unfilled
 from mechdesign.motion.rows import TIME, GivenRows, Poses
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.numerics.sign_changes import Resolved
@@ -23,7 +23,7 @@ from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
-from mechdesign.questions.dynamics.motion_in_time import IntegratedMotion, Integration
+from mechdesign.questions.dynamics.motion_in_time import IntegratedPoses, Integration
 from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestion
 from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.state_in_time import STANDSTILL
@@ -55,17 +55,17 @@ def forward(study: Study, progress: Progress) -> tuple[Result, PoseValues, Shown
     equations = EquationsOfMotion(ForceQuestion.of(study, moves=True), section.forward, outputs)
     integration = Integration(equations)
     course = integration.run(progress)
-    motion, shown = _forces(study, course)
+    motion, shown = _forces(integration, course)
     names = [static.name for static in question_of(motion).statics]
     tables = {
-        "forward": _forward_table(motion, course, outputs), "events": _events_table(study, course),
+        "forward": _forward_table(motion, course, outputs), "events": _events_table(integration),
         "dynamics": dynamics_table(motion), "joint_forces": joint_table(motion),
         "extremes": extremes_table(motion, None, names),
     }  # fmt: skip
-    scope, warnings = _scope(study, course), [*_cautions(study, integration, course)]
+    scope, warnings = _scope(integration), [*_cautions(integration, course)]
     tables = {name: replace(table, scope=replace(scope, poses_only=name != "events")) for name, table in tables.items()}
-    warnings += [*_lift_offs(study, integration, motion), *assumed(study)]
-    counts = {"instants": len(course.times), "steps": course.steps}
+    warnings += [*_lift_offs(integration, motion), *assumed(study)]
+    counts = {"instants": len(course.times), "steps": integration.steps}
     return Result("dynamics", tables, warnings, counts), motion, shown
 
 
@@ -73,27 +73,25 @@ def _at(study: Study, time: float) -> str:
     return f"{time:.6g} {study.units.label('time')}"
 
 
-def _scope(study: Study, course: IntegratedMotion) -> Scope:
+def _scope(integration: Integration) -> Scope:
     """What tables say of the motion that was asked: a part of it is missing, or it has its own end before its time."""
-    ending = course.ending
+    ending, study = integration.ending, integration.equations.study
     if ending is None:
         return Scope()
-    words, until = ending.words.format(time=_at(study, course.end)), _at(study, course.end)
+    until = _at(study, integration.reached)
     if ending.place:
         return Scope(until=f"until {ending.place} at {until}")
-    section = DynamicsSection.of(study).forward
-    assert section is not None
-    return Scope(missing=f"no motion from {until} to {_at(study, float(section.duration))}: {words}")
+    return Scope(missing=f"no motion from {until} to {_at(study, integration.end)}: {ending.words.format(time=until)}")
 
 
-def _cautions(study: Study, integration: Integration, course: IntegratedMotion) -> Iterator[Caution]:
+def _cautions(integration: Integration, course: IntegratedPoses) -> Iterator[Caution]:
     """Warnings of a motion that ended before its time, jumps, or has energies that are not those of the work done."""
-    if (ending := course.ending) is not None:
+    study = integration.equations.study
+    if (ending := integration.ending) is not None:
         kind = {"limit": "incomplete", "rest": "incomplete", "jams": "jammed"}.get(ending.kind, "unconverged")
         ended = "ended" if kind == "incomplete" else "ended early"
-        yield Caution(
-            kind, f"the motion in time {ended}: {ending.words.format(time=_at(study, course.end))}", "forward"
-        )
+        words = ending.words.format(time=_at(study, integration.reached))
+        yield Caution(kind, f"the motion in time {ended}: {words}", "forward")
     for words in dict.fromkeys(words for words, _ in integration.jumps):
         times = [time for name, time in integration.jumps if name == words]
         yield Caution(
@@ -113,7 +111,7 @@ def _cautions(study: Study, integration: Integration, course: IntegratedMotion) 
         yield Caution("unconverged", message, "forward", row)
 
 
-def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iterator[Caution]:
+def _lift_offs(integration: Integration, rows: PoseValues) -> Iterator[Caution]:
     """Warnings of followers that lift off their cams, at rows, or only between them."""
     contacts = lift_off.contacts(integration.equations.question)
     for coupling, remark, where in lift_off.lifted(rows):
@@ -126,7 +124,7 @@ def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iter
 
     def pressed(times: Floats) -> Floats:
         order = np.argsort(times)
-        motion, _ = _forces(study, integration.course(times[order]))
+        motion, _ = _forces(integration, integration.at(times[order]))
         return np.array([motion.arrays[normal] + least for normal in contacts.values()])[:, np.argsort(order)]
 
     ends = np.unique([stretch.end for stretch in integration.stretches])
@@ -135,11 +133,13 @@ def _lift_offs(study: Study, integration: Integration, rows: PoseValues) -> Iter
         times = [change.place for change in changes if change.function == k and change.sign < 0]
         if times:
             words = lift_off.lifts(coupling, "between the instants").words
-            yield Caution("cam", f"{words}; {len(times)} times, first at {_at(study, times[0])}", "joint_forces")
+            first = _at(integration.equations.study, times[0])
+            yield Caution("cam", f"{words}; {len(times)} times, first at {first}", "joint_forces")
 
 
-def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
+def _forces(integration: Integration, course: IntegratedPoses) -> tuple[PoseValues, Shown]:
     """Forces along the motion: those of any motion over time, at the poses that were integrated."""
+    study, positions = integration.equations.study, integration.positions
     mechanism, count = study.mechanism, len(course.times)
     drives = [mechanism.coordinate(name) for name in mechanism.drives]
 
@@ -149,7 +149,7 @@ def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
     rows = np.arange(count)
     values = {drive.name: of(drive, course.configuration.value(drive)) for drive in drives}
     slopes, bends = (
-        {drive.name: of(drive, course.positions.rate(drive, part)) for drive in drives}
+        {drive.name: of(drive, positions.rate(drive, part)) for drive in drives}
         for part in (course.rates.velocity, course.rates.acceleration)
     )
     poses = Poses(GivenRows.single({TIME: course.times, **values}, slopes=slopes, bends=bends))
@@ -162,14 +162,14 @@ def _forces(study: Study, course: IntegratedMotion) -> tuple[PoseValues, Shown]:
     # Efforts are known, also where the drives are singular.
     for drive, effort in zip(drives, course.rates.efforts, strict=True):
         motion.arrays[f"{drive.name}_effort"][:] = effort
-        speed = course.positions.rate(drive, course.rates.velocity)
+        speed = positions.rate(drive, course.rates.velocity)
         motion.arrays[f"{drive.name}_power"][:] = effort * speed
     some = evenly(count, MAX_SHOWN_POSES)
     return motion, Shown(study, poses, rows[some], course.configuration.take(rows[some]))
 
 
 @quiet
-def _forward_table(motion: PoseValues, course: IntegratedMotion, outputs: list[Coordinate]) -> Table:
+def _forward_table(motion: PoseValues, course: IntegratedPoses, outputs: list[Coordinate]) -> Table:
     study, poses, label = motion.question.study, motion.question.poses, motion.question.study.units.label
     columns: list[Column] = [TIMED.column(course.times, label("time"))]
     for k, drive in enumerate(motion.question.drives):
@@ -196,13 +196,12 @@ def _forward_table(motion: PoseValues, course: IntegratedMotion, outputs: list[C
     return FORWARD.table([*columns, VALID.column(motion.valid)])
 
 
-def _events_table(study: Study, course: IntegratedMotion) -> Table:
+def _events_table(integration: Integration) -> Table:
     """A row each event; those that are asked and do not happen have one without a time."""
-    section = DynamicsSection.of(study).forward
-    assert section is not None
-    watched = [*section.events, *([STANDSTILL] if study.mechanism.description.friction else [])]
-    happened = {event.name for event in course.events}
-    rows = [(event.name, event.time, "up" if event.rises else "down") for event in course.events]
+    study, events = integration.equations.study, sorted(integration.events, key=lambda event: event.time)
+    watched = [*integration.section.events, *([STANDSTILL] if study.mechanism.description.friction else [])]
+    happened = {event.name for event in events}
+    rows = [(event.name, event.time, "up" if event.rises else "down") for event in events]
     rows += [(name, np.nan, "") for name in watched if name not in happened]
     names, times, ways = zip(*rows, strict=True) if rows else ((), (), ())
     columns = EVENTS.columns(

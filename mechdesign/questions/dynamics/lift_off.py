@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.followed import Followed
-from mechdesign.motion.passage import Remark
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.question import PoseValues, Remark
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of

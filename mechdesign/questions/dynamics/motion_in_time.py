@@ -13,7 +13,7 @@ events, and contacts that come to rest or begin to slide.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.charts import Positions, Sides, regularity
+from mechdesign.mechanism.charts import Sides, regularity
 from mechdesign.mechanism.configuration import joined
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
@@ -68,33 +68,19 @@ class Stretch(NamedTuple):
     branch: Branch
 
 
-@dataclass
-class IntegratedMotion:
-    """The motion at the instants asked for, shape (..., instants).
+class IntegratedPoses(NamedTuple):
+    """The motion at some times.
 
     Attributes
     ----------
-    times : Floats
-    x, velocity, acceleration : Floats
-        All positions, as `positions` has them.
     work : Floats, shape (1 or 2, instants)
         Work of efforts and loads since the start, less what dampers, stops and friction have taken; that of friction.
-    ending : EndOfRun, optional
-        Why the motion ended before its time.
-    end : float
-        When it ended, or would have come to what is not finite.
     """
 
-    positions: Positions
     times: Floats
-    x: Floats
+    configuration: Configuration
     rates: Rates
     work: Floats
-    configuration: Configuration
-    events: list[Event] = field(default_factory=list)
-    ending: EndOfRun | None = None
-    end: float = 0.0
-    steps: int = 0
 
 
 class SpentError(Exception):
@@ -140,7 +126,7 @@ class Integration(MotionInTime):
         rates = self.equations.rates(np.array([at]), x, velocity)
         return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power[:, 0]])
 
-    def run(self, progress: Progress = NULL) -> IntegratedMotion:
+    def run(self, progress: Progress = NULL) -> IntegratedPoses:
         """Integrate; rows are evenly spread over the duration, or what the motion has reached of it."""
         progress.start(PARTS, "parts of the motion's time")
         seconds = MAX_SECONDS * max(1.0, self.count / MANY)
@@ -155,7 +141,7 @@ class Integration(MotionInTime):
                 words = f"{seconds:g} s of the processor are not enough, the motion got to {{time}}"
                 self.ending = EndOfRun("spent", words)
             count = self.section.rows
-            return self.course(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
+            return self.at(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
 
     def _pass(self, begin: float, end: float, progress: Progress) -> None:
         """Integrate from a corner in time to the next."""
@@ -294,7 +280,7 @@ class Integration(MotionInTime):
         if moves.any():
             self.equations.branch = branch._replace(signs=np.where(moves, np.sign(speeds), branch.signs))
 
-    def course(self, times: Floats) -> IntegratedMotion:
+    def at(self, times: Floats) -> IntegratedPoses:
         """The motion at some times."""
         equations = self.equations
         numbers = np.searchsorted([stretch.end for stretch in self.stretches], times)
@@ -311,10 +297,12 @@ class Integration(MotionInTime):
         whole = joined([part[3] for part in parts], times.shape, vectors, {})
         near = self.positions.near(x)
         whole = replace(whole, near=near, counted=frozenset(near))
-        events = sorted(self.events, key=lambda event: event.time)
-        return IntegratedMotion(
-            self.positions, times, x, rates, work, whole, events, self.ending, self._pole or self.time, self.steps
-        )
+        return IntegratedPoses(times, whole, rates, work)
+
+    @property
+    def reached(self) -> float:
+        """When it ended, or would have come to what is not finite."""
+        return self._pole or self.time
 
     def _switched(self, solver: DOP853) -> DOP853 | None:
         """The solver, or none where coordinates of another chart move much faster than those of this one."""

@@ -170,8 +170,7 @@ class KinematicAlong(AlongMotion):
             arrays[PACE] = self._pace(line, s, there, linear)
         if self._errors:
             rows = line * whole.line
-            for error in targets.errors(self.question.study, whole, values, rows, between=True):
-                arrays[error.name] = error.values
+            arrays |= targets.errors(self.question.study, whole, values, rows, between=True)
         signed = linear.conditionings
         forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
         arrays[FORWARD] = np.abs(forward) if self._lean.passes_singularities else forward

@@ -12,8 +12,8 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.motion.answer import alone, answer_of
-from mechdesign.motion.passage import Passage, pass_over
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.passage import pass_over
+from mechdesign.motion.question import Passage, PoseValues
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.kinematics.columns import MODES

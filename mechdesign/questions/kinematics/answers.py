@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
-from mechdesign.motion.answer import Between, MotionQuestion
 from mechdesign.motion.ends import Change
 from mechdesign.motion.motion import SolvedPoses
-from mechdesign.motion.passage import Passage, Remark
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
@@ -22,10 +22,11 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import LimitPlace, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
+from mechdesign.questions.kinematics.question import KinematicQuestion
 from mechdesign.questions.kinematics.remarks import astray, marks_of, unfollowed, valued, without_value
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.questions.kinematics.targets import totals
-from mechdesign.questions.kinematics.values import KinematicValues
+from mechdesign.questions.kinematics.values import pole_of, values_of
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import shown_of
 from mechdesign.results import Table
@@ -36,10 +37,9 @@ ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobia
 
 
 @dataclass(frozen=True, eq=False)
-class Events(Between):
+class Events:
     """Limits, toggles and change points of motions that can be followed; and the loops and cams of each design."""
 
-    along: KinematicAlong | None
     shapes: Sequence[Sequence[FourBar]]
     limits: Sequence[LimitPlace]
     toggles: Sequence[Toggle]
@@ -52,7 +52,7 @@ class Events(Between):
         return max(self.shapes, key=len)
 
 
-class Kinematics(KinematicValues, MotionQuestion[Events]):
+class Kinematics(KinematicQuestion, MotionQuestion):
     """How does it move?"""
 
     command: ClassVar[str] = "kinematics"
@@ -60,6 +60,12 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
     a_row_a_pose: ClassVar = A_ROW_A_POSE
     # Rows of a cam are places of its profile.
     poses_only: ClassVar[Sequence[str]] = ("cam",)
+
+    def moved(self, solved: SolvedPoses) -> tuple[dict[str, Value], Linearization]:
+        return values_of(self, solved)
+
+    def pole(self, arrays: Mapping[str, Value], linear: Linearization, column: str) -> Value:
+        return pole_of(self, arrays, linear, column)
 
     def marks(self, values: PoseValues) -> Mapping[Remark, Flags]:
         return marks_of(values)
@@ -90,25 +96,26 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
             tables["targets"] = targets_table(values, along)
         return tables, along
 
-    def between(self, passage: Passage) -> Events:
+    def between(self, passage: Passage) -> tuple[KinematicAlong | None, Events]:
         shapes = _shapes(passage)
         loops = max(shapes, key=len)
         along = along_of(self, loops=loops, toggles=True, passages=True)
         cams = profiles(self.study, self.poses)
         if along is None:
-            return Events(along, shapes, (), (), (), cams)
-        return Events(along, shapes, limits_of(along), toggles_of(loops, along), along.ends.changes(), cams)
+            return None, Events(shapes, (), (), (), cams)
+        return along, Events(shapes, limits_of(along), toggles_of(loops, along), along.ends.changes(), cams)
 
-    def kinds(self, passage: Passage, between: Events) -> Sequence[object]:
+    def kinds(self, passage: Passage) -> Sequence[object]:
         """By design which loops it has, and how closely it can be followed."""
-        names = [tuple(loop.joints for loop in own) for own in between.shapes]
-        if between.along is None:
+        names = [tuple(loop.joints for loop in own) for own in passage.between.shapes]
+        if (along := passage.along) is None:
             return names
-        spent, unresolved = between.along.curve.spent.tolist(), between.along.functions.unresolved.tolist()
+        spent, unresolved = along.curve.spent.tolist(), along.functions.unresolved.tolist()
         return [*zip(names, spent, unresolved, strict=True)]
 
-    def tables(self, passage: Passage, between: Events) -> dict[str, Table]:
-        values, along, loops = passage.values, between.along, between.loops
+    def tables(self, passage: Passage) -> dict[str, Table]:
+        between: Events = passage.between
+        values, along, loops = passage.values, passage.along, between.loops
         tables = {**pose_tables(values), "extremes": extremes(values, along)}
         if along is not None:
             tables["limits"] = limits_table(between.limits, along)
@@ -122,15 +129,12 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
             tables["cam"] = cam_table(self.study, between.cams)
         return {name: tables[name] for name in ORDER if name in tables}
 
-    def uneven(self, passage: Passage, between: Events) -> Mapping[str, Sequence[int]]:
-        designs = self.poses.designs
-        return {
-            "limits": [*map(len, _by_line(between.limits, designs))],
-            "toggles": [*map(len, _by_line(between.toggles, designs))],
-        }
+    def uneven(self, passage: Passage) -> Mapping[str, Sequence[int]]:
+        events = {"limits": passage.between.limits, "toggles": passage.between.toggles}
+        return {name: [*map(len, _by_line(own, self.poses.designs))] for name, own in events.items()}
 
-    def say(self, passage: Passage, between: Events, design: int) -> tuple[list[Caution], list[str]]:
-        designs, along = self.poses.designs, between.along
+    def say(self, passage: Passage, design: int) -> tuple[list[Caution], list[str]]:
+        designs, along, between = self.poses.designs, passage.along, passage.between
         own = self if designs == 1 else self.at(self.poses.some(np.array([design])))
         valid = passage.reason.reshape(designs, -1)[design] == 0
         warnings = [*passage.cautions(design), *astray(own)]
@@ -157,9 +161,9 @@ class Kinematics(KinematicValues, MotionQuestion[Events]):
                     warnings.append(Caution("undefined", words, "motion"))
         return [*warnings, *cautions(self.study, between.cams, design)], []
 
-    def drawn(self, passage: Passage, between: Events) -> DrawnMotion:
-        shown = shown_of(self.study, passage)
-        return DrawnMotion(shown, passage.values, between.along, between.limits, between.toggles)
+    def drawn(self, passage: Passage) -> DrawnMotion:
+        shown, events = shown_of(self.study, passage), passage.between
+        return DrawnMotion(shown, passage.values, passage.along, events.limits, events.toggles)
 
 
 def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:

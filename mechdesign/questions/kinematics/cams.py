@@ -13,8 +13,7 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.passage import Remark
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.question import PoseValues, Remark
 from mechdesign.motion.rows import Poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM

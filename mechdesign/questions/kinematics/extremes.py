@@ -13,7 +13,7 @@ from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.rounding import STILL, cleared
 from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
-from mechdesign.questions.kinematics.targets import of_values
+from mechdesign.questions.kinematics.targets import error, judged
 from mechdesign.results import Table
 from mechdesign.statistics import no_value, no_value_along
 
@@ -53,8 +53,8 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
     turn = sizes["angle"]
     # Of each column, the size that rounding is compared with, and the unit.
     curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
-    errors = of_values(motion)
-    curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in errors}
+    targeted = {error(output): output for output in judged(study)}
+    curves |= {error(output): (sizes.get(kind, 0.0), label(kind)) for output, kind in judged(study).items()}
     curves |= {static.name: (static.size, static.unit) for static in question.statics}
     curves |= {name: (sizes["length"], label("length")) for name in question.clearances}
     for name, (quantity, order) in question.orders.items():
@@ -110,7 +110,6 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
         span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
-    targeted = {error.name: error.output for error in errors}
     lacking = _lacking(motion, along, [targeted.get(name, name) for name in curves])
     return replace(EXTREMES.table(EXTREMES.columns(
         of_swept(question.motion, swept, "place in rows (from 0)"),
@@ -133,14 +132,16 @@ def targets_table(motion: PoseValues, along: KinematicAlong | None) -> Table:
 
     `along` is the motion between the poses, None of listed poses and grids.
     """
-    study, poses, errors, valid = motion.question.study, motion.question.poses, of_values(motion), motion.valid
+    study, poses, valid = motion.question.study, motion.question.poses, motion.valid
+    errors, sizes = judged(study), motion.question.sizes
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
     at = poses.abscissa
     numbers = np.full((4, poses.designs, len(errors)), np.nan)
-    for k, error in enumerate(errors):
-        counted = (valid & np.isfinite(error.values)).reshape(shape)
+    for k, (output, quantity) in enumerate(errors.items()):
+        name, column = error(output), motion.arrays[error(output)]
+        counted = (valid & np.isfinite(column)).reshape(shape)
         some = counted.any(axis=1)
-        values = np.where(counted, error.values.reshape(shape), 0.0)[some]
+        values = np.where(counted, column.reshape(shape), 0.0)[some]
         worst = np.where(counted[some], np.abs(values), -1.0).argmax(axis=1)
         lane, (count, total, squares) = np.arange(len(worst)), motion.totals[:, some, k]
         numbers[:, some, k] = (
@@ -149,20 +150,19 @@ def targets_table(motion: PoseValues, along: KinematicAlong | None) -> Table:
             np.abs(values[lane, worst]),
             at.reshape(shape)[some][lane, worst],
         )
-        if along is not None and error.name in along.columns:
-            still = STILL * motion.question.sizes.get(error.quantity, 1.0)
-            value, place = along.worst(error.name, 1, absolute=True, still=still)
+        if along is not None and name in along.columns:
+            value, place = along.worst(name, 1, absolute=True, still=STILL * sizes.get(quantity, 1.0))
             between = np.stack([
-                np.sqrt(along.mean(error.name, 2)), along.mean(error.name), value,
+                np.sqrt(along.mean(name, 2)), along.mean(name), value,
                 along.shown(np.arange(len(place)), place),
             ])  # fmt: skip
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
-        numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * motion.question.sizes.get(error.quantity, 1.0))
+        numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * sizes.get(quantity, 1.0))
         numbers[3, numbers[2, :, k] == 0, k] = np.nan
     rms, mean, largest, where = numbers.reshape(4, -1)
     words = of_swept(motion.question.motion, swept, "row (from 0)")
-    units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
-    outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
+    units = np.tile(np.array([*map(study.units.label, errors.values())], dtype=str), poses.designs)
+    outputs = np.tile(np.array([*errors], dtype=str), poses.designs)
     columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)
-    table = TARGETS.table(columns, **over(along, [error.name for error in errors]))
-    return replace(table, lacking=_lacking(motion, along, [error.output for error in errors]))
+    table = TARGETS.table(columns, **over(along, [*map(error, errors)]))
+    return replace(table, lacking=_lacking(motion, along, [*errors]))

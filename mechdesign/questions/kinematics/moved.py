@@ -129,8 +129,7 @@ class MovedQuestion(PoseQuestion):
         smooth = _through_change_points(self, part, arrays)
         line, row = part.poses.places_along
         rows = (line * self.whole.line + row).astype(np.intp)
-        errors = targets.errors(self.study, self.whole, arrays, rows)
-        return {**arrays, THROUGH: smooth, **{error.name: error.values for error in errors}}
+        return {**arrays, THROUGH: smooth, **targets.errors(self.study, self.whole, arrays, rows)}
 
     @property
     def drives(self) -> list[Coordinate]:

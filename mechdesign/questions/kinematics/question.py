@@ -75,7 +75,7 @@ class KinematicQuestion(MovedQuestion):
         targeted = targets.needed(study, poses)
         return cls(
             study, section, study.motion(poses), poses, watched(study, section, [*shown, *targeted]),
-            section.inverse(mechanism.drives), list(shown.values()), dict(targets.followed(study, poses)), listed,
+            section.inverse(mechanism.drives), list(shown.values()), targets.followed(study, poses), listed,
             (section.outputs or section.jacobian) is not None and len(listed) == len(mechanism.drives), targeted,
             mechanism.cams,
         )  # fmt: skip

@@ -6,8 +6,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism.derivatives import STALLED
-from mechdesign.motion.passage import Remark
-from mechdesign.motion.question import PoseValues
+from mechdesign.motion.question import PoseValues, Remark
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import POSES_AT_ONCE
 from mechdesign.numerics.arrays import Flags

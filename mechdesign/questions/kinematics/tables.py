@@ -14,7 +14,7 @@ from mechdesign.motion.question import PoseValues
 from mechdesign.questions.columns import DRIVE, VALID, power_of_length
 from mechdesign.questions.kinematics.columns import INSTANT_CENTRES, JACOBIAN, MOTION
 from mechdesign.questions.kinematics.instant_centres import MOTIONS
-from mechdesign.questions.kinematics.targets import Error, of_values
+from mechdesign.questions.kinematics.targets import error, judged
 from mechdesign.questions.kinematics.values import entry
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -51,7 +51,7 @@ def centres_table(motion: PoseValues) -> Table:
 def motion_columns(motion: PoseValues) -> list[Column]:
     """The columns of the motion table, `valid` last."""
     question, arrays, label = motion.question, motion.arrays, motion.question.study.units.label
-    rates, errors = question.rates, of_values(motion)
+    rates, errors = question.rates, judged(question.study)
     shown = {output.name: output for output in question.outputs}
     drives = {drive.name: drive for drive in question.drives}
     columns = [column for column in pose_columns(motion) if column.name in drives or column.name not in shown]
@@ -63,9 +63,11 @@ def motion_columns(motion: PoseValues) -> list[Column]:
             if rate in rates:
                 columns.append(MOTION[f"<output>_{order}"].column(arrays[rate], rates[rate], output=name))
         point, _, axis = name.rpartition(".")
-        columns += [
-            _error(question.study, e) for e in errors if e.output == name or (axis == "y" and e.output == point)
-        ]
+        for owner, quantity in errors.items():
+            if owner == name or (axis == "y" and owner == point):
+                kind = "<point>_error" if owner in question.study.mechanism.points else "<output>_error"
+                values, unit = arrays[error(owner)], label(quantity)
+                columns.append(MOTION[kind].column(values, unit, point=owner, output=owner))
     rows = ", ".join(output.name for output in question.listed)
     lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
     area = power_of_length(question.study.units, lengths[0] - lengths[1])
@@ -90,13 +92,6 @@ def pose_columns(motion: PoseValues) -> list[Column]:
     named = {column.name for column in drives}
     timed = columns[:1] if question.poses.times is not None else []
     return [*timed, *drives, *(column for column in columns[len(timed) :] if column.name not in named)]
-
-
-def _error(study: Study, error: Error) -> Column:
-    far = error.output in study.mechanism.points
-    kind = MOTION["<point>_error" if far else "<output>_error"]
-    words = {"point": error.output, "output": error.output}
-    return kind.column(error.values, study.units.label(error.quantity), **words)
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:

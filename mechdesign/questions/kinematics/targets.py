@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,23 +23,6 @@ MAX_DISTANCES = 1 << 20
 TABLE_END_ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class Error:
-    """A coordinate less its target, or a point's distance from its path.
-
-    In the study's units, angles in (-half a turn, half a turn]; nan where the output or the target has no value.
-    """
-
-    output: str
-    quantity: Quantity
-    values: Floats
-
-    @property
-    def name(self) -> str:
-        """Name of the column."""
-        return f"{self.output}_error"
-
-
 def needed(study: Study, poses: Poses) -> tuple[str, ...]:
     """Coordinates whose values the errors need: those with targets, and those that targets depend on."""
     names: list[str] = []
@@ -51,26 +33,24 @@ def needed(study: Study, poses: Poses) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def followed(study: Study, poses: Poses) -> Iterator[tuple[str, Quantity]]:
-    """Names and quantities of the errors that have values between the poses: not of targets with a value for each."""
+def followed(study: Study, poses: Poses) -> dict[str, Quantity]:
+    """Quantities of the errors that have values between the poses, by column: not of targets with a value for each."""
+    each = [(owner, *target.coordinates) for owner, target in study.targets.items() if _a_value_each(target, poses)]
+    return {error(name): quantity for name, quantity in judged(study).items() if not any(name in own for own in each)}
+
+
+def error(output: str) -> str:
+    """Name of the column of its errors."""
+    return f"{output}_error"
+
+
+def judged(study: Study) -> dict[str, Quantity]:
+    """Outputs with targets and the quantities of their errors, a point's x and y before its distance."""
+    outputs: dict[str, Quantity] = {}
     for target in study.targets.values():
-        if _a_value_each(target, poses):
-            continue
-        for name in target.coordinates:
-            yield f"{name}_error", study.mechanism.quantity(name)
-        if len(target.coordinates) == 2:
-            yield f"{target.owner}_error", "length"
-
-
-def of_values(values: PoseValues) -> list[Error]:
-    """The errors among what a question has at its poses, a point's x and y before its distance."""
-    mechanism, errors = values.question.motion.mechanism, list[Error]()
-    for target in values.question.study.targets.values():
-        parts = [(name, mechanism.quantity(name)) for name in target.coordinates]
-        parts += [(target.owner, "length")] if len(parts) == 2 else []
-        errors += [Error(name, quantity, values.arrays[f"{name}_error"]) for name, quantity in parts
-                   if f"{name}_error" in values.arrays]  # fmt: skip
-    return errors
+        outputs |= {name: study.mechanism.quantity(name) for name in target.coordinates}
+        outputs |= {target.owner: "length"} if len(target.coordinates) == 2 else {}
+    return outputs
 
 
 def knots(study: Study, target: Target, poses: Poses) -> list[Corner]:
@@ -104,8 +84,11 @@ def _a_value_each(target: Target, poses: Poses) -> bool:
 
 def errors(
     study: Study, poses: Poses, values: Mapping[str, Floats], rows: Ints, *, between: bool = False
-) -> Iterator[Error]:
-    """Errors of all targets, a point's x and y before its distance.
+) -> dict[str, Floats]:
+    """Errors of all targets by their columns: a coordinate less its target, or a point's distance from its path.
+
+    They are in the study's units, angles in (-half a turn, half a turn]; nan where the output or the target has no
+    value.
 
     Parameters
     ----------
@@ -116,21 +99,21 @@ def errors(
     between : bool
         Whether they are values between the poses, where targets that are given for each pose have none.
     """
-    turn = 2 * np.pi / study.units.angle_factor
+    turn, columns = 2 * np.pi / study.units.angle_factor, dict[str, Floats]()
     for target in study.targets.values():
         goals = _goals(study, target, poses, values, rows, between)
         if goals is None:
             continue
         parts = []
         for name, should in zip(target.coordinates, goals, strict=True):
-            quantity = study.mechanism.quantity(name)
             gap = values[name] - should
-            if quantity == "angle":
+            if study.mechanism.quantity(name) == "angle":
                 gap = gap - turn * np.ceil(gap / turn - 0.5)
             parts.append(gap)
-            yield Error(name, quantity, gap)
+            columns[error(name)] = gap
         if len(parts) == 2:
-            yield Error(target.owner, "length", np.hypot(*parts))
+            columns[error(target.owner)] = np.hypot(*parts)
+    return columns
 
 
 def _goals(
@@ -222,17 +205,16 @@ def nearest(points: Complexes, corners: Complexes) -> tuple[Complexes, Ints]:
 
 def totals(values: PoseValues) -> Floats:
     """Number, sum, and sum of the squares of each design's errors at valid poses, shape (3, designs, errors)."""
-    errors, designs, valid = of_values(values), values.question.poses.designs, values.valid
-    sums = np.zeros((3, designs, len(errors)))
-    for k, error in enumerate(errors):
-        counted = (valid & np.isfinite(error.values)).reshape(designs, -1)
-        own = np.where(counted, error.values.reshape(counted.shape), 0.0)
+    outputs, designs, valid = judged(values.question.study), values.question.poses.designs, values.valid
+    sums = np.zeros((3, designs, len(outputs)))
+    for k, output in enumerate(outputs):
+        column = values.arrays[error(output)]
+        counted = (valid & np.isfinite(column)).reshape(designs, -1)
+        own = np.where(counted, column.reshape(counted.shape), 0.0)
         sums[:, :, k] = counted.sum(axis=1), own.sum(axis=1), (own**2).sum(axis=1)
     return sums
 
 
 def untargeted(values: PoseValues) -> dict[str, Flags]:
-    """By outputs, the valid poses where their target has no value."""
-    parts = {f"{owner}.{axis}" for owner in values.question.study.targets for axis in "xy"}
-    errors = of_values(values)
-    return {error.output: values.valid & ~np.isfinite(error.values) for error in errors if error.output not in parts}
+    """By outputs with targets, points among them, the valid poses where their target has no value."""
+    return {owner: values.valid & ~np.isfinite(values.arrays[error(owner)]) for owner in values.question.study.targets}

@@ -29,17 +29,8 @@ RESTS = "rests"
 STANDS_STILL = 1e-12
 
 
-class KinematicValues(KinematicQuestion):
-    """The question with what it has at solved poses."""
-
-    def moved(self, solved: SolvedPoses) -> tuple[dict[str, Value], Linearization]:
-        return _values(self, solved)
-
-    def pole(self, arrays: Mapping[str, Value], linear: Linearization, column: str) -> Value:
-        return _pole(self, arrays, linear, column)
-
-
-def _values(question: KinematicQuestion, solved: SolvedPoses) -> tuple[dict[str, Value], Linearization]:
+def values_of(question: KinematicQuestion, solved: SolvedPoses) -> tuple[dict[str, Value], Linearization]:
+    """What the question has at solved poses, and their loop equations."""
     mechanism, section, configuration = solved.motion.mechanism, question.section, solved.configuration
     arrays, linear, moving = question.positions(solved)
     regular = np.asarray(arrays["conditioning"]) >= STALLED
@@ -148,7 +139,7 @@ def _rests(linear: Linearization, output: Coordinate, mechanism: Mechanism) -> V
     return rests
 
 
-def _pole(question: KinematicQuestion, arrays: Mapping[str, Value], linear: Linearization, column: str) -> Value:
+def pole_of(question: KinematicQuestion, arrays: Mapping[str, Value], linear: Linearization, column: str) -> Value:
     """What is zero where a column of `KinematicQuestion.poled` goes to infinity: a rate, or the curvature of a cam."""
     name, advantages = column.removesuffix("_advantage"), question.section.mechanical_advantage
     if name in advantages:

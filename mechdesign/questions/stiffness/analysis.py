@@ -17,10 +17,9 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.along import BELOW, PlainAlong
-from mechdesign.motion.answer import Between, MotionQuestion, alone
+from mechdesign.motion.answer import alone
 from mechdesign.motion.motion import Motion, SolvedPoses
-from mechdesign.motion.passage import Passage
-from mechdesign.motion.question import PoseValues, unfilled
+from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, unfilled
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_rows
 from mechdesign.numerics.arrays import Floats, Ints
@@ -116,7 +115,7 @@ def _made(name: str, values: PoseValues) -> Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness(MotionQuestion[Between]):
+class Stiffness(MotionQuestion):
     """What a study asks of the stiffness of a body; only some tables."""
 
     body: Body
@@ -196,10 +195,7 @@ class Stiffness(MotionQuestion[Between]):
             numbers[f"{BELOW}{name}"] = zero if (np.abs(zero) > RIGID * np.abs(stiff)).any() else np.ones(len(zero))
         return numbers
 
-    def between(self, passage: Passage) -> Between:
-        return Between(None)
-
-    def tables(self, passage: Passage, between: Between) -> dict[str, Table]:
+    def tables(self, passage: Passage) -> dict[str, Table]:
         return self.chosen(passage.values, self.names)
 
     def chosen(self, values: PoseValues, names: Collection[str]) -> dict[str, Table]:
@@ -227,11 +223,11 @@ class Stiffness(MotionQuestion[Between]):
             makers["displacements"] = lambda: displacements_table(motion, body.network, effects)
         return {name: make() for name, make in makers.items() if name in names}
 
-    def uneven(self, passage: Passage, between: Between) -> Mapping[str, Ints]:
+    def uneven(self, passage: Passage) -> Mapping[str, Ints]:
         designs = self.poses.designs
         return {"springs": _springs(passage.values).counts(designs, self.poses.count // designs)}
 
-    def say(self, passage: Passage, between: Between, design: int) -> tuple[list[Caution], list[str]]:
+    def say(self, passage: Passage, design: int) -> tuple[list[Caution], list[str]]:
         """Under-constrained poses, links without a beam, and legs without a free joint."""
         held, count = _read(Held, passage.values), self.poses.count // self.poses.designs
         rows = slice(design * count, (design + 1) * count)
@@ -254,7 +250,7 @@ class Stiffness(MotionQuestion[Between]):
             *(assumed(self.body.study) if self.body.given.dynamics else ()),
         ], []
 
-    def drawn(self, passage: Passage, between: Between) -> DrawnStiffness:
+    def drawn(self, passage: Passage) -> DrawnStiffness:
         """The shown poses, the first valid one, and the first with a free twist."""
         values = passage.values
         first, loose = (
