@@ -211,9 +211,9 @@ def _python(page: Page, body: str, where: int) -> None:
     page.printed = stream.getvalue()
 
 
-def _run(tools: Path, path: Path) -> tuple[str, list[str]]:
-    """The text of a page as it would be true, and what is wrong with it as it is."""
-    folder = RUN / path.relative_to(ROOT).with_suffix("")
+def run(tools: Path, path: Path, base: Path = RUN) -> tuple[str, list[str]]:
+    """The text of a page as it would be true, and what is wrong with it as it is; it is run in a folder of `base`."""
+    folder = base / path.relative_to(ROOT).with_suffix("")
     # What an earlier run has left could make a page true that is not.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -250,14 +250,14 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
 def wrong(paths: Iterable[Path]) -> list[str]:
     """Run the examples of these pages; what is wrong with them, in words."""
     with forked() as tools, ThreadPoolExecutor(os.cpu_count()) as pool:
-        return [words for _, told in pool.map(partial(_run, tools), paths) for words in told]
+        return [words for _, told in pool.map(partial(run, tools), paths) for words in told]
 
 
 def main() -> None:
     """Write into the pages what their commands print now."""
     with forked() as tools:
         for path in pages(sys.argv[1:]):
-            text, told = _run(tools, path)
+            text, told = run(tools, path)
             path.write_text(text, encoding="utf-8")
             print(*told, sep="\n")
 

@@ -530,6 +530,7 @@ def test_a_working_folder_that_was_removed_is_told(here, arguments):
     assert done.stderr.startswith("the working folder is not there any more"), done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["MPLCONFIGDIR", "HOME"])
 def test_matplotlib_says_nothing_of_its_cache(here, name):
     nowhere = {"MPLCONFIGDIR": "", "XDG_CACHE_HOME": "", "XDG_CONFIG_HOME": "", name: "/proc/nowhere"}
@@ -632,6 +633,7 @@ def test_a_lack_of_memory_is_known_whoever_meets_it(error, known):
     assert explain(error)[1].startswith("not enough memory" if known else "internal error")
 
 
+@pytest.mark.nightly
 def test_too_few_files_for_the_workers(here):
     """Those that were forked before there was no room do not wait for work for ever."""
     command = [*COMMAND, "optimize", "arm.yaml", "--no-plots", "--jobs", "8"]

@@ -135,6 +135,7 @@ def test_the_same_bytes(here, invoke, command):
     assert contents(here / "there") == contents(here / "out")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("command", "told"),
     [
@@ -157,6 +158,7 @@ def test_ctrl_c(here, command, told):
     assert not any(each.is_running() for each in there)
 
 
+@pytest.mark.nightly
 def test_a_script_without_a_guard(here):
     """New processes do not run it again."""
     (here / "script.py").write_text("""

@@ -125,6 +125,7 @@ def test_a_page_holds_all_of_a_study(asks, invoke):
     assert "2 of 3 requirements met" in page.text
 
 
+@pytest.mark.nightly
 def test_the_same_study_gives_the_same_page(folder, invoke):
     for out in ("one", "two"):
         invoke("run", "slider.yaml", "--report", "--out", out)

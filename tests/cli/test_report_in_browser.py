@@ -514,7 +514,7 @@ def test_a_column_sorts_a_table_by_a_click_and_by_a_key(opened):
     assert cases.all_inner_texts() == ["1", "2", "3"]
 
 
-@pytest.mark.parametrize("width", [400, 1400])
+@pytest.mark.parametrize("width", [400, pytest.param(1400, marks=pytest.mark.nightly)])
 def test_nothing_is_wider_than_the_screen(opened, width):
     for name in ("slider_crank", "five_bar", "straight_line_front", "offset_slider_crank"):
         page = opened(name, width)

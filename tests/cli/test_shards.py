@@ -34,6 +34,7 @@ def content(folder):
     return {name: data.replace(str(folder).encode() + b"/", b"") for name, data in found.items()}
 
 
+@pytest.mark.nightly
 def test_four_shards_merged_are_one_run(studies, invoke):
     names = ["two_link_arm.yaml", "straight_line_synthesis.yaml", "offset_slider_crank.yaml"]
     common = ["--no-plots", "--set", "seed=3"]

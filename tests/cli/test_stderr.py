@@ -123,6 +123,7 @@ def test_no_line_of_a_library_is_seen_where_shipped_studies_run(tmp_path):
 SOME = pytest.mark.parametrize("numbers", [["1e308", "1e59"], pytest.param(NUMBERS, marks=pytest.mark.nightly)])
 
 
+@pytest.mark.nightly
 @SOME
 def test_no_line_of_a_library_is_seen_whatever_the_numbers(numbers, tmp_path):
     studies = [(FOUR_BAR + ASKED, [f"{place}={number}"], QUESTIONS_ASKED) for place, number in product(PLACES, numbers)]
@@ -131,6 +132,7 @@ def test_no_line_of_a_library_is_seen_whatever_the_numbers(numbers, tmp_path):
     assert lines_of_libraries(said) == []
 
 
+@pytest.mark.nightly
 @SOME
 def test_no_line_of_a_library_is_seen_whatever_stands_in_files(numbers, tmp_path):
     commands = []

@@ -199,6 +199,7 @@ def one_picture(*given):
     return gallery
 
 
+@pytest.mark.nightly
 def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeypatch):
     monkeypatch.setattr(pictures, "figures", one_picture)
     monkeypatch.setattr(terminal, "_is_terminal", lambda: True)

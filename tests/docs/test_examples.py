@@ -1,9 +1,36 @@
-"""Examples of pages: what counts as the output that a page shows."""
+"""Examples of pages do what the pages say, and what counts as the output that a page shows."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
 import examples
 import pytest
+from forking import forked
+
+LINK = re.compile(r"\]\((?!\w+:)([^)#\s.][^)#\s]*|\.\.?/[^)#\s]+)(?:#[^)]*)?\)")
+# Pages and pictures that are made while the site is built.
+MADE = {"gallery", "study", "tables", "lists", "papers.md", "_run"}
+
+
+@pytest.fixture(scope="session")
+def tools() -> Iterator[Path]:
+    """The folder of a `mechdesign` that begins at once."""
+    with forked() as folder:
+        yield folder
+
+
+@pytest.mark.parametrize("page", examples.pages(), ids=lambda page: str(page.relative_to(examples.ROOT)))
+def test_a_page_shows_what_its_commands_do(page: Path, tools: Path, tmp_path: Path) -> None:
+    assert examples.run(tools, page, tmp_path)[1] == []
+
+
+@pytest.mark.parametrize("page", examples.pages(), ids=lambda page: str(page.relative_to(examples.ROOT)))
+def test_links_of_a_page_lead_to_files(page: Path) -> None:
+    targets = [page.parent / target for target in LINK.findall(page.read_text(encoding="utf-8"))]
+    assert [target for target in targets if not MADE.intersection(target.parts) and not target.exists()] == []
 
 
 @pytest.mark.parametrize(

@@ -160,6 +160,7 @@ def manifest(result: Result, study: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.nightly
 def test_columns_of_answers_that_no_shipped_study_asks_for_are_in_the_reference():
     assert {name: unsaid(manifest(result, study)) for name, result, study in asked()} == {
         name: [] for name, *_ in asked()

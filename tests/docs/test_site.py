@@ -65,6 +65,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
+@pytest.mark.nightly
 def test_the_site_asks_for_nothing_from_anywhere(site: Path) -> None:
     pages = sorted(site.rglob("*.html"))
     assert len(pages) > 80
@@ -76,6 +77,7 @@ def test_the_site_asks_for_nothing_from_anywhere(site: Path) -> None:
         assert IN_STYLE.findall(style.read_text(encoding="utf-8")) == [], style
 
 
+@pytest.mark.nightly
 def test_every_command_and_option_is_in_the_site(site: Path) -> None:
     text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     for name, command in typer.main.get_command(app).commands.items():
@@ -90,6 +92,7 @@ def test_a_request_would_be_found() -> None:
     assert requests.found == ["img //a.b/c.png", "url(https://a.b/d"]
 
 
+@pytest.mark.nightly
 @pytest.mark.browser
 def test_a_search_for_a_word_of_the_field_shows_its_page_first(site: Path, browser: Browser) -> None:
     page = browser.new_page()
@@ -101,6 +104,7 @@ def test_a_search_for_a_word_of_the_field_shows_its_page_first(site: Path, brows
     assert first == WORDS
 
 
+@pytest.mark.nightly
 def test_thumbnails_are_small(site: Path) -> None:
     sizes = {
         path.name: path.stat().st_size for path in (site / "_images").glob("*.svg") if "@keyframes" in path.read_text()

@@ -183,12 +183,11 @@ def judge(seed: int) -> None:
     assert not [warning for warning in result.warnings if warning.kind == "unconverged"]
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_nothing_narrow_is_passed_in_four_random_motions(seed: int) -> None:
-    judge(seed)
+def test_nothing_narrow_is_passed_in_a_random_motion() -> None:
+    judge(1)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("seed", range(4, 104))
+@pytest.mark.parametrize("seed", [0, *range(2, 104)])
 def test_nothing_narrow_is_passed_in_a_hundred_random_motions(seed: int) -> None:
     judge(seed)

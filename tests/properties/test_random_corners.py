@@ -101,9 +101,8 @@ MAKERS = (kinematic, path, dynamic, coupled_by_table)
 
 
 @pytest.mark.parametrize("make", MAKERS)
-def test_narrow_loads_measures_and_couplings_of_some_motions_are_seen(make: Callable[[int], Case]) -> None:
-    for seed in range(4):
-        check(make(seed), seed, 20_001)
+def test_narrow_loads_measures_and_couplings_of_a_motion_are_seen(make: Callable[[int], Case]) -> None:
+    check(make(0), 0, 20_001)
 
 
 @pytest.mark.nightly

@@ -45,9 +45,8 @@ def check_flywheel(seed: int) -> None:
     near(wheel["added_inertia"][0], added, max(added, inertia), about)
 
 
-def test_flywheels_of_some_random_cycles() -> None:
-    for seed in range(4):
-        check_flywheel(seed)
+def test_flywheel_of_a_random_cycle() -> None:
+    check_flywheel(0)
 
 
 @pytest.mark.nightly

@@ -243,7 +243,7 @@ def at_points(case: Loaded, rows: Sequence[Row]) -> Mapping[tuple[str, str], Com
 CHECKS = (judge_efforts, judge_equilibrium, judge_joints)
 
 
-@settings(max_examples=25)
+@settings(max_examples=8)
 @given(loaded())
 def test_forces_of_some_mechanisms(case: Loaded) -> None:
     for judge in CHECKS:
@@ -258,7 +258,7 @@ def test_forces_of_two_hundred_mechanisms(case: Loaded) -> None:
         judge(case)
 
 
-@settings(max_examples=15)
+@settings(max_examples=5)
 @given(loaded(coupled=True))
 def test_forces_of_some_coupled_mechanisms(case: Loaded) -> None:
     for judge in CHECKS:

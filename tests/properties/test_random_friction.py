@@ -37,7 +37,7 @@ def bodies_effort(case: Rubbed, name: str) -> np.ndarray:
     return case.bodies.virtual[name]
 
 
-@settings(max_examples=12)
+@settings(max_examples=4)
 @given(rubbed())
 def test_friction_of_some_mechanisms(case: Rubbed) -> None:
     judge(case)

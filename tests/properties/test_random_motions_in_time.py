@@ -67,12 +67,6 @@ def judge(case: Rubbed) -> None:
         np.testing.assert_allclose(case.bodies.multipliers["drive", name][:, 0], effort, atol=EXACT * largest, rtol=0)
 
 
-@settings(max_examples=2)
-@given(rubbed())
-def test_motions_of_some_mechanisms(case: Rubbed) -> None:
-    judge(case)
-
-
 @pytest.mark.nightly
 @settings(max_examples=20)
 @given(rubbed())

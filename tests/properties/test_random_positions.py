@@ -313,7 +313,7 @@ def test_a_thousand_couplings_move_as_the_drives_that_give_the_same(made: Made) 
     check_driven(made)
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(mechanisms(coupled=True))
 def test_some_couplings_move_as_the_drives_that_give_the_same(made: Made) -> None:
     check_driven(made)

@@ -88,6 +88,7 @@ def test_boom_cylinder_of_the_excavator_holds_the_moment_of_all_weights() -> Non
     assert table["boom_length_effort"] == pytest.approx(moment / lever, rel=1e-11)
 
 
+@pytest.mark.nightly
 def test_a_braked_pendulum_sticks_inside_of_its_circle_of_friction() -> None:
     result = result_of("braked_pendulum")
     table, events = result.main, result.tables["events"]
@@ -100,6 +101,7 @@ def test_a_braked_pendulum_sticks_inside_of_its_circle_of_friction() -> None:
     assert energy - energy[0] == pytest.approx(table["friction_work"], abs=1e-9 * table["kinetic_energy"].max())
 
 
+@pytest.mark.nightly
 def test_pendulum_passes_its_lowest_place_every_half_of_its_period() -> None:
     """4 sqrt(J / (m g r)) K(sin^2(a / 2)), K the complete elliptic integral of the first kind, a = 170 deg."""
     result = result_of("pendulum")

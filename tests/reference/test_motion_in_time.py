@@ -27,6 +27,7 @@ def balance(table: Table) -> np.ndarray:
     return np.asarray(energy - energy[0])
 
 
+@pytest.mark.nightly
 def test_a_physical_pendulum_swings_with_the_period_of_the_elliptic_integral() -> None:
     # Period 4 sqrt(J / (m g r)) K(sin^2(a / 2)), a the amplitude: passes its lowest place every half of it.
     amplitude = 2.5
@@ -46,6 +47,7 @@ dynamics:
     assert np.abs(balance(table)).max() < 1e-9 * table["kinetic_energy"].max()
 
 
+@pytest.mark.nightly
 def test_andrews_squeezer_moves_to_its_published_state() -> None:
     # CWI test set, state at 0.03 s: see `SQUEEZER`; nine digits of the printed ones agree.
     text = SQUEEZER.split("dynamics:")[0] + (
@@ -68,9 +70,8 @@ dynamics: {{gravity: [0, -9.81], forward: {{duration: 2, start: {{t1: 1, t2: 1}}
     assert np.abs(balance(table)).max() < 1e-9 * table["kinetic_energy"].max()
 
 
-@pytest.mark.parametrize(
-    ("count", "energy", "angle"), [(2, 1e-9, 1e-7), pytest.param(40, 5e-9, 1e-6, marks=pytest.mark.nightly)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("count", "energy", "angle"), [(2, 1e-9, 1e-7), (40, 5e-9, 1e-6)])
 def test_four_bars_go_through_the_pose_in_which_all_links_lie_on_a_line(
     count: int, energy: float, angle: float
 ) -> None:

@@ -211,6 +211,7 @@ def test_crossings_near_the_turning_points_of_a_swing_are_all_found(swings: int)
                     .tables["events"]["time"]).all()  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_a_follower_that_lifts_off_between_two_instants_is_said() -> None:
     # At a constant speed w it is pulled where g + s'' w^2 < 0, of s = 0.4 (cos(turn) - 0.9)^2 within 26 degrees.
     speed = 12.0

@@ -39,6 +39,7 @@ def structural_error(x1: float, x3: float) -> float:
     return float(np.degrees(min(np.abs(error).max() for error in errors)))
 
 
+@pytest.mark.nightly
 def test_function_generator_with_the_best_three_exact_values() -> None:
     """Every design of the grid against Freudenstein's equation; better than Chebyshev's spacing."""
     tables = optimised("function_generator")

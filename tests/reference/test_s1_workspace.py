@@ -69,6 +69,7 @@ def test_table_1(row: int) -> None:
         assert optimum[name][row] == pytest.approx(value, rel=TOLERANCE[name]), name
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("row", range(7))
 def test_table_2(row: int) -> None:
     """l_b = 1.0 of two rows is a misprint of 2.0: the grid's l_b is l_max - l_a."""

@@ -256,6 +256,7 @@ def test_the_shaft_bears_the_moment_of_the_contact_force(follower: str) -> None:
     np.testing.assert_allclose(result.tables["dynamics"]["disc_effort"], (np.conj(place) * on_arm).imag, atol=1e-8)
 
 
+@pytest.mark.nightly
 def test_a_follower_that_is_pulled_lifts_off() -> None:
     text = LOADED.replace("[0, -50]", "[0, 50]")
     assert any(

@@ -371,7 +371,7 @@ kinematics:
     assert (limits["C.x"][0], limits["C.y"][0]) == pytest.approx((part, 170 - 130 * part), rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_size_of_a_force_that_changes_its_sign_is_zero_there():
     """The rod of a crank that a load at B alone pushes bears F/cos: it is zero with the load, and never negative."""
     answer = mechdesign.dynamics(

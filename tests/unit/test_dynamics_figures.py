@@ -92,6 +92,7 @@ def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
             assert abs(sum(moments)) < 1e-11 * largest * study.mechanism.size
 
 
+@pytest.mark.nightly
 def test_every_picture_of_a_motion_is_drawn_and_laid_out() -> None:
     names = set(drawn(mechdesign.load(text=SPRUNG)))
     assert names == {"free_bodies", "efforts", "joint_forces", "bearings", "shaking", "energies"}

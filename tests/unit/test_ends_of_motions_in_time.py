@@ -46,7 +46,8 @@ FOLLOWER = """, follower: {points: {F: [0, 0]}, mass: 3}}
                  marks=pytest.mark.nightly),
     pytest.param("efforts: {door: '-9*door_velocity/abs(door_velocity)'}", "",
                  "the effort of door turns the motion back", 5 / 9, marks=pytest.mark.nightly),
-    ("", f"of: door, table: {TABLE}", "coupling cam has no value from 0.39", None),
+    pytest.param("", f"of: door, table: {TABLE}", "coupling cam has no value from 0.39", None,
+                 marks=pytest.mark.nightly),
 ])  # fmt: skip
 def test_what_has_no_value_further_on_is_named_and_nothing_is_met(
     forward: str, mechanism: str, reason: str, time: float | None

@@ -254,6 +254,7 @@ kinematics:
 """
 
 
+@pytest.mark.nightly
 def test_a_goal_does_not_contradict_the_condition_on_the_same():
     optimize = """
 optimize:

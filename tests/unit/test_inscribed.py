@@ -126,7 +126,7 @@ workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: i
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_shape_that_a_singularity_crosses_is_told() -> None:
     """In any assembly of a five-bar the rods come in line inside the region; in the sketch's they bound it."""
     warnings = [str(warning) for warning in mechdesign.workspace(study_of(CROSSED)).warnings]

@@ -132,7 +132,7 @@ def test_limits_are_named_by_what_they_limit() -> None:
         assert np.abs(z[rows] - base) == pytest.approx(np.full(rows.sum(), length), abs=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_boundary_point_of_an_arm_says_why() -> None:
     """Stretched and folded on circles about the base; the joint limit's arcs on circles about the held elbow."""
     edge = mechdesign.workspace(study_of(ARM)).tables["boundary"]
@@ -150,6 +150,7 @@ def test_every_boundary_point_of_an_arm_says_why() -> None:
     assert gaps.max() < 1e-9
 
 
+@pytest.mark.nightly
 def test_parallel_singularities_of_a_platform() -> None:
     """The lines of its three legs meet in one point (or are parallel): their moments depend on each other."""
     limits = (

@@ -60,7 +60,10 @@ def number(part, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "jansen", "whitworth"])
+@pytest.mark.parametrize(
+    "name",
+    ["four_bar", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("slider_crank", "jansen", "whitworth"))],
+)
 def test_at_steps_of_45_degrees_pins_and_numbers_are_where_the_solver_has_them_between(name):
     step = 45 / 32
     part, _ = shown(name, "kinematics.sweep.crank.step=45")
@@ -253,6 +256,7 @@ def test_time_goes_as_the_rates_have_it():
         assert times / 10000 * 360 == pytest.approx(turned, abs=rounding + 0.02)
 
 
+@pytest.mark.nightly
 def test_poses_that_cannot_be_assembled_are_said():
     part, result = shown("rrr_platform")
     bad = np.flatnonzero(result.tables["motion"]["valid"] == 0)
@@ -268,7 +272,7 @@ def test_a_motion_of_361_poses_is_small_and_the_same_again():
     assert len(part.drawing) + len(part.beside) + len(json.dumps(part.data)) < 200_000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_in_a_workspace_every_pose_keeps_the_links_and_has_its_numbers_from_the_table():
     study = load(FOLDER.parent / "five_bar.yaml")
     result = workspace(study)

@@ -14,12 +14,15 @@ import mechdesign
 ARM = "{ground: {A: [0, 0]}, upper: [A, B, 1], fore: [B, P, 0.5]}"
 
 
+SEEN = [("five_bar", "same", 25), ("3-RRR", "same", 19), ("arm", "any", 11), ("arm", "any", 165), ("arm", "same", 55)]
+NIGHTLY = [("five_bar", "same", 15), ("five_bar", "same", 87), ("five_bar", "same", 89), ("five_bar", "any", 25),
+           ("arm", "any", 27), ("arm", "same", 13)]  # fmt: skip
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "assembly", "seed"), [("five_bar", "same", 15), ("five_bar", "same", 25),
-                         ("five_bar", "same", 87), ("five_bar", "same", 89), ("3-RRR", "same", 19),
-                         ("arm", "any", 11), ("arm", "any", 27), ("arm", "any", 165),
-                         ("arm", "same", 55), ("arm", "same", 13),
-                         pytest.param("five_bar", "any", 25, marks=pytest.mark.nightly)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "assembly", "seed"), [*SEEN, *(pytest.param(*case, marks=pytest.mark.nightly) for case in NIGHTLY)]
+)
 def test_spikes_bumps_between_samples_and_other_elbows_are_part_of_regions(kind: str, assembly: str, seed: int) -> None:
     compare(KINDS[kind].of(seed), assembly, "of many")
 

@@ -100,6 +100,7 @@ def test_crowding_is_the_gap_between_neighbours():
     assert crowding(values) == pytest.approx([np.inf, 0.5 + 0.75, 0.75 + 0.5, np.inf])
 
 
+@pytest.mark.nightly
 def test_front_of_an_arm_and_its_knee():
     result = mechdesign.optimize(study_of(ARM))
     table = result.main
@@ -175,7 +176,8 @@ def hypervolume(values, corner):
     return float(np.sum(np.diff(np.append(x, corner)) * (corner - y)))
 
 
-@pytest.mark.parametrize("name", ["zdt1", pytest.param("zdt3", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["zdt1", "zdt3"])
 def test_the_default_front_has_nearly_all_of_the_hypervolume(name):
     whole = FRONTS[name].hypervolume
     result = mechdesign.optimize(FRONTS[name].study(5))

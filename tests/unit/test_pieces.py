@@ -273,7 +273,7 @@ def design_area(text: str, limit: str, sizes: str) -> float:
     return float(mechdesign.optimize(study).tables["designs"]["area"][0])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_breaks_between_alike_rays_do_not_lose_a_piece() -> None:
     """A bay that opens and ends between two rays: its neighbours were no part of any piece."""
     text = """
@@ -336,7 +336,7 @@ workspace: {point: P, indices: []}
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_expression_that_turns_often_along_a_ray() -> None:
     """Three sectors of an arm, of which the sketch's counts."""
     text = SECTORS.replace("A: [5, 4], P: [5, 11]", "A: [8, 6], P: [8, 12]")

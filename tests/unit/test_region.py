@@ -95,7 +95,7 @@ def test_joint_limits_just_short_of_a_turn(about: str) -> None:
     assert found == pytest.approx(1.5 * np.radians(320) * 2 * np.cos(np.radians(1)), rel=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_limit_of_the_forearm_gives_two_arcs_and_their_sweep() -> None:
     """The forearm within 120 deg of the world: the elbow's circle moved along, with the elbow on one side only."""
     limits = "mechanism.limits=[{angle: [ground, lower], min: -60, max: 60}]"
@@ -168,7 +168,7 @@ def test_common_part_of_two_rings(low: float, high: float, about: str) -> None:
     assert found == pytest.approx(rings(low, high), rel=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_band_of_a_measure_leaves_pieces() -> None:
     limits = (
         "mechanism.limits=[{drive: l1, min: low, max: high}, {drive: l2, min: low, max: high}, "

@@ -33,7 +33,7 @@ def shown(result: Any) -> Any:
         return page.front(result.drawn.designs, result.tables["pareto"], "front")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_design_moves_as_its_own_study_does(asked: Any) -> None:
     study, result = asked
     table, moving = result.tables["pareto"], shown(result)

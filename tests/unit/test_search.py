@@ -282,7 +282,7 @@ def test_best_designs_are_apart():
             assert apart > 0.05 * 9
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_same_seed_same_bits_whatever_the_jobs():
     study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.method=search", "optimize.evaluations=60"])
     one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
