@@ -37,6 +37,8 @@ _SECONDS = 1.0
 _GROWTH = 8
 # Seconds of work that this process does alone, before others begin: about what it costs to begin them.
 _FORKED, _FRESH = 0.03, 0.5
+# Part of the work to come that counts as if this process had done it: where much is left, others begin sooner.
+_TO_COME = 0.1
 
 
 class LostWorkerError(MechdesignError):
@@ -77,7 +79,7 @@ class Pool:
         return self.executor if isinstance(self.executor, Processes) else None
 
     def work(self, seconds: float) -> None:
-        """This process has worked alone; open the executor if that is enough."""
+        """This process has worked alone, or would have to; open the executor if that is enough."""
         self._patience -= seconds
         if self._patience <= 0:
             self.executor = self._open()
@@ -175,9 +177,10 @@ class ChunkMap(Generic[Item, Value]):
                 return
             values, seconds = _timed(self._function, own)
             yield from values
+            if (left := length_hint(source, 2)) > 1:
+                # The first chunk may have imported much, and says nothing of those that are left.
+                self._pool.work(seconds * (1.0 + _TO_COME * left) if begun else seconds)
             begun += 1
-            if length_hint(source, 2) > 1:
-                self._pool.work(seconds)
         left, tasks = length_hint(source), deque[_Task]()
         try:
             while True:
