@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -10,19 +10,21 @@ from typing import Any
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.experiments.answered import Answered, Sheet
-from mechdesign.experiments.case_numbers import CaseNumber
+from mechdesign.experiments.case_numbers import number_of
 from mechdesign.family import stacked
+from mechdesign.family.goals import Goal
 from mechdesign.family.structures import Form, Structures, Values
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Ints
-from mechdesign.questions.look import look, with_fewer_rows
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
+from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks
@@ -39,7 +41,7 @@ def seeded(study: Study, seed: int | None) -> Study:
 
 
 def answers(
-    study: Study, cases: Sequence[Changes], results: Sequence[CaseNumber] = (), *, begin: int = 0, jobs: int | None = 1,
+    study: Study, cases: Sequence[Changes], results: Sequence[Goal] = (), *, begin: int = 0, jobs: int | None = 1,
     shard: Shard = WHOLE,
 ) -> Iterator[Answered]:  # fmt: skip
     """Verdicts on the requirements and the `results` of the cases of a study, batch by batch.
@@ -57,7 +59,7 @@ def answers(
 class Answer:
     """Answers cases of a study; numbers of entries that it leaves out are those of the `first` of them."""
 
-    def __init__(self, study: Study, results: tuple[CaseNumber, ...], first: Changes) -> None:
+    def __init__(self, study: Study, results: tuple[Goal, ...], first: Changes) -> None:
         self._study, self._results = study, results
         self._structures = Structures(study, dict(first))
 
@@ -129,7 +131,7 @@ class Answer:
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
         """Answer designs of a study, each a case; a study without changes is that of all the cases."""
         for command in commands_of(designs.study, self._results):
-            for group in stacked.answers(designs, command).groups:
+            for group in stacked.answers(designs, command):
                 for some in [rows[group.rows]] if designs.changed else rows[:, None]:
                     sheet.note(some, group)
 
@@ -140,37 +142,29 @@ def is_number(value: Any) -> bool:
     return number or (isinstance(value, str) and QUANTITY.fullmatch(value) is not None)
 
 
-def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:
+def commands_of(study: Study, results: Iterable[Goal]) -> tuple[str, ...]:
     """The commands that compute the requirements of a study and some results."""
-    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in results}
+    needed = {command_of(requirement) for requirement in study.requirements} | {goal.command for goal in results}
     return tuple(command for command in COMMANDS if command in needed)
 
 
-def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
+def foresee(study: Study, results: Mapping[Goal, KeyPath]) -> None:
     """Find results and requirements that no table has, by a short look at each command's answer.
+
+    `results` are with their places in the study.
 
     Raises
     ------
     StudyError
         Every such mistake in one go, with its place.
     """
-    results = tuple(results)
-    problems: list[Problem] = []
-    for command in commands_of(study, results):
-        try:
-            result = look(study, command)
-        except AssemblyError:
-            # A case with other numbers may assemble.
-            continue
-        for number in results:
-            if number.command == command:
-                try:
-                    number.find(DesignGroup.alone(result))
-                except UnknownColumnError as error:
-                    problems.append(study.problem(str(error), *number.keys))
-        try:
-            requirements.requirements(study, result, fewer=with_fewer_rows(result))
-        except StudyError as error:
-            problems += error.problems
-    if problems:
-        raise StudyError(problems)
+
+    def unknown(result: Result) -> Iterator[Problem]:
+        for goal, place in results.items():
+            try:
+                if goal.command == result.command:
+                    number_of(goal, DesignGroup.alone(result))
+            except UnknownColumnError as error:
+                yield study.problem(str(error), *place)
+
+    requirements.foresee(study, COMMANDS, also={goal.command: unknown for goal in results})

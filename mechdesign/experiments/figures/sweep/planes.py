@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from mechdesign.experiments.figures.sweep.quantities import MOST_DRAWN, CaseAxis
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
@@ -106,26 +105,15 @@ class Plane:
 
     def over(self, values: Floats) -> Floats:
         """Values at the places, interpolated, shape (fine y, fine x); nan beside a place without one."""
+        from scipy.interpolate import LinearNDInterpolator, RegularGridInterpolator
+
         x, y = np.meshgrid(*self.fine)
         if not self.grid:
-            return np.asarray(LinearTriInterpolator(self._mesh, values[self._corners])(x, y).filled(np.nan))
-        from scipy.interpolate import RegularGridInterpolator
-
+            corners = evenly(len(self.cells), MOST_DRAWN)
+            return np.asarray(LinearNDInterpolator(self.where[corners], values[corners], rescale=True)(x, y))
         table = np.full((len(self.steps[0]), len(self.steps[1])), np.nan)
         table.flat[self.cells] = values
         return np.asarray(RegularGridInterpolator(self.steps, table)((x, y)))
-
-    @cached_property
-    def _corners(self) -> Ints:
-        """Places between which triangles are laid."""
-        return evenly(len(self.cells), MOST_DRAWN)
-
-    @cached_property
-    def _mesh(self) -> Triangulation:
-        corners = self.where[self._corners]
-        # Triangles are well shaped where both entries count alike.
-        shares = self._shares(corners)
-        return Triangulation(corners[:, 0], corners[:, 1], Triangulation(shares[:, 0], shares[:, 1]).triangles)
 
     def field(self, values: Floats, counted: Flags, reduction: Reduction) -> Floats:
         """A result over the plane, of the cases that count at each place; of all of them where these have no number."""

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import FuncFormatter
-from matplotlib.tri import Triangulation
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.figures.designs import (
@@ -203,27 +202,21 @@ def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> 
         levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
     elif not near.all():
         extend = "max" if smallest else "min"
+    options = {"extend": extend, "format": digits}
     if not on_a_grid or len(steps[0]) < 2 or len(steps[1]) < 2 or len(z) < 4:
         order = np.argsort(designs.cpi[inside] if any(goal.smallest for goal in designs.goals) else z)
         axes.margins(0.03)
         dots = axes.scatter(x[order], y[order], c=z[order], s=14, cmap=style.COLORMAP, norm=norm, linewidths=0)
-        return dots, {"extend": extend, "format": digits}
-    if len(z) < FEWEST_OF_FIELD:
-        half = np.array([np.median(np.diff(step)) / 2 for step in steps])
-        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-        cells = PolyCollection(np.column_stack([x, y])[:, None] + corners, array=z, cmap=style.COLORMAP, norm=norm)
-        axes.add_collection(cells)
-        axes.margins(0.02)
-        return cells, {"extend": extend, "format": digits}
-    # In steps of the grid triangles are well shaped; those that span missing designs are left out.
-    scaled = [(v - v.min()) / np.median(np.diff(step)) for v, step in zip((x, y), steps, strict=True)]
-    mesh = Triangulation(*scaled)
-    corners = np.stack([mesh.x[mesh.triangles], mesh.y[mesh.triangles]])
-    mesh = Triangulation(x, y, mesh.triangles, mask=(np.ptp(corners, axis=2) > 2.01).any(axis=0))
-    filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
-    axes.tricontour(mesh, z, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
+        return dots, options
+    table = np.full((len(steps[1]), len(steps[0])), np.nan)
+    table[tuple(np.searchsorted(step, np.round(v, 9)) for step, v in zip(steps[::-1], (y, x), strict=True))] = z
+    field = np.ma.masked_invalid(table)
     axes.margins(0.02)
-    return filled, {"extend": extend, "format": digits}
+    if len(z) < FEWEST_OF_FIELD:
+        return axes.pcolormesh(*steps, field, cmap=style.COLORMAP, norm=norm, shading="nearest"), options
+    filled = axes.contourf(*steps, field, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
+    axes.contour(*steps, field, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
+    return filled, options
 
 
 @picture(DesignsView, "designs", order=40)
