@@ -10,14 +10,13 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
 from matplotlib.colors import BoundaryNorm
 from matplotlib.text import Text
 from numpy.typing import ArrayLike
 
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.style import Grid
+from mechdesign.report.figures.contours import Grid, color_bar, contour_lines, filled
 
 Way = Literal["x", "y"]
 
@@ -210,7 +209,7 @@ class Contours(PanelMark):
         if self.norm is None:
             return
         levels = np.asarray(self.norm.boundaries)
-        style.filled(axes, self.patches, self.norm, style.contour_lines(self.patches, levels))
+        filled(axes, self.patches, self.norm, contour_lines(self.patches, levels))
         for curve in self.outline:
             axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
         if not self.everywhere:
@@ -251,15 +250,6 @@ class Coloured(Own):
     def draw(self, axes: Axes) -> None:
         drawn, options = self.function(axes)
         color_bar(axes, drawn, self.bar, **options)
-
-
-def color_bar(axes: Axes, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:
-    """A bar of colours beside a panel."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    beside = axes.inset_axes((1.02, 0, 0.04, 1))
-    beside.tick_params(labelsize=8)
-    return style.color_bar(figure, drawn, label, cax=beside, **options)
 
 
 @dataclass(frozen=True)

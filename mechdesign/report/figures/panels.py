@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.motion.rows import TIME, Path, Poses, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
+from mechdesign.report.figures.contours import colour_steps, constant, round_levels
 from mechdesign.report.figures.marks import Axis, Contours, Panel, PanelMark, Picture
 from mechdesign.study import Study
 
@@ -165,7 +166,7 @@ def maps(
     for held, sectors in shown:
         for (name, values), levels in zip(parts, scales, strict=True):
             ends = float(np.nanmin(values)), float(np.nanmax(values))
-            same = style.constant(*ends)
+            same = constant(*ends)
             words = ", ".join(filter(None, (held, name))) + f": {number(ends[0])} everywhere" * same
             mark = _contours(over, sectors, values, levels, logarithmic=logarithmic, everywhere=same)
             panels.append(Panel([mark], x, y, words, equal=over.equal))
@@ -182,7 +183,7 @@ def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: 
     sizes, shown = sizes[finite], shown[finite]
     if logarithmic:
         return np.asarray(np.log10(_powers(shown, sizes)))
-    return style.levels(float(shown.min()), quantile(shown, sizes, 0.97), 9)
+    return round_levels(float(shown.min()), quantile(shown, sizes, 0.97), 9)
 
 
 def _contours(
@@ -202,7 +203,7 @@ def _contours(
     ]  # fmt: skip
     words = [_power(10.0**level) for level in levels] if logarithmic else ()
     return Contours(
-        shown, style.steps(levels, float(finite.min()), float(finite.max())), sectors.outline, words, everywhere
+        shown, colour_steps(levels, float(finite.min()), float(finite.max())), sectors.outline, words, everywhere
     )
 
 
@@ -246,7 +247,7 @@ def _powers(values: Floats, sizes: Floats) -> Floats:
     """
     smallest, largest = (max(quantile(values, sizes, share), 1e-16) for share in (0.05, 0.95))
     if largest < _NARROW * smallest:
-        even = style.levels(smallest, largest, 9)
+        even = round_levels(smallest, largest, 9)
         return np.asarray(even[even > 0])
     powers = 10.0 ** np.arange(np.floor(np.log10(smallest)), np.ceil(np.log10(largest)) + 1)
     if len(powers) > 4:

@@ -221,23 +221,19 @@ def _time(study: Study, section: MotionSection, sweep: Sweep, table: Table, retu
 
 def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | None:
     """Time from each pose to the next if the rates follow the motion, negative where they run against it; else None."""
-    along, square, length = (np.zeros(len(sweep.rows) - 1) for _ in range(3))
+    rows = sweep.rows
     rated = [name for name in table.names if f"{name}_velocity" in table or name in rates]
     # The drives if their rates are known: their rates are constant more often than those of other coordinates.
-    for name in [name for name in rated if name in sweep.poses.values] or rated:
-        if f"{name}_velocity" in table:
-            rate = table[f"{name}_velocity"][sweep.rows]
-        else:
-            rate = np.full(len(sweep.rows), rates[name])
-        values = table[name][sweep.rows]
-        size = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
-        if not size > 0:
-            continue
-        step, mean = np.diff(values) / size, (rate[1:] + rate[:-1]) / 2 / size
-        finite = np.isfinite(step) & np.isfinite(mean)
-        along += np.where(finite, step * mean, 0.0)
-        square += np.where(finite, mean**2, 0.0)
-        length += np.where(finite, step**2, 0.0)
+    names = [name for name in rated if name in sweep.poses.values] or rated
+    if not names:
+        return None
+    values = np.array([table[name][rows] for name in names])
+    rate = np.array([table[f"{name}_velocity"][rows] if f"{name}_velocity" in table else np.full(len(rows), rates[name])
+                     for name in names])  # fmt: skip
+    size = np.fmax.reduce(values, axis=1) - np.fmin.reduce(values, axis=1)
+    step, mean = (part[size > 0] / size[size > 0, None] for part in (np.diff(values), (rate[:, 1:] + rate[:, :-1]) / 2))
+    known = np.isfinite(step) & np.isfinite(mean)
+    along, square, length = (np.where(known, part, 0.0).sum(axis=0) for part in (step * mean, mean**2, step**2))
     finite = square > 0
     if not finite.any():
         return None

@@ -25,6 +25,7 @@ from mechdesign.experiments.figures.sweep.quantities import (
 from mechdesign.experiments.figures.sweep.view import CasesView
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
+from mechdesign.report.figures.contours import colour_steps, constant, round_levels
 from mechdesign.report.figures.marks import Contours, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.report.figures.pictures import picture
 
@@ -66,7 +67,7 @@ def response(view: CasesView) -> Picture | None:
         reduction, word = REDUCTIONS[sign]
         fields = [plane.field(number.values, which, reduction) for plane, which in zip(planes, counts, strict=True)]
         norm, (low, high) = _norm(fields, number.values[met]), (float(end(fields)) for end in (np.nanmin, np.nanmax))
-        same = style.constant(low, high)
+        same = constant(low, high)
         for place, (plane, field) in enumerate(zip(planes, fields, strict=True)):
             rest = [entry.name for entry in entries if entry not in (plane.x, plane.y)]
             over = f", {word} over {', '.join(rest) if len(rest) <= _MOST_OTHERS else f'{len(rest)} entries'}"
@@ -99,7 +100,7 @@ def _norm(fields: Sequence[Floats], met: Floats) -> BoundaryNorm:
     if inside.size:
         around = _AROUND * np.ptp(inside)
         ends = max(low, inside.min() - around), min(high, inside.max() + around)
-    return style.steps(style.levels(*ends, LEVELS), low, high)
+    return colour_steps(round_levels(*ends, LEVELS), low, high)
 
 
 def _gate_marks(plane: Plane, gates: Gates) -> Iterator[PanelMark]:

@@ -30,6 +30,7 @@ from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import variables_of
 from mechdesign.report.figures import style
+from mechdesign.report.figures.contours import colour_steps, round_levels
 from mechdesign.report.figures.marks import (
     Axis,
     Coloured,
@@ -196,7 +197,7 @@ def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> 
     on_a_grid = len(steps[0]) * len(steps[1]) <= 4 * len(z)
     near = usual(z, smallest=smallest)
     norm: Normalize = Normalize(z[near].min(), z[near].max())
-    levels, extend = style.levels(z[near].min(), z[near].max(), MAP_LEVELS), "neither"
+    levels, extend = round_levels(z[near].min(), z[near].max(), MAP_LEVELS), "neither"
     digits = FuncFormatter(lambda value, _: f"{value:.3g}")
     if _steep(z) and len(designs.goals) == 1:
         levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
@@ -260,7 +261,7 @@ def parallel_axes(designs: DesignSet) -> Picture:
 
 def _lines(lines: list[Floats], score: Floats, axes: Axes) -> tuple[ScalarMappable, dict[str, Any]]:
     """Lines in steps of colour."""
-    norm = style.steps(style.levels(float(score.min()), float(score.max()), FEW_COLORS), *score[[0, -1]].tolist())
+    norm = colour_steps(round_levels(float(score.min()), float(score.max()), FEW_COLORS), *score[[0, -1]].tolist())
     drawn = LineCollection(lines, array=score, cmap=style.COLORMAP, norm=norm, linewidths=0.8)
     axes.add_collection(drawn)
     axes.grid(visible=False)

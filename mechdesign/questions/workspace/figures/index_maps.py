@@ -26,11 +26,11 @@ from mechdesign.questions.workspace.figures.regions import (
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
+from mechdesign.report.figures.contours import Grid, colour_steps, constant, contour_lines, filled, round_levels
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.marks import Coloured, Late, Own, PanelMark, Picture
 from mechdesign.report.figures.panels import node_areas, quantile, quantity
 from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.style import Grid
 from mechdesign.study import Study
 
 # Columns of the table that are no indices, beside the held coordinates.
@@ -78,13 +78,13 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
     every = [patch for patches in shown for patch in patches]
     low, _, top = _ends(every)
-    same = parts is None and style.constant(low, top)
+    same = parts is None and constant(low, top)
     if same:
         title = f"{title}; {quantity(low, index.unit).strip()} everywhere"
     norm, panels = _norm(every), list[tuple[str, list[PanelMark]]]()
     for words, patches, region in zip(titles, shown, regions, strict=True):
         within = _within(patches, norm)
-        lines = [] if same else style.contour_lines(within, norm.boundaries[1:])
+        lines = [] if same else contour_lines(within, norm.boundaries[1:])
         drawn = (
             Own(partial(fill, local=region.local))
             if same
@@ -101,14 +101,14 @@ def _field(
     patches: Sequence[Grid], norm: BoundaryNorm, lines: Sequence[Sequence[Complexes]], axes: Axes
 ) -> tuple[ScalarMappable, dict[str, Any]]:  # fmt: skip
     """Filled contours, and what a bar of colours shows of them."""
-    style.filled(axes, patches, norm, lines)
+    filled(axes, patches, norm, lines)
     return ScalarMappable(norm, style.COLORMAP), {"ticks": norm.boundaries}
 
 
 def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
     """Filled contours over the patches of a region."""
     within = _within(patches, norm)
-    style.filled(axes, within, norm, style.contour_lines(within, norm.boundaries[1:]))
+    filled(axes, within, norm, contour_lines(within, norm.boundaries[1:]))
 
 
 def _within(patches: Sequence[Grid], norm: BoundaryNorm) -> list[Grid]:
@@ -175,7 +175,7 @@ def index_norm(regions: Sequence[Region], column: str) -> BoundaryNorm:
 def _norm(patches: Sequence[Grid]) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     low, high, top = _ends(patches)
-    return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
+    return colour_steps(round_levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
 
 
 def _parts(regions: Sequence[Sequence[Grid]]) -> list[float] | None:

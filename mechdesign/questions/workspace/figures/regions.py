@@ -16,10 +16,10 @@ from matplotlib.patheffects import withStroke
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
+from mechdesign.report.figures.contours import Grid
 from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.marks import Own, PanelMark, Picture, Trace
 from mechdesign.report.figures.panels import drawn_plane, round_down
-from mechdesign.report.figures.style import Grid
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
