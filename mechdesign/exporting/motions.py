@@ -13,7 +13,8 @@ from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import Path, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import PathRows
 from mechdesign.motion.solving import curve_with
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL
@@ -189,7 +190,7 @@ class Timed:
         line = np.zeros(len(places), dtype=np.intp)
         if (timed := poses.along(line, places).times) is not None:
             return timed
-        if self.section.speed is not None and isinstance(poses.rule, Path):
+        if self.section.speed is not None and isinstance(poses.rule, PathRows):
             return poses.rule.way(line, places) / self.section.speed
         swept, rates = poses.swept, self.section.rates
         if any(self.section.accelerations.values()):

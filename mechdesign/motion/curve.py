@@ -22,8 +22,9 @@ from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.motion.anchors import Anchors, inputs, steps_of, units_of
 from mechdesign.motion.motion import Motion, SolvedPoses
-from mechdesign.motion.pieces import Pieces, Search
-from mechdesign.motion.rows import DesignNumbers, GivenRows, Poses
+from mechdesign.motion.pieces import CurvePieces, Search
+from mechdesign.motion.rows import DesignNumbers, Poses
+from mechdesign.motion.rules import GivenRows
 from mechdesign.motion.turns import drive_turns
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
@@ -59,7 +60,7 @@ class Curve:
 
     Attributes
     ----------
-    pieces : Pieces
+    pieces : CurvePieces
         Intervals of the lines, in order, on which the mechanism assembles and lies within its limits.
     spent : bool array, shape (lines,)
         Lines with too many turns to be followed; they have no pieces.
@@ -152,7 +153,7 @@ class Curve:
         k = self.piece_at(line, s, self._closed)
         return k, self._closed.take(k).within(s)
 
-    def piece_at(self, line: Ints, s: Floats, pieces: Pieces | None = None) -> Ints:
+    def piece_at(self, line: Ints, s: Floats, pieces: CurvePieces | None = None) -> Ints:
         """The piece that contains each place, else the one before it, else the first of the line."""
         pieces = self.pieces if pieces is None else pieces
         span = self.poses.end + 2.0
@@ -199,10 +200,10 @@ class Curve:
         inset = s - fold * INSET * self.poses.end
         return np.where(valid.any(axis=1), places[np.arange(len(s)), last], inset)
 
-    def _begin(self) -> Pieces:
+    def _begin(self) -> CurvePieces:
         """Pieces between the corners of each line, so short that given coordinates change little in each."""
         if not self.poses.end > 0:
-            return Pieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
+            return CurvePieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
         marks, count = steps_of(self.motion, self.plan)
         self.spent |= count.sum(axis=1) * chebyshev.COUNT > BUDGET
         numbers: Ints = np.where(self.spent[:, None], 0, count).astype(np.intp)
@@ -211,7 +212,7 @@ class Curve:
         parts = numbers[line, segment]
         low, high = marks[segment], marks[segment + 1]
         begin, stop = (low + (high - low) * (k / parts) for k in (number, number + 1))
-        return Pieces.of(line, begin, np.where(number + 1 == parts, high, stop))
+        return CurvePieces.of(line, begin, np.where(number + 1 == parts, high, stop))
 
     def _solved(self, line: Ints, s: Floats, poses: Poses, values: Sequence[Floats]) -> Configuration:
         start = None if self.anchors is None else self.anchors.at(line, s)
@@ -270,7 +271,7 @@ class Curve:
     def _turns_at_nodes(self) -> Floats:
         return chebyshev.at_nodes(self._turns)
 
-    def _begin_turns(self, pieces: Pieces, coefficients: Floats) -> None:
+    def _begin_turns(self, pieces: CurvePieces, coefficients: Floats) -> None:
         """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it.
 
         Angles of torsion springs have their turns from the sketch on.

@@ -14,7 +14,8 @@ from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.motion.rows import TIME, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import TIME
 from mechdesign.numerics.arrays import Ints
 from mechdesign.results import Scope, Table
 from mechdesign.study.text.units import Units

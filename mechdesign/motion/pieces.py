@@ -35,7 +35,7 @@ SURE_TURN = np.pi / 2
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces(Lanes):
+class CurvePieces(Lanes):
     """Intervals of motions, arrays of shape (pieces,).
 
     A place x in [-1, 1] of a piece is the place s along its line, in rows. At a dead centre positions change as the
@@ -49,7 +49,7 @@ class Pieces(Lanes):
     depth: Ints  # how often it has been divided
 
     @classmethod
-    def of(cls, line: Ints, begin: Floats, end: Floats) -> Pieces:
+    def of(cls, line: Ints, begin: Floats, end: Floats) -> CurvePieces:
         """Pieces without dead centres."""
         none = np.zeros(len(line), dtype=np.intp)
         return cls(line, begin, end, none, none)
@@ -82,13 +82,15 @@ class Pieces(Lanes):
         """Weights of integrals along the lines at the nodes, shape (pieces, nodes)."""
         return np.asarray(self.stretch * chebyshev.WEIGHTS)
 
-    def halves(self) -> Pieces:
+    def halves(self) -> CurvePieces:
         """Both halves of each piece; a dead centre stays in one of them."""
         middle = self.places(np.zeros(len(self.line)))
-        first = Pieces(self.line, self.begin, middle, np.minimum(self.fold, 0), self.depth + 1)
-        return Pieces.joined([first, Pieces(self.line, middle, self.end, np.maximum(self.fold, 0), self.depth + 1)])
+        first = CurvePieces(self.line, self.begin, middle, np.minimum(self.fold, 0), self.depth + 1)
+        return CurvePieces.joined(
+            [first, CurvePieces(self.line, middle, self.end, np.maximum(self.fold, 0), self.depth + 1)]
+        )
 
-    def divided(self, owner: Ints, marks: Floats) -> Pieces:
+    def divided(self, owner: Ints, marks: Floats) -> CurvePieces:
         """The pieces in order, divided at marks, shape (n,): the number of the piece, and the place in it."""
         order = np.lexsort((marks, owner))
         owner, marks = owner[order], marks[order]
@@ -139,7 +141,7 @@ class Search:
     crossing: bool
     spent: Flags  # shape (lines,)
 
-    def pieces(self, begin: Pieces) -> tuple[Pieces, Floats]:
+    def pieces(self, begin: CurvePieces) -> tuple[CurvePieces, Floats]:
         """The pieces in order along the lines, and the angles at their nodes, shape (angles, pieces, nodes)."""
         lines, pending = len(self.spent), begin
         nodes, sizes = np.zeros(lines), np.zeros((len(self.causes), lines))
@@ -158,16 +160,16 @@ class Search:
             far = good & (turns >= SURE_TURN).any(axis=(0, 2)) & (pending.depth < MOST_HALVINGS)
             valid.append(pending.take(good & ~far))
             turned.append(angles[:, good & ~far])
-            pending = Pieces.joined([*parts, pending.take(halved | far).halves()])
-        pieces = Pieces.joined(valid)
+            pending = CurvePieces.joined([*parts, pending.take(halved | far).halves()])
+        pieces = CurvePieces.joined(valid)
         order = np.lexsort((pieces.begin, pieces.line))
         order = order[~self.spent[pieces.line[order]]]
         return pieces.take(order), np.concatenate(turned, axis=1)[:, order]
 
-    def _judged(self, pieces: Pieces, margins: Floats, sizes: Floats) -> tuple[Flags, Flags, list[Pieces]]:
+    def _judged(self, pieces: CurvePieces, margins: Floats, sizes: Floats) -> tuple[Flags, Flags, list[CurvePieces]]:
         """Pieces in which all margins are positive, those to be halved, and the positive parts of those with zeros."""
         left, halved = np.ones(len(pieces.line), dtype=bool), np.zeros(len(pieces.line), dtype=bool)
-        parts: list[Pieces] = []
+        parts: list[CurvePieces] = []
         for number, (cause, table, size) in enumerate(zip(self.causes, margins, sizes, strict=True)):
             which = np.flatnonzero(left)
             values, scale = table[which], size[pieces.line[which]]
@@ -201,9 +203,9 @@ class Search:
             left[which[unsure | ~positive.any(axis=1) | (last & ~positive.all(axis=1))]] = False
         return left, halved, parts
 
-    def _folded(self, pieces: Pieces, positive: Flags, alike: Flags, number: int) -> list[Pieces | None]:
+    def _folded(self, pieces: CurvePieces, positive: Flags, alike: Flags, number: int) -> list[CurvePieces | None]:
         """The part of each piece up to the place of a `fold`; None if not found."""
-        parts: list[Pieces | None] = [None] * len(alike)
+        parts: list[CurvePieces | None] = [None] * len(alike)
         for k in np.flatnonzero(~alike & (np.count_nonzero(np.diff(positive, axis=1), axis=1) == 1)).tolist():
             piece, node = pieces.take(np.array([k])), int(np.flatnonzero(np.diff(positive[k]))[0])
             good, bad = (node, node + 1) if positive[k, node] else (node + 1, node)
@@ -217,8 +219,8 @@ class Search:
         return parts
 
     def _cut(
-        self, pieces: Pieces, coefficients: Floats, number: int, scale: Floats
-    ) -> tuple[Ints, list[Pieces]]:  # fmt: skip
+        self, pieces: CurvePieces, coefficients: Floats, number: int, scale: Floats
+    ) -> tuple[Ints, list[CurvePieces]]:  # fmt: skip
         """Pieces with zeros of a margin inside or a dead centre at an end, and their parts with a positive margin."""
         role = self.causes[number].role
         table = chebyshev.at_places(coefficients)
@@ -266,7 +268,7 @@ class Search:
         ends = [((of[:, None] == owner) & (mark[:, None] == marks)).any(axis=1) for mark in (low, high)]
         return suspect[cut], [_parts(some.take(of), low, high, *ends)] if len(cut) else []
 
-    def _polished(self, pieces: Pieces, x: Floats, coefficients: Floats, number: int) -> Floats:
+    def _polished(self, pieces: CurvePieces, x: Floats, coefficients: Floats, number: int) -> Floats:
         """Zeros of a margin itself from those of its series, by a step of Newton's method."""
         if not len(x):
             return x
@@ -285,7 +287,7 @@ def between_marks(owner: Ints, marks: Floats, some: Ints) -> tuple[Ints, Floats,
     return owners[:-1][beside], places[:-1][beside], places[1:][beside]
 
 
-def _parts(pieces: Pieces, low: Floats, high: Floats, dead_low: Flags, dead_high: Flags) -> Pieces:
+def _parts(pieces: CurvePieces, low: Floats, high: Floats, dead_low: Flags, dead_high: Flags) -> CurvePieces:
     """Parts of pieces from `low` to `high`, where dead centres may lie; a part with two dead centres is halved."""
     dead_low, dead_high = (
         dead_low | ((low == -1.0) & (pieces.fold == -1)),
@@ -294,7 +296,7 @@ def _parts(pieces: Pieces, low: Floats, high: Floats, dead_low: Flags, dead_high
     begin, end, middle = pieces.places(low), pieces.places(high), pieces.places((low + high) / 2)
     both, depth = dead_low & dead_high, pieces.depth + 1
     fold = np.where(dead_low, -1, np.where(dead_high, 1, 0)).astype(np.intp)
-    first = Pieces(pieces.line, begin, np.where(both, middle, end), fold, depth)
-    second = Pieces(pieces.line, middle, end, np.ones(len(begin), dtype=np.intp), depth).take(both)
-    parts = Pieces.joined([first, second])
+    first = CurvePieces(pieces.line, begin, np.where(both, middle, end), fold, depth)
+    second = CurvePieces(pieces.line, middle, end, np.ones(len(begin), dtype=np.intp), depth).take(both)
+    parts = CurvePieces.joined([first, second])
     return parts.take(parts.end > parts.begin)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from mechdesign.motion.curve import AT_ONCE, BUDGET, Curve
-from mechdesign.motion.pieces import BESIDE, MOST_HALVINGS, RESOLVED, Pieces, largest
+from mechdesign.motion.pieces import BESIDE, MOST_HALVINGS, RESOLVED, CurvePieces, largest
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -115,7 +115,7 @@ class Series:
         parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]
         return np.concatenate([part[0] for part in parts], axis=1), np.concatenate([part[1] for part in parts])
 
-    def _sampled(self, pieces: Pieces) -> tuple[Floats, Floats, Floats, Flags]:
+    def _sampled(self, pieces: CurvePieces) -> tuple[Floats, Floats, Floats, Flags]:
         """Functions at the nodes of pieces (with poles: times their divisors), divisors, exactness, and which are own.
 
         Of shapes (functions, pieces, nodes), twice, (pieces,) and (functions, pieces). A function with poles is
@@ -165,7 +165,7 @@ class Series:
             pieces = pieces.divided(piece, x)
             values, divisors, exact, own = self._sampled(pieces)
         pending = pieces
-        done: list[tuple[Pieces, Floats, Floats, Floats, Flags]] = []
+        done: list[tuple[CurvePieces, Floats, Floats, Floats, Flags]] = []
         self._scale = np.zeros((len(self.names), lines))
         self._divisor_scale = np.zeros((len(self.names), lines))
         best = np.full((2, len(self.names), lines), -np.inf)
@@ -223,14 +223,14 @@ class Series:
             self._table = self._divisor = values
             self._rough = np.zeros(values.shape[:2], dtype=bool)
             return
-        joined = Pieces.joined(parts[0])
+        joined = CurvePieces.joined(parts[0])
         order = np.lexsort((joined.begin, joined.line))
         self.pieces = joined.take(order)
         self._table, self._divisor = (np.concatenate(part, axis=1)[:, order] for part in parts[1:3])
         self._rough = np.concatenate(parts[4], axis=1)[:, order]
 
-    def _nearly_zero(self, pieces: Pieces, values: Floats, divisors: Floats) -> tuple[Ints, Floats]:
-        """Pieces, and places in them, at which magnitudes are smallest and nearly zero, or may be so."""
+    def _nearly_zero(self, pieces: CurvePieces, values: Floats, divisors: Floats) -> tuple[Ints, Floats]:
+        """CurvePieces, and places in them, at which magnitudes are smallest and nearly zero, or may be so."""
         rows = self._magnitudes
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             squares = (values[rows] / divisors[rows] ** self._orders[rows, None, None]) ** 2

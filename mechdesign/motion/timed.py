@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.motion.paths import bends, between
-from mechdesign.motion.rows import TIME, Rows
+from mechdesign.motion.rules import TIME, Rows
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Times that differ by less than this part of the whole time are the same.
@@ -59,7 +59,7 @@ class TimedCourse:
 
 
 @dataclass(frozen=True, eq=False)
-class Timed(Rows):
+class TimedRows(Rows):
     """What coordinates do over time, which is even between the rows.
 
     Parameters
@@ -124,9 +124,9 @@ class Timed(Rows):
         row = np.clip(np.floor(s), 0, self.times.shape[1] - 2).astype(np.intp)
         return np.asarray(np.diff(self.times)[_row(self.times, line), row])
 
-    def take(self, designs: Ints) -> Timed:
+    def take(self, designs: Ints) -> TimedRows:
         courses = {name: course.take(designs) for name, course in self.courses.items()}
-        return Timed(courses, self.times[designs] if len(self.times) > 1 else self.times)
+        return TimedRows(courses, self.times[designs] if len(self.times) > 1 else self.times)
 
 
 def _row(values: Floats, line: Ints) -> Ints:

@@ -13,7 +13,8 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import TIME, PoseNumbers
+from mechdesign.motion.rows import PoseNumbers
+from mechdesign.motion.rules import TIME
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 from mechdesign.study.text.reading import MAX_NUMBER

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.errors import AssemblyError
-from mechdesign.motion.rows import GivenRows, Poses, Sector, Sectors
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import GivenRows, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.region.patches import GRID, patches
 from mechdesign.region.pieces import counted

@@ -12,10 +12,11 @@ from mechdesign.errors import StudyError
 from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.model import Description
 from mechdesign.motion.paths import EvenValues, PointPath, Polyline, Round, Spline
-from mechdesign.motion.rows import MAX_POSES, OWN, DesignNumbers, GivenRows, Grid, Path, Poses, Rows
+from mechdesign.motion.rows import MAX_POSES, OWN, DesignNumbers, Poses
+from mechdesign.motion.rules import GivenRows, GridRows, PathRows, Rows
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
-from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, Sweep
+from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, SweepText
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reading import APART
@@ -86,7 +87,7 @@ class Motions(dict[str, Poses]):
         return np.stack(counts, axis=1) if counts else np.zeros((numbers.count, 0), dtype=np.intp)
 
 
-def _axis(sweep: Sweep, numbers: DesignNumbers) -> EvenValues:
+def _axis(sweep: SweepText, numbers: DesignNumbers) -> EvenValues:
     """Values of a sweep, both ends included: ``from + k step <= to + 1e-9 step``.
 
     Raises
@@ -122,15 +123,15 @@ def _listed(poses: Sequence[Mapping[str, float]], numbers: DesignNumbers) -> Giv
     return GivenRows(values, listed=True, sets=kinds, number=number)
 
 
-def _grid(axes: Mapping[str, EvenValues]) -> Grid:
+def _grid(axes: Mapping[str, EvenValues]) -> GridRows:
     """Poses at every combination of values."""
     count = math.prod(axis.count for axis in axes.values())
     if count > MAX_POSES:
         raise StudyError(f"a grid of {count} poses; at most {MAX_POSES} are possible")
-    return Grid(axes)
+    return GridRows(axes)
 
 
-def _path(path: Mapping[str, PathSection], folder: Folder, numbers: DesignNumbers) -> Path:
+def _path(path: Mapping[str, PathSection], folder: Folder, numbers: DesignNumbers) -> PathRows:
     if not path:
         raise StudyError("an empty path; give its points, [[x, y], ...]")
     columns: dict[str, Floats] = {}
@@ -154,7 +155,7 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: DesignNumber
     for owner in {name.rpartition(".")[0] for name in listed if name.endswith(".x")}:
         if f"{owner}.y" in listed:
             points[owner] = Polyline.through(rows[f"{owner}.x"] + 1j * rows[f"{owner}.y"])
-    return Path(numbers.count, count, tuple(columns), points, listed)
+    return PathRows(numbers.count, count, tuple(columns), points, listed)
 
 
 def _course(name: str, given: PathSection, folder: Folder, value: Callable[[float], Floats]) -> PointPath | Floats:
@@ -194,7 +195,7 @@ def _course(name: str, given: PathSection, folder: Folder, value: Callable[[floa
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
-def _assumed(description: Description, numbers: DesignNumbers) -> Grid:
+def _assumed(description: Description, numbers: DesignNumbers) -> GridRows:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
 
     Raises
@@ -213,10 +214,10 @@ def _assumed(description: Description, numbers: DesignNumbers) -> Grid:
         low, high = limit.min, limit.max
         if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
             ends = [_place(description, end, numbers) / factor for end in (low, high)]
-            return Grid({drive.name: EvenValues.from_to(ends[0], ends[1], 51)})
+            return GridRows({drive.name: EvenValues.from_to(ends[0], ends[1], 51)})
     if drive.kind == "angle":
         turn = numbers.of(2.0 * math.pi / factor)
-        return Grid({drive.name: EvenValues.from_to(numbers.of(0.0), turn, 73)})
+        return GridRows({drive.name: EvenValues.from_to(numbers.of(0.0), turn, 73)})
     raise StudyError(
         f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
         "give 'poses', 'sweep', 'path' or 'motion', or limits of the drive"

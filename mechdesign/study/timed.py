@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from mechdesign.errors import StudyError
-from mechdesign.motion.timed import SAME_TIME, Timed, TimedCourse
+from mechdesign.motion.timed import SAME_TIME, TimedCourse, TimedRows
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.schema.motion_laws import LAWS, Phase
-from mechdesign.study.schema.motions import Course
+from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reading import APART
@@ -20,7 +20,9 @@ from mechdesign.study.text.tables import table_of
 SHORTEST = 1e-6
 
 
-def program(motion: Mapping[str, Course], instants: int, folder: Folder, value: Callable[[float], Floats]) -> Timed:
+def program(
+    motion: Mapping[str, CourseText], instants: int, folder: Folder, value: Callable[[float], Floats]
+) -> TimedRows:
     """The motion of coordinates at so many instants evenly in time, and at the ends of their segments.
 
     Parameters
@@ -38,11 +40,11 @@ def program(motion: Mapping[str, Course], instants: int, folder: Folder, value: 
         if wrong.any():
             raise StudyError(message)
     times, counts = _times(courses, instants)
-    return Timed(courses, times[:, : counts[0]])
+    return TimedRows(courses, times[:, : counts[0]])
 
 
 def number_of_instants(
-    motion: Mapping[str, Course], instants: int, folder: Folder, value: Callable[[float], Floats]
+    motion: Mapping[str, CourseText], instants: int, folder: Folder, value: Callable[[float], Floats]
 ) -> Ints:
     """How many poses the motion of each design has, shape (designs,) or (1,); -1 where it is none."""
     courses = _courses(motion, folder, value)
@@ -53,7 +55,7 @@ def number_of_instants(
 
 
 def _courses(
-    motion: Mapping[str, Course], folder: Folder, value: Callable[[float], Floats]
+    motion: Mapping[str, CourseText], folder: Folder, value: Callable[[float], Floats]
 ) -> dict[str, TimedCourse]:  # fmt: skip
     courses = {}
     for name, given in motion.items():
@@ -69,7 +71,7 @@ def _courses(
     return courses
 
 
-def _by_laws(name: str, given: Course, value: Callable[[float], Floats]) -> TimedCourse:
+def _by_laws(name: str, given: CourseText, value: Callable[[float], Floats]) -> TimedCourse:
     """Moves and dwells one after another."""
     segments = given.segments or ()
     moves = [segment.to for segment in segments if segment.to is not None]

@@ -31,7 +31,7 @@ from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import outside
-from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
+from mechdesign.questions.kinematics.drawn import DrawnPoses, DrawnVectors, Vector
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.results import Result, Table
@@ -61,7 +61,7 @@ class DrawnForces(DrawnPoses):
         """``dynamics.csv``."""
         return dynamics_table(motion)
 
-    def vectors(self, motion: PoseValues, shown: Shown) -> Iterator[Vectors]:
+    def vectors(self, motion: PoseValues, shown: Shown) -> Iterator[DrawnVectors]:
         """Velocities, and forces by what exerts them.
 
         A joint's force is that on its first body. The shaking force stands in the middle of the ground's points.
@@ -76,7 +76,7 @@ class DrawnForces(DrawnPoses):
         frame = [point for owner, point in shown.configuration.graph.points if owner == GROUND and ":" not in point]
         place = sum(shown.configuration.point(point) for point in frame) / len(frame) if frame else 0j
         forces["shaking"] = [("on the frame", np.broadcast_to(place, shown.rows.shape), x + 1j * y)]
-        yield from (Vectors(kind, unit, vectors) for kind, vectors in forces.items())
+        yield from (DrawnVectors(kind, unit, vectors) for kind, vectors in forces.items())
 
 
 class Dynamics(DynamicQuestion, MotionQuestion):

@@ -16,7 +16,7 @@ import numpy as np
 from mechdesign.expressions import Corner, Expression
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.motion.rows import TIME
+from mechdesign.motion.rules import TIME
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved

@@ -31,7 +31,8 @@ from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate, solved_each
 from mechdesign.motion.curve import from_sketch
 from mechdesign.motion.motion import in_study_units, radians
-from mechdesign.motion.rows import GivenRows, Poses, instants
+from mechdesign.motion.rows import Poses, instants
+from mechdesign.motion.rules import GivenRows
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.dynamics.question import ForceQuestion
@@ -48,7 +49,7 @@ NEAREST = 8
 NO_INERTIA = 1e-13
 
 
-class Rates(NamedTuple):
+class RatesInTime(NamedTuple):
     """What the equations of motion give at some poses, each of shape (..., poses); angles in radians."""
 
     velocity: Floats  # of all positions
@@ -184,7 +185,7 @@ class EquationsOfMotion:
         return np.array([[np.ravel(first(linear.configuration, c, rates))[0] for rates in linear.by_drives]
                          for c in self.positions.coordinates], dtype=float)  # fmt: skip
 
-    def rates(self, times: Floats, x: Floats, velocity: Floats) -> Rates:
+    def rates(self, times: Floats, x: Floats, velocity: Floats) -> RatesInTime:
         """Rates at poses near to `x`, shape (m, poses), with its and `velocity`'s independent parts."""
         rates, regular = self._rates(times, x, velocity)
         if len(meeting := np.flatnonzero(~(regular >= MEETING))):
@@ -208,7 +209,7 @@ class EquationsOfMotion:
                 for part in rates]  # fmt: skip
 
     @quiet
-    def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[Rates, Floats]:
+    def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[RatesInTime, Floats]:
         """Rates where the equations have full rank, and how regular they are."""
         chart, last, _, _, window = self.branch
         times = np.clip(times, *window)
@@ -242,7 +243,9 @@ class EquationsOfMotion:
         if self.contacts:
             lost = np.sum(friction * self._sliding(linear, moves, shape), axis=0)
             powers = np.array([powers[0] + lost, lost])
-        return Rates(velocities, accelerated, powers, kinetic, potential, efforts, friction, slack), regularity(linear)
+        return RatesInTime(velocities, accelerated, powers, kinetic, potential, efforts, friction, slack), regularity(
+            linear
+        )
 
     def _accelerations(
         self, linear: Linearization, forces: Forces, moving: Moving, shape: tuple[int, ...]

@@ -12,7 +12,8 @@ from mechdesign.cautions import Caution
 from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.motion.motion import radians
 from mechdesign.motion.question import PoseValues
-from mechdesign.motion.rows import GivenRows, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import GivenRows
 from mechdesign.questions.dynamics.columns import FLYWHEEL
 from mechdesign.questions.dynamics.schema import Flywheel
 from mechdesign.questions.kinematics.along import KinematicAlong

@@ -14,7 +14,8 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.passage import MAX_SHOWN_POSES
 from mechdesign.motion.question import Mark, PoseValues, unfilled
-from mechdesign.motion.rows import TIME, GivenRows, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import TIME, GivenRows
 from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import Progress

@@ -13,7 +13,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.loads import Loading
 
 if TYPE_CHECKING:
-    from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion, Rates
+    from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion, RatesInTime
 
 
 class Instants:
@@ -38,7 +38,7 @@ class Instants:
         return Moving(self.linear.velocity([*self.velocity[self.equations.branch.chart.rows]]))
 
     @cached_property
-    def rates(self) -> Rates:
+    def rates(self) -> RatesInTime:
         """What the equations of motion give."""
         return self.equations.rates(self.times, self.x, self.velocity)
 

@@ -28,11 +28,11 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.corners import Corners, Threshold
-from mechdesign.questions.dynamics.equations_of_motion import MEETING, Branch, EquationsOfMotion, Rates
+from mechdesign.questions.dynamics.equations_of_motion import MEETING, Branch, EquationsOfMotion, RatesInTime
 from mechdesign.questions.dynamics.impacts import bounced, rested, turned
 from mechdesign.questions.dynamics.instants import Instants
 from mechdesign.questions.dynamics.reasons import cannot_go_on
-from mechdesign.questions.dynamics.state_in_time import EndOfRun, Event, MotionInTime
+from mechdesign.questions.dynamics.state_in_time import EndOfRun, EventInTime, MotionInTime
 from mechdesign.questions.dynamics.watches import Watch, Watches
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
@@ -79,7 +79,7 @@ class IntegratedPoses(NamedTuple):
 
     times: Floats
     configuration: Configuration
-    rates: Rates
+    rates: RatesInTime
     work: Floats
 
 
@@ -236,7 +236,7 @@ class Integration(MotionInTime):
             kind, name = watches[change.function].kind, names[change.function]
             if change.place <= until and kind in ("event", "corner"):
                 if kind == "event" and self._sides.get(name):
-                    self.events.append(Event(str(name[1]), change.place, change.sign > 0))
+                    self.events.append(EventInTime(str(name[1]), change.place, change.sign > 0))
                 self._sides[name] = change.sign
         if stop is not None:
             self._turning = [threshold for threshold in self.corners.thresholds if ("corner", threshold.key) in turning]
@@ -259,7 +259,7 @@ class Integration(MotionInTime):
             ways = np.where(rates.friction == 0, self.sliding(rates.acceleration), -rates.friction)[:, 0]
             equations.branch = branch._replace(signs=np.where(begins, np.sign(ways), branch.signs))
         elif stop.kind == "limit":
-            self.events.append(Event(stop.name, self.time, rises=False))
+            self.events.append(EventInTime(stop.name, self.time, rises=False))
             self._bounces += 1
             self.state = bounced(self, stop)
             if self._bounces > MAX_BOUNCES and self.ending is None:
@@ -292,7 +292,9 @@ class Integration(MotionInTime):
             poses = Instants(equations, inside, x, velocity).configuration
             parts.append((x, work, equations.rates(inside, x, velocity), poses))
         x, work = (np.concatenate([part[k] for part in parts], axis=-1) for k in (0, 1))
-        rates = Rates(*(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in parts), strict=True)))
+        rates = RatesInTime(
+            *(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in parts), strict=True))
+        )
         vectors = self.mechanism.geometry.nominal
         whole = joined([part[3] for part in parts], times.shape, vectors, {})
         near = self.positions.near(x)

@@ -39,7 +39,7 @@ from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.results import Strands
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import Load
-from mechdesign.study.schema.motions import Course
+from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.schema.poses import MotionSection
 
 # Parts of what a joint bears, as columns of its own.
@@ -338,7 +338,7 @@ class DynamicQuestion(MovedQuestion):
         rates["means"] = section.means or rated.means
         if section.forward is not None:
             # What efforts bring about is a motion over time, whose poses are there already.
-            rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
+            rates = {"motion": dict.fromkeys(study.mechanism.drives, CourseText(held=0.0))}
         moving = KinematicsSection().model_copy(update=rates)
         # The coordinates that the expressions of the loads follow are watched.
         loaded = moving.model_copy(update={"loads": section.loads})

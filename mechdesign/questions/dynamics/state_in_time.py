@@ -13,7 +13,7 @@ from mechdesign.questions.dynamics.instants import Instants
 STANDSTILL = "standstill"
 
 
-class Event(NamedTuple):
+class EventInTime(NamedTuple):
     """A crossing, a limit that is reached, or a standstill, at a time."""
 
     name: str
@@ -66,7 +66,7 @@ class MotionInTime:
         self.time, self.state = 0.0, np.concatenate([x, velocity, np.zeros(works)])
         equations.branch = equations.branch._replace(signs=np.sign(self.sliding(velocity)))
         self.pace, self.scales = self._sizes_of_state(x, velocity, works)
-        self.events: list[Event] = []
+        self.events: list[EventInTime] = []
         self.ending: EndOfRun | None = None
         self.jumps: list[tuple[str, float]] = []
 
@@ -102,4 +102,4 @@ class MotionInTime:
 
     def stands_still(self) -> None:
         """Note that friction holds the whole mechanism from now on."""
-        self.events.append(Event(STANDSTILL, self.time, rises=False))
+        self.events.append(EventInTime(STANDSTILL, self.time, rises=False))

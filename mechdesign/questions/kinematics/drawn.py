@@ -28,7 +28,7 @@ Vector = tuple[str, str | Complexes, Complexes]
 
 
 @dataclass(frozen=True, eq=False)
-class Vectors:
+class DrawnVectors:
     """Vectors of one kind, such as velocities, at places of a mechanism in n poses.
 
     Parameters
@@ -68,7 +68,7 @@ class DrawnPoses(Drawn):
         """The table with a row a pose of a motion of this question."""
         return motion_table(motion)
 
-    def vectors(self, motion: PoseValues, shown: Shown) -> Iterable[Vectors]:
+    def vectors(self, motion: PoseValues, shown: Shown) -> Iterable[DrawnVectors]:
         """Vectors at shown poses of a motion of this question: velocities of the points, where there are rates."""
         question, configuration = motion.question, shown.configuration
         if not question.section.rated:
@@ -83,7 +83,7 @@ class DrawnPoses(Drawn):
             if study.mechanism.graph.is_point(point):
                 x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
                 arrows.append((point, point, np.where(regular, x + 1j * y, np.nan)))
-        yield Vectors("velocity", study.units.label("velocity"), arrows)
+        yield DrawnVectors("velocity", study.units.label("velocity"), arrows)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,8 @@ from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.forces import Moving
 from mechdesign.motion.motion import Motion, SolvedPoses, in_study_units, radians
 from mechdesign.motion.question import PoseQuestion, unfilled
-from mechdesign.motion.rows import GivenRows, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import GivenRows
 from mechdesign.motion.solving import solve_poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics import targets

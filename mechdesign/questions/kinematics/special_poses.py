@@ -38,7 +38,7 @@ SINGULAR = "singular: det_J is 0"
 CHANGE_POINT = "change point: all links in line"
 
 
-class Event(NamedTuple):
+class PoseEvent(NamedTuple):
     """A place on a motion, in rows, and what happens there."""
 
     place: float
@@ -129,26 +129,26 @@ def _spread(motion: PoseValues, kept: Shown, special: Sequence[float]) -> Ints:
 
 def _events(
     question: KinematicQuestion, along: KinematicAlong, limits: Sequence[LimitPlace], toggles: Sequence[Toggle]
-) -> list[Event]:  # fmt: skip
+) -> list[PoseEvent]:  # fmt: skip
     """Limits, singularities and toggles in the order of the motion; those at one place are one."""
     events = []
     for limit in limits:
         where = f" at {limit.cause.joint}" if limit.cause.joint else ""
         kind = PASSED if limit.end is None else f"{LIMIT}: {limit.cause.kind}"
-        events.append(Event(limit.place, (f"{kind}{where}",)))
+        events.append(PoseEvent(limit.place, (f"{kind}{where}",)))
     for toggle in toggles:
         names = toggle.loop.split(" (")[0].split("-")
         pair = next(f"{one} and {two}" for one, two in pairwise(names) if f"{one} {two}" == toggle.links)
         state = toggle.state.replace("perpendicular", "perpendicular to the slide")
         whole = toggle.effect == "change point"
-        events.append(Event(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
-    events += [Event(place, (SINGULAR,)) for place in _singular(question, along)]
+        events.append(PoseEvent(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
+    events += [PoseEvent(place, (SINGULAR,)) for place in _singular(question, along)]
     events.sort(key=lambda event: event.place)
-    merged: list[Event] = []
+    merged: list[PoseEvent] = []
     for event in events:
         if merged and abs(event.place - merged[-1].place) <= SAME * along.curve.poses.end:
             before = merged.pop()
-            event = Event(before.place, tuple(dict.fromkeys(before.words + event.words)))
+            event = PoseEvent(before.place, tuple(dict.fromkeys(before.words + event.words)))
         merged.append(event)
     return merged
 
@@ -164,7 +164,7 @@ def _singular(question: KinematicQuestion, along: KinematicAlong) -> list[float]
     return [float(place) for place in own.functions.zeros(["det_J"], 0.0).place]
 
 
-def _at_events(question: KinematicQuestion, along: KinematicAlong, events: Sequence[Event]) -> list[SpecialPose]:
+def _at_events(question: KinematicQuestion, along: KinematicAlong, events: Sequence[PoseEvent]) -> list[SpecialPose]:
     """The poses of events; those that cannot be assembled (at infinity) are left out."""
     if not events:
         return []

@@ -12,7 +12,8 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.motion.rows import GivenRows, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import GivenRows
 from mechdesign.motion.solving import solve_poses
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import in_words, parted

@@ -18,7 +18,8 @@ from mechdesign.motion.curve import Curve
 from mechdesign.motion.ends import Ends
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import in_study_units
-from mechdesign.motion.rows import GivenRows, Poses
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import GivenRows
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.workspace.columns import PATH, PATH_INDICES
 from mechdesign.questions.workspace.schema import WorkspaceSection

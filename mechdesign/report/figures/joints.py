@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from mechdesign.motion.rows import TIME
+from mechdesign.motion.rules import TIME
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace

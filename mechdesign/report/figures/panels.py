@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.motion.rows import TIME, Path, Poses, Sector, Sectors
+from mechdesign.motion.rows import Poses
+from mechdesign.motion.rules import TIME, PathRows, Sector, Sectors
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.contours import colour_steps, constant, round_levels
@@ -66,7 +67,7 @@ def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
 
 def times(poses: Poses, rows: Floats, speed: float) -> Floats:
     """When a point that passes its path at a speed is at places of it, in rows; in the study's units."""
-    assert isinstance(poses.rule, Path)
+    assert isinstance(poses.rule, PathRows)
     return poses.rule.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
 
 

@@ -13,7 +13,7 @@ from mechdesign.motion.curve import Curve
 from mechdesign.motion.question import PoseValues
 from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.questions.kinematics.along import KinematicAlong
-from mechdesign.questions.kinematics.drawn import DrawnPoses, Vectors
+from mechdesign.questions.kinematics.drawn import DrawnPoses, DrawnVectors
 from mechdesign.questions.kinematics.moved import full
 from mechdesign.questions.poses import Shown
 from mechdesign.report.figures.sweep import Sweep
@@ -29,7 +29,7 @@ _COMMON, _BOUND = 0.9, 3.0  # quantile of the largest vectors of the poses, and 
 _HALVINGS = 8  # of the way from one pose to the next at most: a jump is never short enough
 
 
-def largest(vectors: Iterable[Vectors]) -> dict[str, float]:
+def largest(vectors: Iterable[DrawnVectors]) -> dict[str, float]:
     """Size of the longest arrow by its unit, 0 where none has any: the largest, but near a singularity, where vectors
     grow without bound, a few times the usual largest one of a pose.
     """

@@ -12,7 +12,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import Joints
-from mechdesign.motion.rows import TIME
+from mechdesign.motion.rules import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath

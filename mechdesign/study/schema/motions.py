@@ -64,7 +64,7 @@ def _segments(raw: Any) -> Any:
     return raw
 
 
-class Course(fields.Model):
+class CourseText(fields.Model):
     """What one coordinate does over time; a list of segments, a CSV file's name or a number alone are short forms."""
 
     short = ({"type": ["string", "number"], "title": "file or number"},)
@@ -85,12 +85,12 @@ class Course(fields.Model):
     def _long_form(cls, raw: Any) -> Any:
         if isinstance(raw, dict) and not raw.keys().isdisjoint(("to", "dwell")):
             raise failure(f"segments of a motion stand in a list, {_RIGHT}")
-        if isinstance(raw, dict | Course):
+        if isinstance(raw, dict | CourseText):
             return raw
         return {"segments" if isinstance(raw, list) else "file" if file_of(raw) is not None else "held": raw}
 
     @model_validator(mode="after")
-    def _begins(self) -> Course:
+    def _begins(self) -> CourseText:
         if self.segments is None:
             return self
         for number, segment in enumerate(self.segments[1:], start=2):

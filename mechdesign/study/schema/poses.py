@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import cut
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.motions import Course
+from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields
@@ -31,7 +31,7 @@ def _range(raw: list[Any] | str) -> str:
     return "from: {}, to: {}, step: {}".format(*parts) if len(parts) == 3 else ""
 
 
-class Sweep(fields.Model):
+class SweepText(fields.Model):
     """Values of one coordinate, both ends included; a number alone is held."""
 
     short = (fields.NUMBER_FORM,)
@@ -52,7 +52,7 @@ class Sweep(fields.Model):
         return {"from": raw, "to": raw, "number": 1} if isinstance(raw, int | float | str) else raw
 
     @model_validator(mode="after")
-    def _spacing(self) -> Sweep:
+    def _spacing(self) -> SweepText:
         if (self.step is None) == (self.number is None):
             raise failure("a sweep needs either 'step' or 'number'")
         return self
@@ -68,7 +68,7 @@ def _sweeps(raw: Any) -> Any:
     """Ranges by coordinate as they are; a range without its coordinate is a mistake."""
     if not isinstance(raw, dict) or len(raw) < 2 or any(isinstance(value, dict) for value in raw.values()):
         return raw
-    given = {key: raw[key] for key in Sweep.fields_by_key() if key in raw}
+    given = {key: raw[key] for key in SweepText.fields_by_key() if key in raw}
     names = [value for key, value in raw.items() if key not in given and fields.NAME.fullmatch(str(value))]
     # A coordinate may have the name of a key, and be held: {theta: 30, step: 5}.
     if not given or not (names or given.keys() & {"from", "to"}):
@@ -107,7 +107,7 @@ class PoseSection(Section):
     kinematics, and there a turn of the drive or its limits. Example: [{theta1: 30, theta2: 60}, {C.x: 0.2, C.y: 1.1}]
     Example: workspace
     """
-    sweep: Annotated[dict[fields.CoordinateName, Sweep], BeforeValidator(_sweeps)] | None = None
+    sweep: Annotated[dict[fields.CoordinateName, SweepText], BeforeValidator(_sweeps)] | None = None
     """Ranges of coordinates; several make a grid, and a number alone is held. Example: {theta: {from: 0, to: 360, step:
     5}}
     """
@@ -182,7 +182,7 @@ class MotionSection(PoseSection):
     """What means, rms and evenness of the motion are over. Left out: what is swept, or the length of a path; in a
     ``motion`` time. Example: time
     """
-    motion: dict[fields.CoordinateName, Course] | None = None
+    motion: dict[fields.CoordinateName, CourseText] | None = None
     """What drives or other coordinates do over time, as many as the mobility, in place of poses and rates: moves by a
     law and dwells, or a CSV file of times and values; a number alone is held. All end at the same time. Example:
     {theta: [{to: 90, time: 0.3, law: cycloidal}, {dwell: 0.1}, {to: 0, time: 0.4}]} Example: {C.x: {file:
@@ -310,7 +310,7 @@ def source_of(checker: Checker, section: PoseSection) -> PoseSection:
     return section if section.source is not None else checker.parts.get("kinematics") or section
 
 
-def _motion(section: PoseSection) -> dict[str, Course]:
+def _motion(section: PoseSection) -> dict[str, CourseText]:
     """What a section prescribes over time."""
     return (section.motion or {}) if isinstance(section, MotionSection) else {}
 
