@@ -10,7 +10,8 @@ import numpy as np
 
 from mechdesign.cautions import fails
 from mechdesign.errors import explain
-from mechdesign.experiments.case_numbers import CaseNumber, judged
+from mechdesign.experiments.case_numbers import judged, number_of
+from mechdesign.family.goals import Goal
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report import requirements
@@ -135,7 +136,7 @@ class Answered:
 class Sheet:
     """Collects the answers of some cases, command by command."""
 
-    def __init__(self, study: Study, results: Sequence[CaseNumber], count: int) -> None:
+    def __init__(self, study: Study, results: Sequence[Goal], count: int) -> None:
         self._results, self._mobility = results, study.mechanism.mobility
         #: by the row: what the case requires, the study's own until it is set
         self.judging = [Judging.of(study)] * count
@@ -177,9 +178,9 @@ class Sheet:
         if not good.any():
             return
         try:
-            for k, number in enumerate(self._results):
-                if number.command == command:
-                    values, self._units[k] = number.find(group)
+            for k, goal in enumerate(self._results):
+                if goal.command == command:
+                    values, self._units[k] = number_of(goal, group)
                     self._numbers[rows[good], k] = values[good]
             for k, judged_command in enumerate(self._commands):
                 if judged_command == command:

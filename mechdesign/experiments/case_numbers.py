@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mechdesign.experiments.schema.matrix import Named
+from mechdesign.family.goals import Goal, goal
 from mechdesign.family.judge import Judgement, judge
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Flags, Floats
@@ -17,63 +17,30 @@ from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, path_of, terms_of
-from mechdesign.terms import command_of as command_named
 
 
-@dataclass(frozen=True)
-class CaseNumber:
-    """A number of a case by the name of a result.
-
-    Parameters
-    ----------
-    name : str
-        ``COMMAND.COLUMN``, ``COMMAND.TABLE.COLUMN`` or ``COMMAND.TABLE.ROW.COLUMN``, as in requirements, or a number of
-        the workspace alone (``GII``). Of several rows one of `mechdesign.statistics.STATISTICS` follows. A sum of such
-        numbers is a number, too.
-    where : tuple of (str, value)
-        Only rows whose columns have these values count.
-    keys : tuple
-        Where the study names it.
-    whole : bool
-        Whether it is nan where poses, samples or a part of the motion are missing.
-    """
-
-    name: str
-    where: tuple[tuple[str, Any], ...] = ()
-    keys: KeyPath = ()
-    whole: bool = False
-
-    @property
-    def title(self) -> str:
-        """The name, and in parentheses which rows count."""
-        where = ", ".join(f"{column} {value}" for column, value in self.where)
-        return f"{self.name} ({where})" if where else self.name
-
-    @property
-    def command(self) -> str:
-        """The command that computes it."""
-        return command_named(self.name) or "workspace"
-
-    def find(self, group: DesignGroup) -> tuple[Floats, str]:
-        """The number of each design, shape (designs,), nan where a row that counts has none; and its unit.
-
-        Raises
-        ------
-        UnknownColumnError
-            If there is no such column or row, or several rows count and no statistic is named; also where designs
-            differ in their number of rows, so that each has to be read by itself.
-        """
-        terms = _terms(group, path_of(self.name), dict(self.where))
-        numbers = terms.numbers(len(group.ends))
-        return np.where(incomplete(group, terms), np.nan, numbers) if self.whole else numbers, terms.unit
-
-
-def numbers_in(section: str, results: Iterable[Named]) -> list[CaseNumber]:
-    """The numbers that a section of the study lists as its results."""
-    return [
-        CaseNumber(result.result, tuple(result.where.items()), (section, "results", k))
+def goals_in(
+    section: KeyPath, results: Iterable[Named], *, smallest: bool = False, whole: bool = False
+) -> dict[Goal, KeyPath]:
+    """The numbers that a section of the study lists as its results, with their places in the study."""
+    return {
+        goal(result.result, smallest=smallest, where=result.where, single=True, whole=whole): (*section, k)
         for k, result in enumerate(results)
-    ]
+    }
+
+
+def number_of(goal: Goal, group: DesignGroup) -> tuple[Floats, str]:
+    """A number of each design, shape (designs,), nan where a row that counts has none; and its unit.
+
+    Raises
+    ------
+    UnknownColumnError
+        If there is no such column or row, or several rows count and no statistic is named; also where designs differ in
+        their number of rows, so that each has to be read by itself.
+    """
+    terms = _terms(group, goal.column, dict(goal.where))
+    numbers = terms.numbers(len(group.ends))
+    return np.where(incomplete(group, terms), np.nan, numbers) if goal.whole else numbers, terms.unit
 
 
 def judged(group: DesignGroup, required: Sequence[Requirement]) -> tuple[Judgement, Flags, str]:
@@ -87,7 +54,7 @@ def judged(group: DesignGroup, required: Sequence[Requirement]) -> tuple[Judgeme
     Raises
     ------
     UnknownColumnError
-        See `CaseNumber.find`; also where designs are judged on other rows.
+        See `number_of`; also where designs are judged on other rows.
     """
     one = required[0]
     if any(other is not one and _subject(other) != _subject(one) for other in required):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -12,8 +12,9 @@ import numpy as np
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.experiments.answered import Answered, Sheet
-from mechdesign.experiments.case_numbers import CaseNumber
+from mechdesign.experiments.case_numbers import number_of
 from mechdesign.family import stacked
+from mechdesign.family.goals import Goal
 from mechdesign.family.structures import Form, Structures, Values
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Ints
@@ -23,6 +24,7 @@ from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
 from mechdesign.work.chunks import map_chunks
@@ -39,7 +41,7 @@ def seeded(study: Study, seed: int | None) -> Study:
 
 
 def answers(
-    study: Study, cases: Sequence[Changes], results: Sequence[CaseNumber] = (), *, begin: int = 0, jobs: int | None = 1,
+    study: Study, cases: Sequence[Changes], results: Sequence[Goal] = (), *, begin: int = 0, jobs: int | None = 1,
     shard: Shard = WHOLE,
 ) -> Iterator[Answered]:  # fmt: skip
     """Verdicts on the requirements and the `results` of the cases of a study, batch by batch.
@@ -57,7 +59,7 @@ def answers(
 class Answer:
     """Answers cases of a study; numbers of entries that it leaves out are those of the `first` of them."""
 
-    def __init__(self, study: Study, results: tuple[CaseNumber, ...], first: Changes) -> None:
+    def __init__(self, study: Study, results: tuple[Goal, ...], first: Changes) -> None:
         self._study, self._results = study, results
         self._structures = Structures(study, dict(first))
 
@@ -140,21 +142,20 @@ def is_number(value: Any) -> bool:
     return number or (isinstance(value, str) and QUANTITY.fullmatch(value) is not None)
 
 
-def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:
+def commands_of(study: Study, results: Iterable[Goal]) -> tuple[str, ...]:
     """The commands that compute the requirements of a study and some results."""
-    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in results}
+    needed = {command_of(requirement) for requirement in study.requirements} | {goal.command for goal in results}
     return tuple(command for command in COMMANDS if command in needed)
 
 
-def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
-    """Find results and requirements that no table has, by a short look at each command's answer.
+def foresee(study: Study, results: Mapping[Goal, KeyPath]) -> None:
+    """Find results, with their places in the study, and requirements that no table has; it looks at answers.
 
     Raises
     ------
     StudyError
         Every such mistake in one go, with its place.
     """
-    results = tuple(results)
     problems: list[Problem] = []
     for command in commands_of(study, results):
         try:
@@ -162,12 +163,12 @@ def foresee(study: Study, results: Iterable[CaseNumber]) -> None:
         except AssemblyError:
             # A case with other numbers may assemble.
             continue
-        for number in results:
-            if number.command == command:
+        for goal, place in results.items():
+            if goal.command == command:
                 try:
-                    number.find(DesignGroup.alone(result))
+                    number_of(goal, DesignGroup.alone(result))
                 except UnknownColumnError as error:
-                    problems.append(study.problem(str(error), *number.keys))
+                    problems.append(study.problem(str(error), *place))
         try:
             requirements.requirements(study, result, fewer=with_fewer_rows(result))
         except StudyError as error:

@@ -15,9 +15,10 @@ from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
 from mechdesign.experiments.answered import Answered
-from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
+from mechdesign.experiments.case_numbers import goals_in
 from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.schema.sensitivities import Changed
+from mechdesign.family.goals import Goal
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -52,7 +53,7 @@ class Changing:
             yield from (((self.name, self.value + sign * step),) for step in (self.step * STEPS).tolist())
 
 
-def prepared(study: Study) -> tuple[list[CaseNumber], list[Changing]]:
+def prepared(study: Study) -> tuple[list[Goal], list[Changing]]:
     """The results to differentiate and the numbers that change, checked by a short look at the study's answers.
 
     Raises
@@ -65,7 +66,7 @@ def prepared(study: Study) -> tuple[list[CaseNumber], list[Changing]]:
         raise StudyError(
             "sensitivities need a section of that name, e.g. sensitivities: {results: [GII], parameters: [r]}"
         )
-    results = numbers_in(SENSITIVITIES.name, section.results)
+    results = goals_in((SENSITIVITIES.name, "results"), section.results)
     changes: list[Changing] = []
     problems: list[Problem] = []
     for k, parameter in enumerate(section.parameters):
@@ -79,7 +80,7 @@ def prepared(study: Study) -> tuple[list[CaseNumber], list[Changing]]:
     if problems:
         raise StudyError(problems)
     foresee(study, results)
-    return results, changes
+    return [*results], changes
 
 
 def _changing(study: Study, changed: Changed) -> Changing:
@@ -133,7 +134,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     return Result(SENSITIVITIES.name, {table.name: table}, warnings, counts, failed)
 
 
-def _table(results: Sequence[CaseNumber], numbers: Sequence[Changing], whole: Answered) -> tuple[Table, list[str]]:
+def _table(results: Sequence[Goal], numbers: Sequence[Changing], whole: Answered) -> tuple[Table, list[str]]:
     """The derivative of each result by each number, and why it is unknown or uncertain; empty where it is neither."""
     middle, size = whole.table[0, 3:], 2 * len(STEPS)
     sides = whole.table[1:, 3:].reshape(len(numbers), 2, len(STEPS), len(results))
@@ -150,7 +151,7 @@ def _table(results: Sequence[CaseNumber], numbers: Sequence[Changing], whole: An
     units = [(whole.units[j], numbers[k].unit) for j, k in pairs]
     table = columns.SENSITIVITIES
     return table.table(table.columns(
-        {}, result=np.array([results[j].title for j, _ in pairs]),
+        {}, result=np.array([results[j].name for j, _ in pairs]),
         parameter=np.array([numbers[k].given for _, k in pairs]), derivative=derivative, error=error,
         unit=np.array([Units.ratio(*both) for both in units]), elasticity=elasticity, below=low, above=high,
         value=value, value_unit=np.array([unit for unit, _ in units]), at=at,

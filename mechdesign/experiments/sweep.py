@@ -15,17 +15,19 @@ from mechdesign.cautions import Caution
 from mechdesign.columns import Column
 from mechdesign.errors import Interrupted, StudyError, counted
 from mechdesign.experiments.answered import IMPOSSIBLE, NOT_MET, Answered
-from mechdesign.experiments.case_numbers import CaseNumber, numbers_in
+from mechdesign.experiments.case_numbers import goals_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.design import Design, cases_of, tried
-from mechdesign.experiments.ranking import Ranking, goals_of
+from mechdesign.experiments.ranking import ranked
+from mechdesign.family.goals import Goal
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
-from mechdesign.report.cases import text_of
+from mechdesign.report.cases import FRONT, RANK, text_of
 from mechdesign.report.requirements import DrawnCases, in_words, over_cases
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit, is_judged, with_entries
@@ -36,7 +38,7 @@ from mechdesign.work.threads import one_thread
 _SECTION = "matrix"
 
 
-def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
+def prepared(study: Study) -> tuple[Design, list[Goal]]:
     """The cases of a study and the results to compute of each, checked by a short look at the study's answers.
 
     Raises
@@ -49,8 +51,9 @@ def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
         raise StudyError(
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
-    goals = {number.title: number for number in goals_of(matrix.best)}
-    results = [*({number.title: number for number in numbers_in(_SECTION, matrix.results)} | goals).values()]
+    places = goals_in((_SECTION, "results"), matrix.results) | _goals(study)
+    # A goal stands for the result of its name.
+    results = {goal: places[goal] for goal in {goal.name: goal for goal in places}.values()}
     if not commands_of(study, results):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
@@ -59,7 +62,7 @@ def prepared(study: Study) -> tuple[Design, list[CaseNumber]]:
     _foresee_limits(study, cases)
     # A number with a requirement has a column already.
     required = requirement_names(study, [*cases.columns])
-    return cases, [number for number in results if number.title not in required]
+    return cases, [goal for goal in results if goal.name not in required]
 
 
 def _foresee_limits(study: Study, cases: Design) -> None:
@@ -73,7 +76,7 @@ def _foresee_limits(study: Study, cases: Design) -> None:
     for name, value in tried(study, cases):
         if is_judged(name) and QUANTITY.fullmatch(str(value)):
             try:
-                foresee(with_entries(study, [(name, value)]), ())
+                foresee(with_entries(study, [(name, value)]), {})
             except StudyError as error:
                 message = f"{name}={value}: {'; '.join(problem.message for problem in error.problems)}"
                 raise StudyError([study.problem(message, _SECTION)]) from None
@@ -144,7 +147,7 @@ def merged(study: Study, blocks: Sequence[Block], *, seed: int | None = None) ->
     return _result(study, cases, whole, results)
 
 
-def _result(study: Study, cases: Design, whole: Answered, results: Sequence[CaseNumber]) -> Result:
+def _result(study: Study, cases: Design, whole: Answered, results: Sequence[Goal]) -> Result:
     """The result with the table of the answered cases."""
     count, total, failed = len(whole), len(cases), np.flatnonzero(whole.table[:, 0] >= IMPOSSIBLE).tolist()
     counts = {"cases": count, "not_met": int((whole.table[:, 0] == NOT_MET).sum()), "failed": len(failed)}
@@ -154,20 +157,21 @@ def _result(study: Study, cases: Design, whole: Answered, results: Sequence[Case
         message = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
     part = f"{count} of {total} cases were answered; this is what they are" if count < total else ""
     table = SWEEP.table(_columns(study, cases, whole, results))
-    ranked = None
+    with_rank = None
     if goals := _goals(study):
-        ranking = Ranking.of(goals, {name: table[name] for name in goals}, table["exit_code"] == 0)
-        ranked = np.isfinite(ranking.rank)
-        table = replace(table, columns=(*table.columns, *ranking.columns()))
+        costs = np.stack([goal.sign * table[goal.name] for goal in goals], axis=1)
+        rank, front = ranked(costs, table["exit_code"] == 0)
+        with_rank = np.isfinite(rank)
+        table = replace(table, columns=(*table.columns, *SWEEP.columns({}, **{RANK: rank, FRONT: front})))
         if study.matrix and study.matrix.best and study.matrix.best.sort:
-            table = table.take(np.argsort(ranking.rank, kind="stable"))
+            table = table.take(np.argsort(rank, kind="stable"))
     return Result(
-        "sweep", {"sweep": table}, tuple(_warnings(study, cases, whole, ranked)), counts, message, interrupted=part,
+        "sweep", {"sweep": table}, tuple(_warnings(study, cases, whole, with_rank)), counts, message, interrupted=part,
         drawn=_drawn(study, cases, whole, results),
     )  # fmt: skip
 
 
-def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[CaseNumber]) -> DrawnCases:
+def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[Goal]) -> DrawnCases:
     """The entries that vary, the results with what is required of them, and which are goals."""
     entries = [*cases.columns]
     verdicts = tuple(
@@ -178,8 +182,9 @@ def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[CaseN
     bounds = [(None, None) if k in own else (requirement.at_least, requirement.at_most)
               for k, requirement in enumerate(study.requirements)]  # fmt: skip
     limits = dict(zip(requirement_names(study, entries), bounds, strict=True))
-    results = limits | {number.title: (None, None) for number in numbers}
-    return DrawnCases(entries, results, _goals(study), verdicts)
+    results = limits | {goal.name: (None, None) for goal in numbers}
+    goals = {goal.name: int(goal.sign) for goal in _goals(study)}
+    return DrawnCases(entries, results, goals, verdicts)
 
 
 def _limits_of_cases(study: Study, entries: Sequence[str]) -> set[int]:
@@ -198,13 +203,15 @@ def _varies(entries: Sequence[str], k: int, key: str = "") -> bool:
     return any(f"{place}.".startswith(f"{name}.") or f"{name}.".startswith(f"{place}.") for name in entries)
 
 
-def _goals(study: Study) -> dict[str, int]:
-    """Goals by their columns: 1 for a minimised, -1 for a maximised one."""
-    best = study.matrix.best if study.matrix is not None else None
-    return {number.title: sign for number, sign in goals_of(best).items()}
+def _goals(study: Study) -> dict[Goal, KeyPath]:
+    """What is best of the cases, large before small, with its places in the study."""
+    best, goals = study.matrix and study.matrix.best, dict[Goal, KeyPath]()
+    for key in ("maximize", "minimize") if best else ():
+        goals |= goals_in((_SECTION, "best", key), getattr(best, key), smallest=key == "minimize", whole=True)
+    return goals
 
 
-def _columns(study: Study, cases: Design, whole: Answered, numbers: Sequence[CaseNumber]) -> Iterator[Column]:
+def _columns(study: Study, cases: Design, whole: Answered, numbers: Sequence[Goal]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(whole), whole.table
     labels = {"label": np.array(cases.labels[:count])} if cases.labels else {}
@@ -216,8 +223,8 @@ def _columns(study: Study, cases: Design, whole: Answered, numbers: Sequence[Cas
         limit = "what the case requires" if k in own else str(whole.worst[k].verdict.requirement)
         yield SWEEP["<requirement>"].column(*whole.number(len(numbers) + k), requirement=name, limit=limit)
         yield SWEEP["<requirement>_met"].column(table[:, k - len(whole.worst)] == 1, requirement=name)
-    for k, number in enumerate(numbers):
-        yield SWEEP["<result>"].column(*whole.number(k), result=number.title)
+    for k, goal in enumerate(numbers):
+        yield SWEEP["<result>"].column(*whole.number(k), result=goal.name)
     reasons = np.array([*whole.reasons], dtype=object)[table[:, 2].astype(np.intp)]
     yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
 

@@ -135,8 +135,7 @@ def _goals(study: Study, results: Sequence[Named]) -> list[Goal]:
         ]
         raise StudyError([_renamed(problem, names) for problem in error.problems]) from None
     assert matrix is not None
-    named = [goal(result.result, where=result.where) for result in matrix.results]
-    return [replace(own, single=True, absolute=False) for own in named]
+    return [goal(result.result, where=result.where, single=True) for result in matrix.results]
 
 
 def _renamed(problem: Problem, names: Sequence[str]) -> Problem:

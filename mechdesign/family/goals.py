@@ -53,6 +53,8 @@ class Goal:
         Whether it is a condition.
     single : bool
         Whether it is the one number that a row or a statistic gives, not the worst of several rows.
+    whole : bool
+        Of a case, whether it is nan where poses, samples or a part of the motion are missing.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Goal:
     outline: Outline | None = None
     gate: bool = False
     single: bool = False
+    whole: bool = False
 
     @property
     def sign(self) -> float:
@@ -169,17 +172,19 @@ def _errors(result: Result, output: str, rms: Floats) -> Floats:
 
 def goal(
     result: str | Expression, *, smallest: bool = False, where: Mapping[str, object] | None = None,
-    absolute: bool = False, unassembled: bool = False,
+    absolute: bool = False, unassembled: bool = False, single: bool = False, whole: bool = False,
 ) -> Goal:  # fmt: skip
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
 
-    Of an error the absolute value always counts.
+    Of an error the absolute value always counts, unless it is a `single` number.
     """
     name, command, column, expression = _parts(result)
     rows = tuple((where or {}).items())
     title = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
-    absolute = absolute or (expression is None and column.endswith("_error"))
-    return Goal(title, command, column, smallest, absolute, rows, 0.0, unassembled, expression)
+    absolute = absolute or (expression is None and column.endswith("_error") and not single)
+    return Goal(
+        title, command, column, smallest, absolute, rows, 0.0, unassembled, expression, single=single, whole=whole
+    )
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:

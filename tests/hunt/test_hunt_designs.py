@@ -15,7 +15,7 @@ import numpy as np
 import mechdesign
 from mechdesign.errors import MechdesignError
 from mechdesign.experiments.answered import Answered
-from mechdesign.experiments.case_numbers import CaseNumber
+from mechdesign.experiments.case_numbers import number_of
 from mechdesign.experiments.cases import answers
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
@@ -281,7 +281,7 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 entries[".".join(map(str, path))] = float(value) * (1 + WIDTH * rng.uniform(-1, 1))
             cases.append(entries)
         names = [f"{name}.{word}" for name in columns(command, own)[:12] for word in ("min", "max")]
-        wanted = [CaseNumber(name) for name in names]
+        wanted = [goal(name, single=True) for name in names]
         whole = Answered()
         for answered in answers(mechdesign.load(data), [tuple(entries.items()) for entries in cases], wanted):
             whole.add(answered)
@@ -301,7 +301,7 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 first = next(warning for warning in result.warnings if warning.kind == kind)
                 assert whole.warned[kind].message.startswith(f"{command}: {first}"), seed
             for j, each in enumerate(wanted):
-                (expected,) = each.find(DesignGroup.alone(result))[0].tolist()
+                (expected,) = number_of(each, DesignGroup.alone(result))[0].tolist()
                 assert same(whole.number(j)[0][k], expected), (seed, each.name, whole.number(j)[0][k])
                 compared += 1
     assert compared

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.experiments.ranking import Ranking
+from mechdesign.experiments.ranking import ranked
 from mechdesign.motion.functions import Functions
 from mechdesign.report.cases import best_of
 from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
@@ -60,12 +60,12 @@ def test_several_goals_rank_by_the_sum_of_parts_of_their_ranges_and_mark_the_fro
 def test_equal_cases_share_a_rank_and_rounding_makes_none_better():
     values = np.array([2.0, 1.0, 1.0 + 1e-15, 3.0, np.nan, 0.0])
     admitted = np.array([True, True, True, True, True, False])
-    ranking = Ranking.of({"a": 1}, {"a": values}, admitted)
-    np.testing.assert_array_equal(ranking.rank, [3, 1, 1, 4, np.nan, np.nan])
-    assert ranking.front.tolist() == [False, True, True, False, False, False]
-    assert Ranking.of({"a": -1}, {"a": values}, admitted).rank[3] == 1
-    flat = Ranking.of({"a": 1, "b": -1}, {"a": values, "b": np.array([1, 1, 1, 1 - 1e-16, 1, 1])}, admitted)
-    np.testing.assert_array_equal(flat.rank, ranking.rank)
+    rank, front = ranked(values[:, None], admitted)
+    np.testing.assert_array_equal(rank, [3, 1, 1, 4, np.nan, np.nan])
+    assert front.tolist() == [False, True, True, False, False, False]
+    assert ranked(-values[:, None], admitted)[0][3] == 1
+    flat = np.stack([values, -np.array([1, 1, 1, 1 - 1e-16, 1, 1])], axis=1)
+    np.testing.assert_array_equal(ranked(flat, admitted)[0], rank)
 
 
 @pytest.mark.slow
