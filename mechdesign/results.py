@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
 from mechdesign.columns import Column, ColumnKind, filled
-from mechdesign.statistics import Follow
+from mechdesign.statistics import Request
 
 if TYPE_CHECKING:
     import pandas
@@ -108,14 +108,15 @@ class Scope:
     missing : str
         In words, which poses or parts of the motion are not valid; empty where all are.
     follow : callable, optional
-        Columns along the motion, or parts of it; None for each that is not known there.
+        Columns along the motion, or parts of it, as `mechdesign.motion.followed` has them, asked together; None for
+        each that is not known there.
     until : str
         In words, where the motion has its own end before the time that was asked.
     """
 
     poses_only: bool = False
     missing: str = ""
-    follow: Follow | None = None
+    follow: Callable[[Sequence[Request]], Sequence[Any]] | None = None
     until: str = ""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from mechdesign.results import Result, Strands, Table
 from mechdesign.row_values import equal_to, present_words
 from mechdesign.statistics import (
     STATISTICS,
-    Course,
     Interval,
     Measured,
     Part,
@@ -27,6 +26,9 @@ from mechdesign.statistics import (
     no_value,
     no_value_along,
 )  # fmt: skip
+
+if TYPE_CHECKING:
+    from mechdesign.motion.followed import Followed
 
 # Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.
 IN_UNIT = "in `unit`"
@@ -94,7 +96,7 @@ class Chosen:
         return tuple(filter(None, [self.table.scope.missing if self.table.scope is not None else "", *rows]))
 
     @cached_property
-    def courses(self) -> Mapping[str, Course]:
+    def courses(self) -> Mapping[str, Followed]:
         """The column between the rows, where these are poses of a motion that is followed.
 
         Of a table with several rows a pose there is one of each, by its words.
@@ -155,10 +157,11 @@ class Chosen:
             if not self.courses:
                 return rows
             courses = [*self.courses.values()]
+            rounding = max(course.rounding for course in courses)
             lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
-            numbers = np.where(lost, rows, statistic(Several(courses, spread)))
+            numbers = np.where(lost, rows, statistic(Several(courses, spread, rounding)))
             if not STATISTICS[self.statistic].pure:
-                numbers = cleared(numbers, max(course.rounding for course in courses))
+                numbers = cleared(numbers, rounding)
             return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
 
     def _several(self, count: int) -> str:

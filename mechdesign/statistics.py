@@ -111,17 +111,21 @@ class RowSpread:
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Values of several columns along motions, of as many values each, as those of one, and of the rows among them."""
+    """Values of several columns along motions, of as many values each, as those of one, and of the rows among them.
 
-    parts: Sequence[Course]
+    Values up to `rounding` are rounding.
+    """
+
+    parts: Sequence[Spread]
     rows: RowSpread
+    rounding: float
 
     def end(self, sign: int) -> Floats:
         """The largest value of all, or with the sign -1 the smallest: that of a row where it is farther out."""
         between = sign * np.max([sign * part.end(sign) for part in self.parts], axis=0)
-        row, rounding = self.rows.end(sign), max(part.rounding for part in self.parts)
+        row = self.rows.end(sign)
         with np.errstate(invalid="ignore"):
-            return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), rounding), row, between)
+            return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), self.rounding), row, between)
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of all values."""
@@ -196,48 +200,6 @@ class Request(NamedTuple):
     def columns(self) -> tuple[str, ...]:
         """The column, and the columns that bound the part."""
         return (self.column, *(name for name, _ in self.part))
-
-
-class Course(Spread, Protocol):
-    """A column along the motion of each design, or a part of it, between the poses as well."""
-
-    @property
-    def followed(self) -> Flags:
-        """Which motions are followed between their poses, shape (designs,)."""
-
-    @property
-    def rounding(self) -> float:
-        """Values up to this are rounding."""
-
-    @property
-    def lost(self) -> Floats:
-        """Part of each motion on which it has no value, shape (designs,)."""
-
-    def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
-        """The largest value times the sign (of absolute values, where these count) and its place in rows.
-
-        The value is that of the function; both are of shape (designs,).
-        """
-
-    def at(self, parts: Floats) -> Floats:
-        """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
-
-    def pose(self, place: float) -> Mapping[str, float]:
-        """What the poses give at a place of the first design's motion, in the study's units."""
-
-    def shown(self, place: float) -> str:
-        """A place of the first design's motion in words."""
-
-    @property
-    def means_over(self) -> str:
-        """What means are over, in words; empty where it is time, or there is none."""
-
-    def of(self, design: int) -> Course | None:
-        """The column along the motion of one of the designs; None where it is not followed."""
-
-
-# Columns along motions, asked together; None for each that is not known there.
-Follow = Callable[[Sequence[Request]], Sequence[Course | None]]
 
 
 def no_value(number: int, count: int, noun: str = "pose") -> str:

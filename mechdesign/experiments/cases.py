@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import number_of
 from mechdesign.family import stacked
@@ -18,9 +18,9 @@ from mechdesign.family.goals import Goal
 from mechdesign.family.structures import Form, Structures, Values
 from mechdesign.motion.group import DesignGroup
 from mechdesign.numerics.arrays import Ints
-from mechdesign.questions.look import look, with_fewer_rows
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
+from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
@@ -149,29 +149,22 @@ def commands_of(study: Study, results: Iterable[Goal]) -> tuple[str, ...]:
 
 
 def foresee(study: Study, results: Mapping[Goal, KeyPath]) -> None:
-    """Find results, with their places in the study, and requirements that no table has; it looks at answers.
+    """Find results and requirements that no table has, by a short look at each command's answer.
+
+    `results` are with their places in the study.
 
     Raises
     ------
     StudyError
         Every such mistake in one go, with its place.
     """
-    problems: list[Problem] = []
-    for command in commands_of(study, results):
-        try:
-            result = look(study, command)
-        except AssemblyError:
-            # A case with other numbers may assemble.
-            continue
+
+    def unknown(result: Result) -> Iterator[Problem]:
         for goal, place in results.items():
-            if goal.command == command:
-                try:
+            try:
+                if goal.command == result.command:
                     number_of(goal, DesignGroup.alone(result))
-                except UnknownColumnError as error:
-                    problems.append(study.problem(str(error), *place))
-        try:
-            requirements.requirements(study, result, fewer=with_fewer_rows(result))
-        except StudyError as error:
-            problems += error.problems
-    if problems:
-        raise StudyError(problems)
+            except UnknownColumnError as error:
+                yield study.problem(str(error), *place)
+
+    requirements.foresee(study, COMMANDS, also={goal.command: unknown for goal in results})

@@ -1,4 +1,4 @@
-"""Columns along motions as `mechdesign.statistics.Course` has them: of all designs together, and of one of them."""
+"""Columns along motions, of all designs together and of one of them: as requirements, goals and pictures see them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Courses:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A column over motions of all designs or of one, or the same part of each; see `mechdesign.statistics.Course`.
+    """A column over motions of all designs or of one, or the same part of each.
 
     `largest` has, by sign, the largest values of all designs times the sign, once they are asked for.
     """

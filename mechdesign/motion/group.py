@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import overload
 
 import numpy as np
 
 from mechdesign.cautions import Caution
+from mechdesign.motion.followed import Followed
 from mechdesign.numerics.arrays import Flags, Ints
 from mechdesign.results import Result, Scope, Table
-from mechdesign.statistics import Course, Follow, Request
+from mechdesign.statistics import Request
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +90,13 @@ class DesignGroup:
         return replace(own, scope=scope)
 
 
-def _follow_of(scope: Scope, design: int) -> Follow | None:
+def _follow_of(scope: Scope, design: int) -> Callable[[Sequence[Request]], list[Followed | None]] | None:
     """Columns along the motion of one design of several."""
     together = scope.follow
     if together is None:
         return None
 
-    def own(requests: Sequence[Request]) -> list[Course | None]:
+    def own(requests: Sequence[Request]) -> list[Followed | None]:
         return [None if course is None else course.of(design) for course in together(requests)]
 
     return own

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from mechdesign.terms import command_of as command_named
 
 Limits = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
+Check = Callable[[Result], Iterable[Problem]]
 # Place of a verdict where the motion never enters the part that a requirement is about.
 _OUTSIDE = "no place of the motion"
 
@@ -128,7 +130,9 @@ def number_of(study: Study, command: str) -> int:
     return len(judged_by(study, command)) + len(study.barred)
 
 
-def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
+def foresee(
+    study: Study, commands: Iterable[str], *, goals: bool = False, also: Mapping[str, Check] = MappingProxyType({})
+) -> None:
     """Check before a long computation that the requirements of commands name columns that their results will have.
 
     Parameters
@@ -136,6 +140,8 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     goals : bool
         Whether to look at the choices, goals and conditions of `optimize` as well, which its own computation begins
         with.
+    also : mapping of str to callable
+        What else is wrong with a look at the results of commands.
 
     Raises
     ------
@@ -145,7 +151,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     from mechdesign.questions.look import look, with_fewer_rows
 
     problems: list[Problem] = []
-    judged = {command_of(requirement) for requirement in study.requirements}
+    judged = {command_of(requirement) for requirement in study.requirements} | also.keys()
     if goals and study.optimize is not None:
         from mechdesign.questions.optimize.question import designs_question
 
@@ -159,6 +165,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     for command in [name for name in commands if name in judged]:
         try:
             glance = look(study, command)
+            problems += also[command](glance) if command in also else ()
             requirements(study, glance, fewer=with_fewer_rows(glance))
         except AssemblyError:
             # Its own computation reports it.
