@@ -131,7 +131,7 @@ class Answer:
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
         """Answer designs of a study, each a case; a study without changes is that of all the cases."""
         for command in commands_of(designs.study, self._results):
-            for group in stacked.answers(designs, command).groups:
+            for group in stacked.answers(designs, command):
                 for some in [rows[group.rows]] if designs.changed else rows[:, None]:
                     sheet.note(some, group)
 

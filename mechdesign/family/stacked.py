@@ -17,7 +17,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.along import AlongMotion
 from mechdesign.motion.answer import MotionQuestion, answer
 from mechdesign.motion.followed import courses_of
-from mechdesign.motion.group import Answers, DesignGroup
+from mechdesign.motion.group import DesignGroup
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import evaluate
 from mechdesign.motion.rows import Poses
@@ -166,25 +166,25 @@ def _followed(tables: Mapping[str, Table], along: AlongMotion | None) -> dict[st
 
 
 @one_thread()
-def at_poses(study: Study, command: str, poses: Poses) -> Answers:
+def at_poses(study: Study, command: str, poses: Poses) -> list[DesignGroup]:
     """Answers for the poses of several designs, each as if it were asked alone, without pictures.
 
     The poses are solved together: their arrays are held as a whole. A design without a valid pose has an error.
     """
-    return Answers(answer(TOGETHER[command](study, poses)))
+    return [*answer(TOGETHER[command](study, poses))]
 
 
-def answers(designs: Designs, command: str) -> Answers:
-    """A command's answer for each design, or the error of a design that has none."""
+def answers(designs: Designs, command: str) -> list[DesignGroup]:
+    """A command's answers for designs, in groups of one kind; a design that has none has its error."""
     answered: list[DesignGroup] = []
     if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
         # Where a group has an error, its designs are answered one by one.
         for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
             with suppress(MechdesignError):
-                groups = at_poses(study, command, poses).groups
+                groups = at_poses(study, command, poses)
                 answered += [replace(group, rows=rows[group.rows]) for group in groups]
     left = set(range(designs.count)).difference(*(group.rows.tolist() for group in answered))
-    return Answers([*answered, *(_alone(designs, k, command) for k in sorted(left))])
+    return [*answered, *(_alone(designs, k, command) for k in sorted(left))]
 
 
 def _alone(designs: Designs, k: int, command: str) -> DesignGroup:

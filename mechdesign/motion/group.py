@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import overload
 
 import numpy as np
 
@@ -100,26 +99,3 @@ def _follow_of(scope: Scope, design: int) -> Callable[[Sequence[Request]], list[
         return [None if course is None else course.of(design) for course in together(requests)]
 
     return own
-
-
-class Answers(Sequence[Result | Exception]):
-    """The answer of each design, or why it has none, in groups of those that are of one kind."""
-
-    def __init__(self, groups: Sequence[DesignGroup]) -> None:
-        self.groups = groups
-        self._places = {row: (group, k) for group in groups for k, row in enumerate(group.rows.tolist())}
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    @overload
-    def __getitem__(self, k: int) -> Result | Exception: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[Result | Exception]: ...
-    def __getitem__(self, k: int | slice) -> Result | Exception | list[Result | Exception]:
-        if isinstance(k, slice):
-            return [self[number] for number in range(*k.indices(len(self)))]
-        if k not in self._places:
-            raise IndexError(k)
-        group, own = self._places[k]
-        return group.of(own)

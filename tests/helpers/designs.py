@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
 from mechdesign.errors import AssemblyError
 from mechdesign.family.stacked import at_poses
+from mechdesign.motion.group import DesignGroup
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 
-Answer = Result | AssemblyError
+Answer = Result | Exception
+
+
+def each_of(groups: Sequence[DesignGroup]) -> list[Answer]:
+    """The answer of each design, in their order."""
+    found = {row: group.of(k) for group in groups for k, row in enumerate(group.rows.tolist())}
+    return [found[row] for row in sorted(found)]
 
 
 def assert_as_alone(
@@ -27,7 +34,7 @@ def assert_as_alone(
     found: dict[int, Answer] = {}
     for rows in alike(designs, ask.__name__, np.arange(designs.count)):
         poses = study_poses(designs.study, ask.__name__, designs.take(rows).numbers)
-        found |= zip(rows.tolist(), at_poses(designs.study, ask.__name__, poses), strict=True)
+        found |= zip(rows.tolist(), each_of(at_poses(designs.study, ask.__name__, poses)), strict=True)
     for k, answer in found.items():
         if isinstance(answer, AssemblyError):
             with pytest.raises(AssemblyError) as alone:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from helpers.designs import each_of
 from helpers.studies import study_of
 
 from mechdesign.columns import Column
@@ -116,7 +117,7 @@ STUDIES: Mapping[str, tuple[str, Mapping[str, tuple[float, float]]]] = {
 
 
 def together(study: Study, designs: Mapping[str, Floats]) -> list[Result | AssemblyError]:
-    return at_poses(study, "kinematics", study_poses(study, "kinematics", Designs(study, designs).numbers))
+    return each_of(at_poses(study, "kinematics", study_poses(study, "kinematics", Designs(study, designs).numbers)))
 
 
 def alone(study: Study, designs: Mapping[str, Floats], k: int) -> Result | AssemblyError:
