@@ -13,7 +13,6 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.configuration import joined
-from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.plates import Sizes
 from mechdesign.motion.solving import solve_poses
@@ -104,14 +103,11 @@ class PosedStudy:
     @cached_property
     def slots(self) -> list[LinkSlot]:
         """The slots of slides and telescopic links, as long as the travel over the motion."""
-        description, slots = self.mechanism.description, []
-        slides = {
-            name: (joint.line.link, joint.point)
-            for name, joint in description.joints.items() if not isinstance(joint, Fixed)
-        }  # fmt: skip
-        slides |= {name: (name, link.tip) for name, link in description.links.items() if link.tip is not None}
-        for name, (link, point) in slides.items():
-            travel = self.track.configuration.slides[self.mechanism.graph.slides.index(name)]
+        graph, slots = self.mechanism.graph, []
+        # Of joints first, then of legs.
+        for slide in sorted(range(len(graph.slides)), key=graph.telescopic.__contains__):
+            link, point = graph.guides[slide][0].removesuffix(":rod"), graph.sliding(slide)
+            travel = self.track.configuration.slides[slide]
             ends = [self.in_frame(link, point, int(index(travel))) for index in (np.argmin, np.argmax)]
             slots.append(LinkSlot(link, point, (ends[0], ends[1])))
         return slots

@@ -69,9 +69,9 @@ def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]
             continue
         slide = slides.get(contact.joint)
         if slide is not None:
-            guide, slider = joints.guides[slide]
+            guide, slider = graph.guides[slide]
             edge = graph.edge_of(slide)
-            contacts.append(Rubbing(contact.joint, k, slider or "", guide, slide, edge, frictions[contact.joint]))
+            contacts.append(Rubbing(contact.joint, k, slider, guide, slide, edge, frictions[contact.joint]))
         elif contact.turns and (by := carriers.get(contact.by, contact.by)) != contact.on:
             contacts.append(Rubbing(contact.joint, k, contact.on, by, None, -1, frictions[contact.joint]))
     return contacts
