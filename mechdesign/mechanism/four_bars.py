@@ -217,9 +217,7 @@ class _Bodies:
         graph = mechanism.graph
         self.owner: dict[str, str] = {body: body for body in graph.bodies}
         for clamp in graph.clamps.values():
-            one, other = sorted(
-                (self.owner[body.removesuffix(":rod")] for body in clamp[:2]), key=list(graph.bodies).index
-            )
+            one, other = sorted((self.owner[body] for body in clamp[:2]), key=list(graph.bodies).index)
             self.owner = {body: one if owner == other else owner for body, owner in self.owner.items()}
         self.ground = self.owner[GROUND]
         self.frames: dict[str, int] = {body: graph.bodies[body][0] for body in self.owner.values()}
