@@ -18,7 +18,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import PosedStudy
+from mechdesign.exporting.view import PosedStudy, several
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 
@@ -26,8 +26,6 @@ from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
 MOST_TRIED = 100_000
 # A search that allows meetings counts one of two plates as so many of a pin.
 OF_PLATES = 100
-# Meetings that a warning names at most.
-MOST_NAMED = 3
 HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 
@@ -108,12 +106,10 @@ class Layering:
         """A warning where something meets."""
         if not self.meetings:
             return ()
-        named = "; ".join(map(str, self.meetings[:MOST_NAMED]))
-        more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
         head = "no stack was found in which nothing meets"
         if self.complete or all(meeting.certain for meeting in self.meetings):
             head = "in whatever layers, something meets"
-        return (Caution("infeasible", f"{head}; here {named}{more}"),)
+        return (Caution("infeasible", f"{head}; here {several(self.meetings)}"),)
 
 
 def stack_of(view: PosedStudy) -> Layering:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,6 +24,8 @@ from mechdesign.study.text.reading import Context, read_number
 
 # Width of links of a study without plates, as a part of the mechanism's size.
 WIDTH = 0.08
+# Most parts, or meetings, that a warning names.
+MOST_NAMED = 3
 # Least number of poses of a motion.
 LOOKS = 721
 
@@ -227,3 +229,9 @@ class PosedStudy:
             except PydanticCustomError as error:
                 raise StudyError(f"--at {name}: {error}") from None
         return values
+
+
+def several(named: Sequence[object]) -> str:
+    """The first of what a warning names, and how many more there are."""
+    more = [f"and {len(named) - MOST_NAMED} more"] if len(named) > MOST_NAMED else []
+    return "; ".join([*map(str, named[:MOST_NAMED]), *more])

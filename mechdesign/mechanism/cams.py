@@ -30,7 +30,7 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Turn
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.wheels import Pressed
+from mechdesign.mechanism.wheels import Mesh, Pressed
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
@@ -312,10 +312,7 @@ class CamFollower:
             normal = -1j * out * moved / speed
             pitch, pace = -dot(normal, curved) / norm2(moved), speed
             place, touched, size = center - radius * normal, center, 1 / pitch - radius
-        # The follower's own motion while the cam is held: by play between them, the drives moved back.
-        parted = linear.sensitivity([play(self.coupling)])
-        back = first(configuration, self.followed, parted) * self.against(velocity, touched, configuration)
-        own = np.asarray(self.against(parted, touched, configuration) - back)[0]
+        own = self._own(linear, velocity, touched)
         pressure = np.arctan(cross(own, normal) / dot(own, normal))
         turned = normal * np.conj(configuration.body_rotation(self.links[1]))
         swept = pace * dot(self.local(configuration, center), turned)
@@ -357,3 +354,7 @@ class CamFollower:
         touch = self.touch(configuration)
         normal: Value = effort / touch.lever
         return Pressed(touch.place, normal * touch.normal, normal)
+
+
+# Two links that touch as a coupling has them move: wheels, or a cam and its follower.
+Engagement = Mesh | CamFollower

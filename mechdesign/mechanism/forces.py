@@ -18,7 +18,7 @@ from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.outputs import Rates, pulled
+from mechdesign.mechanism.outputs import Rates, first, pulled
 
 
 def bases(graph: Graph) -> dict[str, int]:
@@ -249,14 +249,11 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
         constant, stiffness, free, damping = spring.pull(lambda term: geometry.term(term, places))
         rate: Value = 0.0
         if spring.turning:
-            one, other = spring.between
-            stretch = configuration.value(winding(spring)) - free
+            angle = winding(spring)
+            stretch = configuration.value(angle) - free
             if moving.velocity is not None:
-                frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
-                rate = frames[0] - frames[1]
-            moment = constant + stiffness * stretch + damping * rate
-            forces.on_body(other, 0.0, -1.0 * moment)
-            forces.on_body(one, 0.0, moment)
+                rate = first(configuration, angle, moving.velocity)
+            forces.on_coordinate(angle, -1.0 * (constant + stiffness * stretch + damping * rate))
         else:
             span = forces.span(spring.between)
             length = np.sqrt(norm2(span))

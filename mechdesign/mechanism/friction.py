@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.elements.joints import Friction
 from mechdesign.mechanism.forces import Forces
@@ -22,7 +23,6 @@ from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.joint_contacts import PIN, Joints
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
-from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Members whose relative rate is below this part of the fastest in the mechanism do not move against each other.

@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 from mechdesign.mechanism.algebra import Vector
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import coupled
 from mechdesign.mechanism.forces import bases
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.wheels import Engagement
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"

@@ -125,14 +125,15 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
 
 @quiet
 def acceleration_sensitivity(
-    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
-    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+    configuration: Configuration, coordinate: Coordinate, by_time: Sequence[Rates], by_z: Sequence[Rates]
 ) -> Value:  # fmt: skip
-    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis)."""
+    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis).
+
+    `by_time` are velocities and accelerations, `by_z` the derivatives of positions, velocities and accelerations.
+    """
+    (velocity, acceleration), (position_z, velocity_z, acceleration_z) = by_time, by_z
     if coordinate.kind == "expression":
-        return _curved_sensitivity(
-            configuration, coordinate, velocity, acceleration, position_z, velocity_z, acceleration_z
-        )
+        return _curved_sensitivity(configuration, coordinate, by_time, by_z)
     if coordinate.kind == "distance":
         rate, rate_z = first(configuration, coordinate, velocity), first(configuration, coordinate, position_z)
         bend = second(configuration, coordinate, velocity, velocity, acceleration)
@@ -148,25 +149,20 @@ def acceleration_sensitivity(
 
 
 def _curved_sensitivity(
-    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
-    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+    configuration: Configuration, coordinate: Coordinate, by_time: Sequence[Rates], by_z: Sequence[Rates]
 ) -> Value:  # fmt: skip
     """`acceleration_sensitivity` of an expression f of parts p.
 
     f''_z = sum_i f_i p_i''_z + 2 sum_ij f_ij p_i' p_j'_z + sum_ij f_ij p_i'' p_j_z + sum_ijk f_ijk p_i' p_j' p_k_z
     """
+    (velocity, acceleration), (position_z, velocity_z, _) = by_time, by_z
     by_part = partial(_by_part, coordinate)
     rate, shift = (by_part(partial(first, configuration, rates=rates)) for rates in (velocity, position_z))
     rise, rate_z = (
         by_part(partial(second, configuration, one=velocity, other=other, both=both))
         for other, both in ((velocity, acceleration), (position_z, velocity_z))
     )
-    rise_z = by_part(
-        partial(
-            acceleration_sensitivity, configuration, velocity=velocity, acceleration=acceleration,
-            position_z=position_z, velocity_z=velocity_z, acceleration_z=acceleration_z,
-        )
-    )  # fmt: skip
+    rise_z = by_part(partial(acceleration_sensitivity, configuration, by_time=by_time, by_z=by_z))
     by_rise = _gradient_along(configuration, coordinate, rise)
     total: Value = 0.0
     for name, slope in _gradient_along(configuration, coordinate, rate, twice=True).items():

@@ -94,7 +94,7 @@ class Coupling(Element):
     """
     # From coordinates and parameters in the study's units, whichever key gives it. A name in it is a parameter as in a
     # `Measure`, or a place of the coupling's own.
-    to: Annotated[Expression, declared.Notation("function")] | None = None
+    to: Annotated[Expression, declared.Notation("Bound")] | None = None
     """Expression of coordinates and parameters, in the study's units; the name of a link, joint or leg stands for its
     coordinate. Example: -2.5*sun + 3.5*arm
     """

@@ -7,13 +7,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, leaves
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.wheels import Engagement
 from mechdesign.questions.stiffness.elements import (
     Beam,
     Element,

@@ -51,22 +51,17 @@ class _LinkKeys(Keys):
         return notations.long_link(raw)
 
 
-if TYPE_CHECKING:
+class Written(Keys, Generic[E]):
+    """The keys of an element, as ``Written[Spring]``."""
 
-    class Written(Keys, Generic[E]):
-        """The keys of an element."""
+    if TYPE_CHECKING:
 
         def __getattr__(self, key: str) -> Any: ...
 
-else:
+    else:
 
-    class _Written:
-        """Annotation of the keys of an element, as ``Written[Spring]``."""
-
-        def __getitem__(self, element):
+        def __class_getitem__(cls, element):
             return _keys_of(element)
-
-    Written = _Written()
 
 
 @cache
@@ -118,7 +113,7 @@ def _read(hint: Any) -> Any:
         case Notation("part"):
             return _keys_of(get_args(hint)[0])
         case Notation():
-            return notations.BY_WORD[mark.word]
+            return notations.BY_WORD.get(mark.word) or getattr(fields, mark.word)
         case Size():
             kind = None if mark.between else mark.kind
             number = fields.number(kind, mark.least, exclusive=mark.exclusive, place=not mark.fixed, fixed=mark.fixed)
