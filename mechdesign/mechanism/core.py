@@ -209,10 +209,9 @@ class Core:
 
     def frame(self, body: str, configuration: Configuration) -> tuple[Vector, Vector]:
         """Origin and x axis of a body's frame in the world."""
-        base = next(point for owner, point in self.graph.points if owner == body)
-        along = configuration.body_rotation(body)
-        local = self.geometry.local(body, base, configuration.places)
-        return configuration.nodes[self.graph.nodes.index(base)] - local * along, along
+        base, along = self.graph.bases[body], configuration.body_rotation(body)
+        local = self.geometry.local(body, self.graph.nodes[base], configuration.places)
+        return configuration.nodes[base] - local * along, along
 
     def margins(self, configuration: Configuration, *, smooth: bool = False) -> list[tuple[str, Value]]:
         """Named margins of all limits: positive inside; see `Bound.margins`."""

@@ -37,11 +37,10 @@ def cams(
         followed = next(part for part in coupling.function.parts if part.kind != "parameter")
         point = given.face.through or ""
         follower = graph.holder(given.face.link, point)
-        base = next(graph.nodes.index(name) for body, name in graph.points if body == given.link)
         whole = _plan_with(followed, [c.name for c in forward.structure.given], plan, coupling.name)
         cam = CamFollower(
             coupling.name, index, given, followed, coupling.follower, (follower, given.link), graph.nodes.index(point),
-            base, turns_of(given.face), forward, whole,
+            graph.bases[given.link], turns_of(given.face), forward, whole,
         )  # fmt: skip
         _check_follower(cam)
         listed.append(cam)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.elements.joints import Fixed, LinkLine, Prismatic
@@ -71,6 +72,11 @@ class Graph:
     clamps: Mapping[str, tuple[str, str, str]]  # by fixed joint, the two bodies and their point
     # Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
+
+    @cached_property
+    def bases(self) -> dict[str, int]:
+        """By body, its base: the node of its first point, from which its edges run."""
+        return {body: self.nodes.index(point) for body, point in reversed([*self.points])}
 
     def node(self, name: str) -> int:
         """Index of the node of a point, ``B``; the point of a link, ``rod.B``, has the node of its pin."""

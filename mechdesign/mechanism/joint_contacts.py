@@ -11,7 +11,6 @@ from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import coupled
-from mechdesign.mechanism.forces import bases
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
 
@@ -62,7 +61,7 @@ class Joints:
         self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(),
         engaged: Sequence[Engagement] = (),
     ) -> None:  # fmt: skip
-        self.description, self.graph, self.bases = description, graph, bases(graph)
+        self.description, self.graph, self.bases = description, graph, graph.bases
         self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
         self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
         #: By node at which one body alone has a point, this body: it bears what acts on the pin.

@@ -10,6 +10,7 @@ from typing import Any
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import fit
+from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
 from mechdesign.mechanism.elements.links import Link, Mass
 from mechdesign.mechanism.graph import GROUND, rod_of
@@ -99,6 +100,11 @@ class Builder:
         if measured:
             self.measured.add(name)
         return name
+
+    def parameters_in(self, expression: Expression) -> None:
+        """Register the parameters that an expression of coordinates names."""
+        for name in expression.names & self.parameter_values.keys():
+            self.place((MEASURED + name,), Amount(self.parameter_values[name], "", Expression.parse(name)), "none")
 
     def numbers(self, given: Keys, *path: str, turning: bool = False) -> dict[str, Term]:
         """Register the numbers of an element that are given as places of the geometry; their names by their keys."""

@@ -12,7 +12,7 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.expressions import Expression
 from mechdesign.functions import Tabulated
 from mechdesign.mechanism.coordinates import coupled
-from mechdesign.mechanism.elements.couplings import MEASURED, Cam, Coupling, play
+from mechdesign.mechanism.elements.couplings import Cam, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.joints import LinkLine
 from mechdesign.mechanism.geometry import Geometry
@@ -27,7 +27,6 @@ from mechdesign.study.building.joints import WrongJoint, check_named, line_of, r
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reading import APART
-from mechdesign.study.text.units import Amount
 
 # Rows from which a cubic spline is told.
 FEWEST_ROWS = 4
@@ -122,8 +121,7 @@ def _function(
         listed = [*section.coordinates, *section.moving, *section.slides, *parameters]
         if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
             return None
-        for item in to.names & parameters.keys():
-            builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
+        builder.parameters_in(to)
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
         named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
         return replace(to.substituted(named), angle_unit=unit)
