@@ -22,8 +22,8 @@ def study_json(view: PosedStudy) -> Content:
     if study.drawn is not None and study.mechanism.sketch_configuration.valid:
         # With overrides the assembly is that of the study without them: draw it, or the sketch may show another.
         sketch = data["mechanism"].get("sketch") or {}
-        places = {point: complex(study.mechanism.sketch_configuration.point(point)) for point in sketch}
-        places = {point: [place.real, place.imag] for point, place in places.items()}
+        drawn = {point: complex(study.mechanism.sketch_configuration.point(point)) for point in sketch}
+        places = {point: [place.real, place.imag] for point, place in drawn.items()}
         data["mechanism"] = {**data["mechanism"], "sketch": places}
     files = list(dict.fromkeys(os.path.relpath(path, study.folder.path) for _, path, _ in study.inputs()))
     named = f"it names files that are not in it ({', '.join(files)}): keep them beside it"
