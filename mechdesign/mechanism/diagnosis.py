@@ -17,6 +17,7 @@ from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.graphs import pieces
 
 DRIVES = "mechanism.drives"
 # Largest number of joints or links that a message names.
@@ -389,8 +390,5 @@ def _can_go(description: Description, joint: str) -> bool:
     slide = description.joints[joint]
     if not isinstance(slide, Prismatic):
         return True
-    pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
-    reached = {slide.line.link}
-    for _ in pairs:
-        reached.update(*(pair for pair in pairs if pair & reached))
-    return slide.slider in reached
+    others = (other.links for name, other in description.joints.items() if name != joint)
+    return any({*slide.links} <= piece for piece in pieces(others))

@@ -96,7 +96,7 @@ class Element:
         return named if isinstance(named, tuple) else (named,)
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together; `given` has them as attributes, None where it has not."""
         return iter(())
 

@@ -70,7 +70,7 @@ class Link(Element):
     """
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if (given.from_ is None) != (given.to is None):
             yield "a binary link needs both 'from' and 'to'"

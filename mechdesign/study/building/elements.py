@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from functools import cache
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import Field, create_model, model_validator
 
@@ -14,7 +14,6 @@ from mechdesign.mechanism.elements.declared import Choice, Element, Notation, Si
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.study.building import notations
 from mechdesign.study.text import fields
-from mechdesign.study.text.reading import failure
 from mechdesign.study.text.units import Amount
 
 E = TypeVar("E", bound=Element)
@@ -27,11 +26,8 @@ class Keys(fields.Model):
     sizes: ClassVar[Mapping[str, Size]]
     items = Element.items
 
-    @model_validator(mode="after")
-    def _fitting(self) -> Self:
-        for message in self.declares.misfits(self):
-            raise failure(message)
-        return self
+    def faults(self) -> Iterator[str]:
+        return self.declares.faults(self)
 
     def numbers(self) -> Iterator[tuple[str, Size, Amount]]:
         """The numbers of the geometry that are given, with their keys."""

@@ -10,6 +10,7 @@ from mechdesign.errors import suggestion
 from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.numerics.graphs import pieces
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text.document import KeyPath
@@ -161,10 +162,7 @@ def check_connected(builder: Builder) -> None:
         ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
         if joint.slot and joint.point:
             ties.append({joint.slot, *owners.get(joint.point, ())})
-    reached, before = {GROUND}, 0
-    while len(reached) > before:
-        before = len(reached)
-        reached.update(*(tie for tie in ties if tie & reached))
+    (reached,) = (piece for piece in pieces([{GROUND}, *ties]) if GROUND in piece)
     for name in section.links:
         if name in reached or GROUND not in section.links:
             continue
