@@ -20,7 +20,7 @@ from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
 from mechdesign.exporting.view import PosedStudy, several
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
+from mechdesign.mechanism.plates import Clearances, Item, Pair, pins_of, plate_of
 
 # Layers that the search for a stack tries at most, one link at a time.
 MOST_TRIED = 100_000
@@ -35,12 +35,12 @@ def layers_csv(view: PosedStudy) -> Content:
 
     The rod of a telescopic link lies in the layer of its body.
     """
-    stack = stack_of(view)
-    thickness = view.millimetres * float(view.sizes.thickness)
+    description, thickness = view.mechanism.description, view.millimetres * float(view.sizes.thickness)
+    stack = stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
-    rows, description = list[tuple[str, str, int, int]](), view.mechanism.description
+    rows = list[tuple[str, str, int, int]]()
     for link, layer in stack.layers.items():
         rows.append((link, "plate", layer, layer))
         if description.links[link].tip is not None:
@@ -54,11 +54,9 @@ def layers_csv(view: PosedStudy) -> Content:
 
 
 @dataclass(frozen=True)
-class Meeting:
+class Meeting(Pair):
     """Two items that meet in the plane, at a pose in words."""
 
-    one: Item
-    other: Item
     pose: str
 
     @property
@@ -112,12 +110,6 @@ class Layering:
         return (Caution("infeasible", f"{head}; here {several(self.meetings)}"),)
 
 
-def stack_of(view: PosedStudy) -> Layering:
-    """The best stack of a study's plates over its motion; layers that the study gives are kept."""
-    description = view.mechanism.description
-    return stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
-
-
 def meetings_of(view: PosedStudy) -> list[Meeting]:
     """What meets in the plane over the motion.
 
@@ -161,7 +153,10 @@ def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, lin
 def stacked(
     links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
 ) -> Layering:  # fmt: skip
-    """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
+    """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings.
+
+    Layers that are given are kept.
+    """
     avoidable = [meeting for meeting in meetings if not meeting.certain]
     search, most = _Search(links, pins, avoidable, given), max([len(links), *given.values()])
     for count in range(max([1, *given.values()]), most + 1):

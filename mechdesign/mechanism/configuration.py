@@ -118,16 +118,14 @@ class Configuration:
             return angle if near is None else nearest(angle, near)
         if coordinate.kind == "parameter":
             return self.vectors.parameters[coordinate.name]
-        assert coordinate.expression is not None
-        value = coordinate.expression.evaluate(self.user_values(coordinate))
-        value = value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
+        value = coordinate.formula.evaluate(self.user_values(coordinate))
+        value = value * coordinate.formula.angle_unit if coordinate.quantity == "angle" else value
         near = self.near.get(coordinate.name) if coordinate.turn else None
         return value if near is None else nearest(value, near, coordinate.turn)
 
     def user_values(self, coordinate: Coordinate) -> dict[str, Value]:
         """Values of the parts of an expression, angles in the study's unit as its text expects."""
-        assert coordinate.expression is not None
-        unit = coordinate.expression.angle_unit
+        unit = coordinate.formula.angle_unit
         return {
             part.name: self.value(part) / unit if part.quantity == "angle" else self.value(part)
             for part in coordinate.parts

@@ -177,19 +177,16 @@ def _span(nodes: Sequence[Vector], coordinate: Coordinate) -> Vector:
 
 
 def _user(part: Coordinate, value: Value, whole: Coordinate) -> Value:
-    assert whole.expression is not None
-    return value / whole.expression.angle_unit if part.quantity == "angle" else value
+    return value / whole.formula.angle_unit if part.quantity == "angle" else value
 
 
 def _radians(coordinate: Coordinate, value: Value) -> Value:
     """The value of an expression, or a derivative of it, in radians if it is an angle."""
-    assert coordinate.expression is not None
-    return value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
+    return value * coordinate.formula.angle_unit if coordinate.quantity == "angle" else value
 
 
 def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
-    assert coordinate.expression is not None
-    partials = coordinate.expression.derivatives(values)
+    partials = coordinate.formula.derivatives(values)
     return [partials.get(part.name, 0.0) for part in coordinate.parts]
 
 
@@ -202,8 +199,7 @@ def _gradient_along(
     configuration: Configuration, coordinate: Coordinate, rate: Mapping[str, Value], *, twice: bool = False
 ) -> dict[str, Any]:
     """Gradient of an expression with its slope along a change of its parts, and with that of the slope if `twice`."""
-    assert coordinate.expression is not None
     duals = {name: Dual(value, rate[name]) for name, value in configuration.user_values(coordinate).items()}
     if twice:
         duals = {name: Dual(dual, Dual(rate[name], 0.0)) for name, dual in duals.items()}
-    return coordinate.expression.derivatives(duals)
+    return coordinate.formula.derivatives(duals)

@@ -13,7 +13,7 @@ from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, pi
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start
-from mechdesign.mechanism.coordinates import Coordinate, angles_of, leaves
+from mechdesign.mechanism.coordinates import angles_of, leaves
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
@@ -53,7 +53,9 @@ class Plan:
         self.iterative = any(group.form == "newton" for group in structure.groups)
         #: Angles in given expressions and in couplings whose turns are counted on the way from a start, as they do not
         #: follow from values.
-        self.angles = self._counted_on_the_way()
+        inner = angles_of(c for c in structure.values if c.kind == "expression")
+        open_ = [angle for name, angle in inner.items() if name not in self.counted.union(self.solved)]
+        self.angles = tuple(angle for angle in open_ if structure.counted(angle, core.graph) is None)
         self.followers = tuple(coupling.follower for coupling in core.couplings)
         # Given and coupled values that move these angles.
         behind = frozenset[int]().union(*(structure.behind(angle, core.graph) for angle in self.angles))
@@ -70,14 +72,6 @@ class Plan:
     def continued(self) -> bool:
         """Whether poses are continued from a start: for groups without a closed form, or to count turns."""
         return self.iterative or bool(self.angles)
-
-    def _counted_on_the_way(self) -> tuple[Coordinate, ...]:
-        structure, graph = self.structure, self.core.graph
-        inner = angles_of(c for c in structure.values if c.kind == "expression")
-        return tuple(
-            angle for name, angle in inner.items()
-            if name not in self.counted.union(self.solved) and structure.counted(angle, graph) is None
-        )  # fmt: skip
 
     @cached_property
     def change_points(self) -> ChangePoints | None:

@@ -73,7 +73,6 @@ def build_couplings(builder: Builder) -> dict[str, Coupling]:
 def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, function: Expression) -> Cam:
     """The cam of a coupling; `sets` is the coordinate that follows."""
     section, given, path = builder.section, coupling.cam, ("couplings", name, "cam")
-    assert given is not None
     check_named(builder, "link", [given.link], (*path, "link"))
     followed = sorted(function.names - builder.parameter_values.keys() - {f"{name}.ratio", f"{name}.phase"})
     if len(followed) != 1:
@@ -125,7 +124,6 @@ def _function(
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
         named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
         return replace(to.substituted(named), angle_unit=unit)
-    assert given.of is not None
     listed = [*section.coordinates, *section.moving, *section.slides]
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
         return None
@@ -133,7 +131,6 @@ def _function(
     if given.table is not None:
         table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
-    assert given.ratio is not None
     if float(given.ratio) == 0.0:
         message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
         builder.report((*path, "ratio"), message)

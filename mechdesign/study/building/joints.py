@@ -211,6 +211,5 @@ def build_friction(builder: Builder) -> dict[str, Friction]:
 
 
 def _clamped_at(builder: Builder, clamp: Written[Joint], point: str) -> bool:
-    assert clamp.fixed is not None
     one, other = (builder.section.points_of(link) for link in clamp.fixed)
     return point == (clamp.point or next((shared for shared in one if shared in other), None))
