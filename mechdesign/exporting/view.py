@@ -176,10 +176,7 @@ class PosedStudy:
         if curve is None or curve.spent.any():
             parts = [*solve_poses(self.question.motion, self.question.watched)]
             configurations = [part.configuration for part in parts]
-            whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
-            wound = {name: np.concatenate([part.near[name] for part in configurations])
-                     for name in self.mechanism.windings}  # fmt: skip
-            whole = replace(whole, near=wound)
+            whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {}, self.mechanism.windings)
             places, follows = np.concatenate([part.rows for part in parts]) * 1.0, np.zeros(poses.count - 1, dtype=bool)
         else:
             finer = -(-(LOOKS - 1) // max(poses.end, 1))

@@ -164,15 +164,21 @@ def hide(value: Either, lost: Flags) -> Either:
 
 
 def joined(
-    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
-) -> Configuration:
-    """Flat batches of one mechanism joined to one batch of a shape; angles are in (-pi, pi]."""
-    count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
+    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value],
+    angles: Iterable[str] = (),
+) -> Configuration:  # fmt: skip
+    """Flat batches of one mechanism joined to one batch of a shape.
+
+    These `angles` keep their turns as far as they are known; others are in (-pi, pi].
+    """
+    count, end, whole, names = int(np.prod(shape, dtype=np.int64)), 0, list[Any](), list[str]()
     reason = np.empty(count, dtype=np.int8)
     for part in parts:
         some = slice(end, end := end + len(part.reason))
         reason[some] = part.reason
+        names = names or [name for name in angles if name in part.near]
         values: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        values += [np.broadcast_to(part.near[name], part.shape) for name in names]
         whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in values]
         for k, value in enumerate(values):
             if np.ndim(value) > np.ndim(whole[k]):
@@ -184,4 +190,5 @@ def joined(
     nodes, rotations, slides, closures = (
         list(islice(full, len(values))) for values in (part.nodes, part.rotations, part.slides, part.closures)
     )
-    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason.reshape(shape), places)
+    near, reason = dict(zip(names, full, strict=True)), reason.reshape(shape)
+    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason, places, near)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -205,16 +205,10 @@ class Plan:
             drives = [picked(v, rows) for v in columns]
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
-        parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
+        parts = map_chunks(part, range(0, count, length), jobs)
         counted = sorted({*(angle.name for angle in self.angles), *self._within_given, *self.coupled})
-        parts = [*parts] if counted else parts
-        whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
-        near = {
-            name: np.concatenate([np.broadcast_to(some.near[name], some.shape) for some in parts]).reshape(shape)
-            for name in counted
-            if all(name in some.near for some in parts)
-        }
-        return replace(whole, near={**self.turns(values, dims), **near}, counted=self.counted)
+        whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims, counted)
+        return replace(whole, near={**self.turns(values, dims), **whole.near}, counted=self.counted)
 
     def _at_once(
         self,
