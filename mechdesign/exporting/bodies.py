@@ -275,9 +275,7 @@ class RigidBodies:
         """Every joint, and whether it closes a loop; those of the tree have no direction yet."""
         graph, whole = self.graph, DisjointSet(self.graph.bodies)
         joints: list[tuple[BodyJoint, bool]] = []
-        at_nodes: dict[int, list[str]] = {}
-        for body, point in graph.points:
-            at_nodes.setdefault(graph.node(point), []).append(body)
+        at_nodes = {graph.node(point): [*bodies] for point, bodies in graph.holders.items()}
 
         def add(joint: BodyJoint) -> None:
             joints.append((joint, not whole.merge(joint.parent, joint.child)))

@@ -78,6 +78,14 @@ class Graph:
         """By body, its base: the node of its first point, from which its edges run."""
         return {body: self.nodes.index(point) for body, point in reversed([*self.points])}
 
+    @cached_property
+    def holders(self) -> dict[str, list[str]]:
+        """By point, the bodies that have it."""
+        holders: dict[str, list[str]] = {}
+        for body, point in self.points:
+            holders.setdefault(point, []).append(body)
+        return holders
+
     def node(self, name: str) -> int:
         """Index of the node of a point, ``B``; the point of a link, ``rod.B``, has the node of its pin."""
         return self.nodes.index(name.rpartition(".")[2])
@@ -102,7 +110,7 @@ class Graph:
 
     def links_at(self, point: str) -> list[str]:
         """Names of the links that meet at a point."""
-        return list(dict.fromkeys(body.removesuffix(":rod") for body, name in self.points if name == point))
+        return list(dict.fromkeys(body.removesuffix(":rod") for body in self.holders.get(point, ())))
 
     def joined(self, edges: Iterable[int]) -> list[str]:
         """Names of the points at the ends of edges, in their order; given distances, no links, are left out."""

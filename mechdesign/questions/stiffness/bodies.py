@@ -134,10 +134,7 @@ def build_bodies(
     target = TARGET if link is None or link in section.elastic else holder(link, at)
     loaded = {*loaded, *(graph.nodes[node] for c in mechanism.couplings for link, node in c.gap.ends if not link)}
     builder = _Builder(mechanism, section, target, loaded)
-    holders: dict[str, list[str]] = {}
-    for body, point in graph.points:
-        if ":" not in point:
-            holders.setdefault(point, []).append(body)
+    holders = {point: [*bodies] for point, bodies in graph.holders.items() if ":" not in point}
     for slide, (name, (guide, slider)) in enumerate(zip(graph.slides, graph.guides, strict=True)):
         point = graph.sliding(slide)
         if not slider:
