@@ -5,12 +5,11 @@ from __future__ import annotations
 import cmath
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, indent, tostring
-from xml.etree.ElementTree import SubElement as add
 
 from mechdesign.errors import printable
 from mechdesign.exporting.bodies import OPEN, BodyJoint, RigidBodies, RigidBody, Sum
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.model_text import comment, name_of, numbers, outlines, paint, planar, words
+from mechdesign.exporting.model_text import add, comment, name_of, numbers, outlines, paint, planar, words
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.graph import GROUND
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
-from xml.etree.ElementTree import Comment
+from xml.etree.ElementTree import Comment, Element, SubElement
 
 from mechdesign import __version__
 from mechdesign.errors import printable
@@ -18,6 +18,11 @@ from mechdesign.report.figures.shapes import link_colors
 WORLD = "world"
 # Decimals of places (m).
 DECIMALS = 12
+
+
+def add(element: Element, tag: str, **attributes: str) -> Element:
+    """Add an element with attributes; returns it."""
+    return SubElement(element, tag, attributes)
 
 
 def numbers(*values: float) -> str:
