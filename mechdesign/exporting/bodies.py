@@ -10,19 +10,19 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
+from scipy.cluster.hierarchy import DisjointSet
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.view import PosedStudy
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.core import Bound
-from mechdesign.mechanism.elements.joints import Fixed, Prismatic
 from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.forces import Forces, center, inertia_about_center
@@ -113,24 +113,6 @@ class Pull:
     rest: float
     damping: float
     constant: float
-
-
-class Components:
-    """Sets of items that are joined pair by pair."""
-
-    def __init__(self) -> None:
-        self._roots: dict[str, str] = {}
-
-    def join(self, one: str, other: str) -> bool:
-        """Join two items; whether they were not joined before."""
-        roots = self._root(one), self._root(other)
-        self._roots[roots[0]] = roots[1]
-        return roots[0] != roots[1]
-
-    def _root(self, item: str) -> str:
-        while self._roots.get(item, item) != item:
-            item = self._roots[item]
-        return item
 
 
 class RigidBodies:
@@ -291,68 +273,42 @@ class RigidBodies:
 
     def _joints(self) -> list[tuple[BodyJoint, bool]]:
         """Every joint, and whether it closes a loop; those of the tree have no direction yet."""
-        description, graph, whole = self.description, self.graph, Components()
+        graph, whole = self.graph, DisjointSet(self.graph.bodies)
         joints: list[tuple[BodyJoint, bool]] = []
-        at_nodes: dict[int, list[str]] = {}
-        for body, point in graph.points:
-            at_nodes.setdefault(graph.node(point), []).append(body)
-        clamped: dict[int, Components] = {node: Components() for node in at_nodes}
+        at_nodes = {graph.node(point): [*bodies] for point, bodies in graph.holders.items()}
 
-        def add(joint: BodyJoint) -> bool:
-            closing = not whole.join(joint.parent, joint.child)
-            joints.append((joint, closing))
-            return closing
+        def add(joint: BodyJoint) -> None:
+            joints.append((joint, not whole.merge(joint.parent, joint.child)))
 
-        for clamp in description.joints.values():
-            if isinstance(clamp, Fixed):
-                node = graph.node(clamp.point)
-                one, other = (graph.holder(link, clamp.point) for link in clamp.links)
-                clamped[node].join(one, other)
-                add(BodyJoint(f"fixed.{clamp.name}", "fixed", one, other, self.place(node)))
-        for number, name in enumerate(graph.slides):
-            guide, slider, node = self._sliding(number, at_nodes)
-            along = complex(self.view.pose.direction(graph.edge_of(number)))
-            value = self.scales.length * float(self.view.pose.slides[number])
-            slide = BodyJoint(slide_name(name), "slide", guide, slider, self.place(node), along, value)
-            if not whole.join(guide, slider):
-                block = self._block(name, guide, node)
-                whole.join(guide, block)
-                slide = BodyJoint(slide.name, "slide", guide, block, slide.place, along, value)
-                joints.append((BodyJoint(f"fixed.{name}", "fixed", block, slider, slide.place), True))
-            joints.append((slide, False))
-        driven = {frozenset((drive.target, drive.reference)) for drive in description.drives.values()}
+        for name, (one, other, point) in graph.clamps.items():
+            add(BodyJoint(f"fixed.{name}", "fixed", one, other, self.place(graph.node(point))))
+        for number, (name, (guide, slider)) in enumerate(zip(graph.slides, graph.guides, strict=True)):
+            edge, value = graph.edge_of(number), self.scales.length * float(self.view.pose.slides[number])
+            node, along = graph.edges[edge].head, complex(self.view.pose.direction(edge))
+            moved = slider
+            if not slider or whole.connected(guide, slider):
+                moved = f"{name}:block"
+                self._blocks[moved] = (guide, graph.nodes[node])
+                whole.add(moved)
+            add(BodyJoint(slide_name(name), "slide", guide, moved, self.place(node), along, value))
+            if not slider:
+                at_nodes[node].append(moved)
+            elif moved != slider:
+                add(BodyJoint(f"fixed.{name}", "fixed", moved, slider, self.place(node)))
+        clamped = {node: DisjointSet(bodies) for node, bodies in at_nodes.items()}
+        for one, other, point in graph.clamps.values():
+            clamped[graph.node(point)].merge(one, other)
+        driven = {frozenset((drive.target, drive.reference)) for drive in self.description.drives.values()}
         pins = [(node, pair) for node, bodies in at_nodes.items() for pair in combinations(bodies, 2)]
         links = {body: body.removesuffix(":rod") for body in graph.bodies}
         pins.sort(key=lambda pin: (frozenset(links.get(body, body) for body in pin[1]) not in driven,
                                    GROUND not in pin[1]))  # fmt: skip
         for node, (one, other) in pins:
-            if clamped[node].join(one, other):
+            if clamped[node].merge(one, other):
                 several = len(at_nodes[node]) > 2
                 name = f"pin.{graph.nodes[node]}" + f".{other if one == GROUND else f'{one}.{other}'}" * several
                 add(BodyJoint(name.replace(":", "."), "hinge", one, other, self.place(node)))
         return joints
-
-    def _sliding(self, number: int, at_nodes: Mapping[int, list[str]]) -> tuple[str, str, int]:
-        """Guide, slider and the slider's node of a slide; a pin in a slot gets a block."""
-        graph, name = self.graph, self.graph.slides[number]
-        if number in graph.telescopic:
-            ends = self.description.links[name].ends
-            assert ends is not None
-            return name, f"{name}:rod", graph.node(ends[1])
-        joint = self.description.joints[name]
-        assert not isinstance(joint, Fixed)
-        node, line = graph.node(joint.point), joint.line
-        guide = line.link if line.through is None else graph.holder(line.link, line.through)
-        if isinstance(joint, Prismatic):
-            return guide, graph.holder(joint.slider, joint.point), node
-        block = self._block(name, guide, node)
-        at_nodes[node].append(block)
-        return guide, block, node
-
-    def _block(self, slide: str, guide: str, node: int) -> str:
-        name = f"{slide}:block"
-        self._blocks[name] = (guide, self.graph.nodes[node])
-        return name
 
     def _tree(self, joints: Iterable[BodyJoint]) -> dict[str, BodyJoint]:
         """Joints of the tree by name, each with its parent nearer to the ground, and the value of its coordinate."""
@@ -362,7 +318,7 @@ class RigidBodies:
                 left.remove(joint)
                 child = joint.child if joint.parent == body else joint.parent
                 along = joint.along if child == joint.child else -joint.along
-                tree[joint.name] = BodyJoint(joint.name, joint.kind, body, child, joint.place, along, joint.value)
+                tree[joint.name] = replace(joint, parent=body, child=child, along=along)
                 reached.append(child)
         return self._valued(tree)
 
@@ -373,20 +329,17 @@ class RigidBodies:
         def rotation(body: str) -> complex:
             return complex(pose.body_rotation(self._blocks.get(body, (body, ""))[0]))
 
-        def put(joint: BodyJoint, value: float) -> None:
-            tree[joint.name] = BodyJoint(
-                joint.name, joint.kind, joint.parent, joint.child, joint.place, joint.along, value
-            )
-
         for joint in [*tree.values()]:
             if joint.kind == "hinge":
-                put(joint, cmath.phase(rotation(joint.child) * rotation(joint.parent).conjugate()))
+                turn = rotation(joint.child) * rotation(joint.parent).conjugate()
+                tree[joint.name] = replace(joint, value=cmath.phase(turn))
         for drive in map(self.mechanism.coordinate, self.mechanism.drives):
             terms = self.sum_of(drive) if drive.kind == "angle" else None
             free = next((name for name in terms or () if name not in fixed and tree[name].kind == "hinge"), None)
             if terms is not None and free is not None:
                 away = float(np.asarray(pose.value(drive))) - self.value(terms)
-                put(tree[free], tree[free].value + TURN * round(away / TURN) / terms[free])
+                turns = TURN * round(away / TURN) / terms[free]
+                tree[free] = replace(tree[free], value=tree[free].value + turns)
                 fixed |= terms.keys()
         return tree
 

@@ -74,12 +74,8 @@ def followers(view: PosedStudy) -> dict[str, list[Shape]]:
     return shapes
 
 
-def cautions(view: PosedStudy) -> tuple[Caution, ...]:
+def cautions(view: PosedStudy) -> Iterator[Caution]:
     """Warnings of cams that cannot be cut as they should."""
-    return tuple(_cautions(view))
-
-
-def _cautions(view: PosedStudy) -> Iterator[Caution]:
     for cam in view.mechanism.cams:
         if _disc(view, cam, 0.0) is None:
             message = f"cam {cam.coupling}: its profile bounds no part: it is engraved on '{cam.links[1]}', and not cut"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +69,8 @@ def curve_csv(view: PosedStudy) -> Content:
 def motion_csv(view: PosedStudy) -> Content:
     """A row an instant: time, and position, velocity and acceleration of each drive."""
     step = step_of(view.rate or RATE, view.study.units)
-    section = next((part for part in _sections(view.study) if part.rated), None)
+    sections = (view.study.kinematics, view.study.dynamics)
+    section = next((part for part in sections if part is not None and part.rated), None)
     if section is not None:
         table = Timed(view.study, section).table(step)
     elif view.study.dynamics is not None and view.study.dynamics.forward is not None:
@@ -110,11 +110,6 @@ def step_of(text: str, units: Units) -> float:
     return step
 
 
-def _sections(study: Study) -> Iterator[MotionSection]:
-    """Sections whose motions may have a time."""
-    return (section for section in (study.kinematics, study.dynamics) if section is not None)
-
-
 def _instants(end: float, step: float) -> Floats:
     """Instants from 0 to the end.
 
@@ -146,7 +141,7 @@ class Timed:
             )
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         curve = curve_with(study.motion(poses), drives)
-        times = _instants(self._end(poses), step)
+        times = _instants(float(self._clock(poses, np.array([float(poses.end)]))[0]), step)
         line, places = np.zeros(len(times), dtype=np.intp), self._places(poses, times)
         solved = curve.solve(line, places)
         along, configuration = solved.poses, solved.configuration
@@ -168,10 +163,6 @@ class Timed:
                 for name, value in zip(names, values, strict=True)
             ]
         return Table("motion", tuple(columns))
-
-    def _end(self, poses: Poses) -> float:
-        """How long the motion lasts."""
-        return float(self._clock(poses, np.array([float(poses.end)]))[0])
 
     def _places(self, poses: Poses, times: Floats) -> Floats:
         """Places along the motion, in rows, at instants."""

@@ -12,14 +12,13 @@ from mechdesign.cautions import Caution
 from mechdesign.exporting.discs import DEVIATION, CamDisc, cautions, discs_of, open_profiles, replace_plate
 from mechdesign.exporting.drawing import CentreMark, Drawing, DrawnCircle, Shape, Text, around, box, roomiest
 from mechdesign.exporting.exports import drawings
-from mechdesign.exporting.view import PosedStudy
+from mechdesign.exporting.view import PosedStudy, several
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.plates import gap, hull, joined
 from mechdesign.questions.reliability.schema.section import in_words
 
 SHEET = 600.0  # width of the sheet where the study gives none
 SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
-MOST_NAMED = 3  # sentences of a warning at most
 ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
 
 
@@ -209,20 +208,14 @@ def parts_cautions(view: PosedStudy) -> tuple[Caution, ...]:
     """Warnings of parts that cannot be cut as they are, or do not fit on the sheet, and of cams."""
     parts, sheet, kerf = parts_of(view), view.sizes.sheet, view.millimetres * float(view.sizes.kerf)
     faults = [fault for part in parts for fault in part.faults()]
-    warnings = [Caution("infeasible", _several(faults))] if faults else []
+    warnings = [Caution("infeasible", several(faults))] if faults else []
     if sheet is not None:
         width = view.millimetres * float(sheet)
         lengths = {part.name: (high - low).real for part in parts for low, high in [box(part.shapes(kerf))]}
         wide = [f"{name!r} is {length:.6g} mm long" for name, length in lengths.items() if length > width]
         if wide:
-            warnings.append(Caution("infeasible", f"the sheet is {width:.6g} mm wide: {_several(wide)}"))
+            warnings.append(Caution("infeasible", f"the sheet is {width:.6g} mm wide: {several(wide)}"))
     return (*warnings, *cautions(view))
-
-
-def _several(sentences: Sequence[str]) -> str:
-    """The first of some sentences, and how many more there are."""
-    more = len(sentences) - MOST_NAMED
-    return "; ".join(sentences[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
 
 
 parts_dxf, parts_svg = drawings("parts", "every link as a part to cut at 1:1", 10, parts_drawing, parts_cautions)

@@ -18,16 +18,14 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.exporting.exports import Content, export
-from mechdesign.exporting.view import PosedStudy
+from mechdesign.exporting.view import PosedStudy, several
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.plates import Clearances, Item, pins_of, plate_of
+from mechdesign.mechanism.plates import Clearances, Item, Pair, pins_of, plate_of
 
 # Layers that the search for a stack tries at most, one link at a time.
 MOST_TRIED = 100_000
 # A search that allows meetings counts one of two plates as so many of a pin.
 OF_PLATES = 100
-# Meetings that a warning names at most.
-MOST_NAMED = 3
 HEAD = ("item", "kind", "first_layer", "last_layer", "from_mm", "to_mm")
 
 
@@ -37,12 +35,12 @@ def layers_csv(view: PosedStudy) -> Content:
 
     The rod of a telescopic link lies in the layer of its body.
     """
-    stack = stack_of(view)
-    thickness = view.millimetres * float(view.sizes.thickness)
+    description, thickness = view.mechanism.description, view.millimetres * float(view.sizes.thickness)
+    stack = stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
-    rows, description = list[tuple[str, str, int, int]](), view.mechanism.description
+    rows = list[tuple[str, str, int, int]]()
     for link, layer in stack.layers.items():
         rows.append((link, "plate", layer, layer))
         if description.links[link].tip is not None:
@@ -56,11 +54,9 @@ def layers_csv(view: PosedStudy) -> Content:
 
 
 @dataclass(frozen=True)
-class Meeting:
+class Meeting(Pair):
     """Two items that meet in the plane, at a pose in words."""
 
-    one: Item
-    other: Item
     pose: str
 
     @property
@@ -108,18 +104,10 @@ class Layering:
         """A warning where something meets."""
         if not self.meetings:
             return ()
-        named = "; ".join(map(str, self.meetings[:MOST_NAMED]))
-        more = f"; and {len(self.meetings) - MOST_NAMED} more" if len(self.meetings) > MOST_NAMED else ""
         head = "no stack was found in which nothing meets"
         if self.complete or all(meeting.certain for meeting in self.meetings):
             head = "in whatever layers, something meets"
-        return (Caution("infeasible", f"{head}; here {named}{more}"),)
-
-
-def stack_of(view: PosedStudy) -> Layering:
-    """The best stack of a study's plates over its motion; layers that the study gives are kept."""
-    description = view.mechanism.description
-    return stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
+        return (Caution("infeasible", f"{head}; here {several(self.meetings)}"),)
 
 
 def meetings_of(view: PosedStudy) -> list[Meeting]:
@@ -165,7 +153,10 @@ def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, lin
 def stacked(
     links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
 ) -> Layering:  # fmt: skip
-    """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings."""
+    """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings.
+
+    Layers that are given are kept.
+    """
     avoidable = [meeting for meeting in meetings if not meeting.certain]
     search, most = _Search(links, pins, avoidable, given), max([len(links), *given.values()])
     for count in range(max([1, *given.values()]), most + 1):

@@ -21,17 +21,13 @@ def study_json(view: PosedStudy) -> Content:
     data: dict[str, Any] = {**study.resolved}
     if study.drawn is not None and study.mechanism.sketch_configuration.valid:
         # With overrides the assembly is that of the study without them: draw it, or the sketch may show another.
-        data["mechanism"] = {**data["mechanism"], "sketch": _drawn(view)}
+        sketch = data["mechanism"].get("sketch") or {}
+        drawn = {point: complex(study.mechanism.sketch_configuration.point(point)) for point in sketch}
+        places = {point: [place.real, place.imag] for point, place in drawn.items()}
+        data["mechanism"] = {**data["mechanism"], "sketch": places}
     files = list(dict.fromkeys(os.path.relpath(path, study.folder.path) for _, path, _ in study.inputs()))
     named = f"it names files that are not in it ({', '.join(files)}): keep them beside it"
     # Characters that YAML has no place for, or that end its lines, are written as escapes.
     text = json.dumps(data, indent=2, ensure_ascii=False)
     text = _NOT_IN_YAML.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
     return Content(text + "\n", (Caution("incomplete", named),) * bool(files))
-
-
-def _drawn(view: PosedStudy) -> dict[str, list[float]]:
-    """Places of the points that the sketch has, as they are assembled."""
-    drawn, sketch = view.mechanism.sketch_configuration, view.study.resolved["mechanism"].get("sketch") or {}
-    places = {point: complex(drawn.point(point)) for point in sketch}
-    return {point: [place.real, place.imag] for point, place in places.items()}

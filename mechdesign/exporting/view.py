@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,6 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.configuration import joined
-from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.plates import Sizes
 from mechdesign.motion.solving import solve_poses
@@ -25,6 +24,8 @@ from mechdesign.study.text.reading import Context, read_number
 
 # Width of links of a study without plates, as a part of the mechanism's size.
 WIDTH = 0.08
+# Most parts, or meetings, that a warning names.
+MOST_NAMED = 3
 # Least number of poses of a motion.
 LOOKS = 721
 
@@ -104,14 +105,11 @@ class PosedStudy:
     @cached_property
     def slots(self) -> list[LinkSlot]:
         """The slots of slides and telescopic links, as long as the travel over the motion."""
-        description, slots = self.mechanism.description, []
-        slides = {
-            name: (joint.line.link, joint.point)
-            for name, joint in description.joints.items() if not isinstance(joint, Fixed)
-        }  # fmt: skip
-        slides |= {name: (name, link.tip) for name, link in description.links.items() if link.tip is not None}
-        for name, (link, point) in slides.items():
-            travel = self.track.configuration.slides[self.mechanism.graph.slides.index(name)]
+        graph, slots = self.mechanism.graph, []
+        # Of joints first, then of legs.
+        for slide in sorted(range(len(graph.slides)), key=graph.telescopic.__contains__):
+            link, point = graph.guides[slide][0].removesuffix(":rod"), graph.sliding(slide)
+            travel = self.track.configuration.slides[slide]
             ends = [self.in_frame(link, point, int(index(travel))) for index in (np.argmin, np.argmax)]
             slots.append(LinkSlot(link, point, (ends[0], ends[1])))
         return slots
@@ -178,10 +176,7 @@ class PosedStudy:
         if curve is None or curve.spent.any():
             parts = [*solve_poses(self.question.motion, self.question.watched)]
             configurations = [part.configuration for part in parts]
-            whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {})
-            wound = {name: np.concatenate([part.near[name] for part in configurations])
-                     for name in self.mechanism.windings}  # fmt: skip
-            whole = replace(whole, near=wound)
+            whole = joined(configurations, (poses.count,), self.mechanism.geometry.nominal, {}, self.mechanism.windings)
             places, follows = np.concatenate([part.rows for part in parts]) * 1.0, np.zeros(poses.count - 1, dtype=bool)
         else:
             finer = -(-(LOOKS - 1) // max(poses.end, 1))
@@ -231,3 +226,9 @@ class PosedStudy:
             except PydanticCustomError as error:
                 raise StudyError(f"--at {name}: {error}") from None
         return values
+
+
+def several(named: Sequence[object]) -> str:
+    """The first of what a warning names, and how many more there are."""
+    more = [f"and {len(named) - MOST_NAMED} more"] if len(named) > MOST_NAMED else []
+    return "; ".join([*map(str, named[:MOST_NAMED]), *more])

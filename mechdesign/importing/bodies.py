@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import StudyError
 from mechdesign.importing.sketch import GROUND, FileSketch
+from mechdesign.numerics.graphs import pieces
 
 
 class MergedLinks:
@@ -94,10 +95,7 @@ class MergedLinks:
             del self.points[body]
         ties = [set(self.at(point)) for point in sketch.points]
         ties += [{self.of(slide.guide), *self.at(slide.point)} for slide in sketch.slides.values()]
-        reached, before = {GROUND}, 0
-        while len(reached) > before:
-            before = len(reached)
-            reached = reached.union(*(tie for tie in ties if tie & reached))
+        (reached,) = (piece for piece in pieces([{GROUND}, *ties]) if GROUND in piece)
         for body in [body for body in self.points if body not in reached]:
             sketch.omitted.append(f"link {body!r}, which nothing joins to the ground")
             del self.points[body]

@@ -80,10 +80,10 @@ def conversion(
         raise StudyError(f"{cut(origin.name)} is empty")
     for kind in FORMATS:
         if kind.recognises(origin):
-            sketch = kind.read(origin)
+            sketch: FileSketch = kind.read(origin)
             break
     else:
-        names = "; ".join(kind.name for kind in FORMATS)
+        names = "; ".join(kind.NAME for kind in FORMATS)
         raise StudyError(f"the format of {cut(origin.name)} is not known; what can be imported: {names}")
     if not sketch.links:
         raise StudyError(f"{cut(origin.name)} has no links")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import add
 from typing import TypeVar, overload
@@ -104,6 +104,12 @@ def angle_of(z: Vector) -> Floats:
     """Angle of a vector in (-pi, pi]."""
     angle = np.angle(z)
     return np.where(angle <= -np.pi, np.pi, angle)
+
+
+def fit(local: Sequence[complex], places: Sequence[complex]) -> complex:
+    """Vector along which local vectors turn best onto those between some places (least squares)."""
+    one, other = (sum(part) / len(part) for part in (local, places))
+    return sum(((b - other) * (a - one).conjugate() for a, b in zip(local, places, strict=True)), 0j)
 
 
 def wrap(angle: Value) -> Value:

@@ -30,7 +30,7 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Turn
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.wheels import Pressed
+from mechdesign.mechanism.wheels import Mesh, Pressed
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
@@ -284,11 +284,8 @@ class CamFollower:
     @quiet
     def _touch(self, configuration: Configuration, out: float) -> Touch:
         linear = Linearization(self.forward.structure, self._geometry, configuration)
-        slopes = [first(configuration, self.followed, rates) for rates in linear.by_drives]
-        square = sum(slope * slope for slope in slopes)
-        rates = [slope / square for slope in slopes]
-        velocity = linear.velocity(rates)
-        acceleration = linear.acceleration(velocity, [0.0] * len(rates))
+        velocity = self.driven(linear)
+        acceleration = linear.acceleration(velocity, [0.0] * len(linear.structure.given))
         frames = [linear.graph.bodies[body][0] for body in self.links]
         center, radius = configuration.nodes[self.node], self.roller(configuration)
         moved = self.against(velocity, center, configuration)
@@ -312,19 +309,22 @@ class CamFollower:
             normal = -1j * out * moved / speed
             pitch, pace = -dot(normal, curved) / norm2(moved), speed
             place, touched, size = center - radius * normal, center, 1 / pitch - radius
-        # The follower's own motion while the cam is held: by play between them, the drives moved back.
-        parted = linear.sensitivity([play(self.coupling)])
-        back = first(configuration, self.followed, parted) * self.against(velocity, touched, configuration)
-        own = np.asarray(self.against(parted, touched, configuration) - back)[0]
+        own = self.own(linear, velocity, touched)
         pressure = np.arctan(cross(own, normal) / dot(own, normal))
         turned = normal * np.conj(configuration.body_rotation(self.links[1]))
         swept = pace * dot(self.local(configuration, center), turned)
         return Touch(place, normal, pressure, size, pitch, face, dot(own, normal), swept)
 
-    def _own(self, linear: Linearization, velocity: Rates, place: Vector) -> Vector:
+    def driven(self, linear: Linearization) -> Rates:
+        """Velocities for each unit of what is followed, with the least rates of the drives."""
+        slopes = [first(linear.configuration, self.followed, rates) for rates in linear.by_drives]
+        square = sum(slope * slope for slope in slopes)
+        return linear.velocity([slope / square for slope in slopes])
+
+    def own(self, linear: Linearization, velocity: Rates, place: Vector) -> Vector:
         """How a place of the follower moves for each unit of its coordinate while the cam is held.
 
-        That is by play between them, the drives moved back; `velocity` is that for each unit of what is followed.
+        That is by play between them, the drives moved back; `velocity` is that of `driven`.
         """
         parted = linear.sensitivity([play(self.coupling)])
         back = first(linear.configuration, self.followed, parted)
@@ -357,3 +357,7 @@ class CamFollower:
         touch = self.touch(configuration)
         normal: Value = effort / touch.lever
         return Pressed(touch.place, normal * touch.normal, normal)
+
+
+# Two links that touch as a coupling has them move: wheels, or a cam and its follower.
+Engagement = Mesh | CamFollower

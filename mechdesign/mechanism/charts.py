@@ -60,8 +60,8 @@ class Positions:
         self.start = self.of(at)[:, 0]
         followed = angles_of([*coordinates, *self.coordinates, *(c.function for c in mechanism.couplings)]).values()
         self.angles = {angle.name: angle for angle in followed if angle.kind == "angle"}
-        self._turns = {name: float(at.value(angle)) - self.difference(angle, self.start[:, None])[0]
-                       for name, angle in self.angles.items()}  # fmt: skip
+        self._turns = {name: float(at.value(a)) - self.between(a.body, a.reference, self.start[:, None])[0]
+                       for name, a in self.angles.items()}  # fmt: skip
 
     def of(self, configuration: Configuration) -> Floats:
         """Values in poses, shape (m, poses); of a single pose (m, 1)."""
@@ -70,21 +70,17 @@ class Positions:
 
     def near(self, x: Floats) -> dict[str, Value]:
         """Values of the angles, with their turns."""
-        return {name: self.difference(angle, x) + self._turns[name] for name, angle in self.angles.items()}
+        return {name: self.between(a.body, a.reference, x) + self._turns[name] for name, a in self.angles.items()}
 
     def rate(self, coordinate: Coordinate, rates: Floats) -> Floats:
         """Derivative of an angle between bodies or of a slide from those of all positions, of shape (m, ...)."""
         if coordinate.kind == "slide":
             slide: Floats = rates[len(self.rows) + coordinate.slide]
             return slide
-        return self.difference(coordinate, rates)
-
-    def difference(self, angle: Coordinate, x: Floats) -> Floats:
-        """Angle between the classes of two bodies, up to a constant; of rates of `x` its rate."""
-        return self.between(angle.body, angle.reference, x)
+        return self.between(coordinate.body, coordinate.reference, rates)
 
     def between(self, body: str, reference: str, x: Floats) -> Floats:
-        """The same from a reference to a body."""
+        """Angle from the class of a reference to that of a body, up to a constant; of rates of `x` its rate."""
         total = np.zeros(x.shape[1:])
         for sign, end in ((1, body), (-1, reference)):
             frame = self.mechanism.graph.bodies[end][0]

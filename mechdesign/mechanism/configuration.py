@@ -118,16 +118,14 @@ class Configuration:
             return angle if near is None else nearest(angle, near)
         if coordinate.kind == "parameter":
             return self.vectors.parameters[coordinate.name]
-        assert coordinate.expression is not None
-        value = coordinate.expression.evaluate(self.user_values(coordinate))
-        value = value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
+        value = coordinate.formula.evaluate(self.user_values(coordinate))
+        value = value * coordinate.formula.angle_unit if coordinate.quantity == "angle" else value
         near = self.near.get(coordinate.name) if coordinate.turn else None
         return value if near is None else nearest(value, near, coordinate.turn)
 
     def user_values(self, coordinate: Coordinate) -> dict[str, Value]:
         """Values of the parts of an expression, angles in the study's unit as its text expects."""
-        assert coordinate.expression is not None
-        unit = coordinate.expression.angle_unit
+        unit = coordinate.formula.angle_unit
         return {
             part.name: self.value(part) / unit if part.quantity == "angle" else self.value(part)
             for part in coordinate.parts
@@ -166,15 +164,21 @@ def hide(value: Either, lost: Flags) -> Either:
 
 
 def joined(
-    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
-) -> Configuration:
-    """Flat batches of one mechanism joined to one batch of a shape; angles are in (-pi, pi]."""
-    count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
+    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value],
+    angles: Iterable[str] = (),
+) -> Configuration:  # fmt: skip
+    """Flat batches of one mechanism joined to one batch of a shape.
+
+    These `angles` keep their turns as far as they are known; others are in (-pi, pi].
+    """
+    count, end, whole, names = int(np.prod(shape, dtype=np.int64)), 0, list[Any](), list[str]()
     reason = np.empty(count, dtype=np.int8)
     for part in parts:
         some = slice(end, end := end + len(part.reason))
         reason[some] = part.reason
+        names = names or [name for name in angles if name in part.near]
         values: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        values += [np.broadcast_to(part.near[name], part.shape) for name in names]
         whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in values]
         for k, value in enumerate(values):
             if np.ndim(value) > np.ndim(whole[k]):
@@ -186,4 +190,5 @@ def joined(
     nodes, rotations, slides, closures = (
         list(islice(full, len(values))) for values in (part.nodes, part.rotations, part.slides, part.closures)
     )
-    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason.reshape(shape), places)
+    near, reason = dict(zip(names, full, strict=True)), reason.reshape(shape)
+    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason, places, near)

@@ -52,6 +52,12 @@ class Coordinate:
     turn: float = 0.0
 
     @property
+    def formula(self) -> Expression:
+        """The expression of one of this kind."""
+        assert self.expression is not None
+        return self.expression
+
+    @property
     def linear(self) -> bool:
         """Whether an expression is linear in angles and slides, whatever its parameters."""
         if self.expression is None or any(part.kind not in ("angle", "slide", "parameter") for part in self.parts):

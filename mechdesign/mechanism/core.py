@@ -15,7 +15,6 @@ from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import TURN, Value, Vector, norm2, wrap
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.elements.measures import Limit
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
@@ -30,13 +29,15 @@ ON_THE_CUT = 1e-9
 
 @dataclass(frozen=True)
 class Bound:
-    """A limit with its coordinate; `drive` says that this is a drive, whose turns count."""
+    """A limit with its coordinate."""
 
     coordinate: Coordinate
-    minimum: Term | None
-    maximum: Term | None
-    label: str
-    drive: bool = False
+    limit: Limit
+
+    @property
+    def drive(self) -> bool:
+        """Whether it is of a drive, whose turns count."""
+        return bool(self.limit.kind == "drive")
 
     def scale(self, size: float) -> float:
         """Unit of rounding errors in this limit's margins, for a mechanism of a given size."""
@@ -73,13 +74,13 @@ class Bound:
                 if not counted:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
-                return [(self.label, margin)]
+                return [(self.limit.name, margin)]
             value = configuration.value(self.coordinate)
         margins = []
         if low is not None:
-            margins.append((f"{self.label} min", value - low))
+            margins.append((f"{self.limit.name} min", value - low))
         if high is not None:
-            margins.append((f"{self.label} max", high - value))
+            margins.append((f"{self.limit.name} max", high - value))
         return margins
 
     def away(self, configuration: Configuration, places: Mapping[str, Value]) -> Value | None:
@@ -95,8 +96,7 @@ class Bound:
     @property
     def of_angle(self) -> bool:
         """Whether it bounds an angle on both sides, so modulo a turn; an angle from an expression is not meant."""
-        given = self.minimum is not None and self.maximum is not None
-        return self.coordinate.kind == "angle" and given
+        return self.coordinate.kind == "angle" and None not in (self.limit.min, self.limit.max)
 
     def counts(self, places: Mapping[str, Value]) -> bool:
         """Whether whole turns of an angle matter: in an expression, or if the ends are a turn or more apart."""
@@ -106,7 +106,7 @@ class Bound:
 
     def ends(self, places: Mapping[str, Value]) -> tuple[Value | None, Value | None]:
         """Smallest and largest value for given values of the places; None for a side that is left open."""
-        low, high = (places[end] if isinstance(end, str) else end for end in (self.minimum, self.maximum))
+        low, high = (places[end] if isinstance(end, str) else end for end in (self.limit.min, self.limit.max))
         return low, high
 
 
@@ -126,7 +126,7 @@ class Core:
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
         self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
-        self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+        self.bounds = tuple(map(self._bound, description.limits))
 
     def why(self, number: int) -> str:
         """A reason of poses in words, see `Reason`; of a coupling without a value with its name."""
@@ -209,10 +209,9 @@ class Core:
 
     def frame(self, body: str, configuration: Configuration) -> tuple[Vector, Vector]:
         """Origin and x axis of a body's frame in the world."""
-        base = next(point for owner, point in self.graph.points if owner == body)
-        along = configuration.body_rotation(body)
-        local = self.geometry.local(body, base, configuration.places)
-        return configuration.nodes[self.graph.nodes.index(base)] - local * along, along
+        base, along = self.graph.bases[body], configuration.body_rotation(body)
+        local = self.geometry.local(body, self.graph.nodes[base], configuration.places)
+        return configuration.nodes[base] - local * along, along
 
     def margins(self, configuration: Configuration, *, smooth: bool = False) -> list[tuple[str, Value]]:
         """Named margins of all limits: positive inside; see `Bound.margins`."""
@@ -242,10 +241,9 @@ class Core:
         """Coordinates of the limits that depend on the turns of angles."""
         return tuple(bound.coordinate for bound in self.bounds if bound.counts(self.nominal))
 
-    def _bound(self, limit: Limit, index: int) -> Bound:
+    def _bound(self, limit: Limit) -> Bound:
         if limit.kind in ("distance", "angle"):
             coordinate = names.between("-".join(limit.items), limit.kind, limit.items, self.graph)
         else:
             coordinate = self.coordinate(limit.items[0])
-        label = limit.name
-        return Bound(coordinate, limit.min, limit.max, label, limit.kind == "drive")
+        return Bound(coordinate, limit)

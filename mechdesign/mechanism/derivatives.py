@@ -260,7 +260,7 @@ class Linearization(Loops):
         return velocity_z, self._solve(
             none, rest,
             derived=lambda pose, c, rates: acceleration_sensitivity(
-                pose, c, velocity, acceleration, position, velocity_z, rates
+                pose, c, (velocity, acceleration), (position, velocity_z, rates)
             ),
         )  # fmt: skip
 

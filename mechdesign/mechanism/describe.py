@@ -12,11 +12,10 @@ from mechdesign.mechanism.coordinates import winding
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.diagnosis import joints_in_words, near_singular
 from mechdesign.mechanism.elements.declared import Term
-from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.four_bars import describe_loops
-from mechdesign.mechanism.graph import GROUND, Graph, rod_of
+from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
@@ -184,7 +183,7 @@ def chain_of(
     description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]
 ) -> GroupChain:
     """The bodies and joints around the only loop of a group."""
-    (loop,) = group.loops
+    (loop,), clamps = group.loops, graph.clamps.values()
     # Round the loop: bodies (str) and between them joints (letter, name); bodies placed already are the base.
     walk: list[str | tuple[str, str]] = []
     node = loop.start
@@ -194,8 +193,9 @@ def chain_of(
         before = walk[-1] if walk else BASE
         if body == before:
             return
-        if isinstance(before, str) and not _clamped(description, before, body, graph.nodes[node]):
-            walk.append(("R", graph.nodes[node]))
+        pin = graph.nodes[node]
+        if isinstance(before, str) and not any(pin == at and {*pair} == {before, body} for *pair, at in clamps):
+            walk.append(("R", pin))
         walk.append(body)
 
     for k, sign in loop.edges:
@@ -204,7 +204,7 @@ def chain_of(
             to(edge.locals[0][1])
         else:
             name = graph.slides[edge.slide]
-            first, last = _slide_bodies(description, name)[::sign]
+            first, last = _slide_bodies(graph, name)[::sign]
             to(first)
             walk.append(("P", name))
             to(last)
@@ -240,23 +240,17 @@ def _pinned(
     """A link at one of two slides that is neither driven nor ground and has a pin; the pin, and the slide."""
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)} | {GROUND}
     for slide in (one, other):
-        for body in _slide_bodies(description, slide):
+        for body in _slide_bodies(graph, slide):
             for owner, point in graph.points if body not in driven and body not in middle else ():
                 if owner == body and any(point == shared and mate != body for mate, shared in graph.points):
                     return body, point, slide
     return None
 
 
-def _slide_bodies(description: Description, name: str) -> tuple[str, ...]:
+def _slide_bodies(graph: Graph, name: str) -> tuple[str, str]:
     """Bodies at the tail and at the head of a slide; the pin in a slot counts as a body."""
-    joint = description.joints.get(name)
-    return (name, rod_of(name)) if joint is None else (*joint.links, f"{PIN_IN}{name}")[:2]
-
-
-def _clamped(description: Description, a: str, b: str, point: str) -> bool:
-    pair = {a.removesuffix(":rod"), b.removesuffix(":rod")}
-    clamps = [joint for joint in description.joints.values() if isinstance(joint, Fixed)]
-    return any({*joint.links} == pair and joint.point == point for joint in clamps)
+    guide, slider = graph.guides[graph.slides.index(name)]
+    return guide, slider or f"{PIN_IN}{name}"
 
 
 def group_in_words(description: Description, graph: Graph, plan: Plan, index: int, placed: set[str]) -> str:

@@ -11,12 +11,13 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
-from mechdesign.mechanism.elements.joints import Fixed, Prismatic
+from mechdesign.mechanism.elements.joints import Prismatic
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.graphs import pieces
 
 DRIVES = "mechanism.drives"
 # Largest number of joints or links that a message names.
@@ -35,18 +36,10 @@ def listed(names: Iterable[str], last: str = "and") -> str:
 
 def joints_in_words(description: Description, graph: Graph) -> list[str]:
     """A description of every joint with the links that it joins."""
-    holders: dict[str, list[str]] = {}
-    for body, point in graph.points:
-        if ":" not in point:
-            link = body.removesuffix(":rod")
-            if link not in holders.setdefault(point, []):
-                holders[point].append(link)
-    clamps = [joint.point for joint in description.joints.values() if isinstance(joint, Fixed)]
-    words = [
-        f"revolute {point} ({', '.join(links)})"
-        for point, links in holders.items()
-        if len(links) - clamps.count(point) > 1
-    ]
+    clamps = [point for _, _, point in graph.clamps.values()]
+    pins = {point: graph.links_at(point) for point in graph.holders if ":" not in point}
+    pins = {point: links for point, links in pins.items() if len(links) - clamps.count(point) > 1}
+    words = [f"revolute {point} ({', '.join(links)})" for point, links in pins.items()]
     words += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
     for name, joint in description.joints.items():
         parts = (*joint.links, joint.point)[:2]
@@ -148,9 +141,7 @@ def _too_free(equations: LoopEquations, jacobian: Floats, drives: Sequence[str],
 
 def _loose_ends(graph: Graph) -> str:
     """A hint at two points, on one link each, whose names differ by a slip so that one pin may be meant."""
-    owners: dict[str, list[str]] = {}
-    for body, point in graph.points:
-        owners.setdefault(point, []).append(body.removesuffix(":rod"))
+    owners = {point: graph.links_at(point) for point in graph.holders}
     on_slides = {graph.nodes[node] for edge in graph.edges if edge.slide is not None for node in (edge.tail, edge.head)}
     lone = [point for point, links in owners.items() if len(links) == 1 and point not in on_slides and ":" not in point]
     for k, point in enumerate(lone):
@@ -389,8 +380,5 @@ def _can_go(description: Description, joint: str) -> bool:
     slide = description.joints[joint]
     if not isinstance(slide, Prismatic):
         return True
-    pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
-    reached = {slide.line.link}
-    for _ in pairs:
-        reached.update(*(pair for pair in pairs if pair & reached))
-    return slide.slider in reached
+    others = (other.links for name, other in description.joints.items() if name != joint)
+    return any({*slide.links} <= piece for piece in pieces(others))

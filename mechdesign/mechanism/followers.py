@@ -37,11 +37,10 @@ def cams(
         followed = next(part for part in coupling.function.parts if part.kind != "parameter")
         point = given.face.through or ""
         follower = graph.holder(given.face.link, point)
-        base = next(graph.nodes.index(name) for body, name in graph.points if body == given.link)
         whole = _plan_with(followed, [c.name for c in forward.structure.given], plan, coupling.name)
         cam = CamFollower(
             coupling.name, index, given, followed, coupling.follower, (follower, given.link), graph.nodes.index(point),
-            base, turns_of(given.face), forward, whole,
+            graph.bases[given.link], turns_of(given.face), forward, whole,
         )  # fmt: skip
         _check_follower(cam)
         listed.append(cam)
@@ -86,18 +85,17 @@ def _check_follower(cam: CamFollower) -> None:
                 "no one profile",
                 where,
             )
-    square = sum(slope * slope for slope in slopes)
-    velocity = linear.velocity([slope / square for slope in slopes])
+    velocity = cam.driven(linear)
     point = core.graph.nodes[cam.node]
     if cam.flat:
         along = cam.along_face(drawn)
-        pushed = max(float(np.abs(dot(1j * along, cam._own(linear, velocity, place + s * along)))) for s in (0.0, size))
+        pushed = max(float(np.abs(dot(1j * along, cam.own(linear, velocity, place + s * along)))) for s in (0.0, size))
         mistake = (
             f"moves the flat face at '{point}' along itself or not at all, so that the cam cannot push it: give "
             "another direction, or a point of the link that moves"
         )
     else:
-        pushed = float(np.abs(cam._own(linear, velocity, place)))
+        pushed = float(np.abs(cam.own(linear, velocity, place)))
         mistake = f"does not move the roller at '{point}' against the cam: give a point of the link that it moves"
     if pushed <= UNMOVED * (size if cam.follower.quantity == "angle" else 1.0):
         raise MechanismError(f"'{cam.follower.name}' {mistake}", where)

@@ -17,16 +17,7 @@ from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.outputs import Rates, pulled
-
-
-def bases(graph: Graph) -> dict[str, int]:
-    """By body, its base: the node of its first point, from which its edges run."""
-    nodes: dict[str, int] = {}
-    for body, point in graph.points:
-        nodes.setdefault(body, graph.nodes.index(point))
-    return nodes
+from mechdesign.mechanism.outputs import Rates, first, pulled
 
 
 @dataclass(eq=False)
@@ -55,7 +46,7 @@ class Forces:
 
     def __post_init__(self) -> None:
         self.nodes = [0.0] * len(self.configuration.nodes)
-        self.bases = bases(self.configuration.graph)
+        self.bases = self.configuration.graph.bases
 
     def on_pin(self, node: int, force: Vector) -> None:
         """Add a force on the pin at a node."""
@@ -232,8 +223,8 @@ def local_center(geometry: Geometry, body: str, given: Mass, places: Mapping[str
 def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
     """From the base of a body to its centre of mass, in its frame."""
     places = forces.configuration.places
-    base = next(point for owner, point in geometry.graph.points if owner == body)
-    return local_center(geometry, body, given, places) - geometry.local(body, base, places)
+    base = geometry.local(body, geometry.graph.nodes[forces.bases[body]], places)
+    return local_center(geometry, body, given, places) - base
 
 
 @quiet
@@ -249,14 +240,11 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
         constant, stiffness, free, damping = spring.pull(lambda term: geometry.term(term, places))
         rate: Value = 0.0
         if spring.turning:
-            one, other = spring.between
-            stretch = configuration.value(winding(spring)) - free
+            angle = winding(spring)
+            stretch = configuration.value(angle) - free
             if moving.velocity is not None:
-                frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
-                rate = frames[0] - frames[1]
-            moment = constant + stiffness * stretch + damping * rate
-            forces.on_body(other, 0.0, -1.0 * moment)
-            forces.on_body(one, 0.0, moment)
+                rate = first(configuration, angle, moving.velocity)
+            forces.on_coordinate(angle, -1.0 * (constant + stiffness * stretch + damping * rate))
         else:
             span = forces.span(spring.between)
             length = np.sqrt(norm2(span))

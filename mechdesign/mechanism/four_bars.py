@@ -12,7 +12,7 @@ double-rocker, GRRC rocker-crank, RRR1-RRR4 triple-rocker, SCCC and the like cha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -21,8 +21,7 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, norm2
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.elements.joints import Fixed, Prismatic, Slot
-from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.outputs import Rates
 
@@ -215,12 +214,11 @@ class _Bodies:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        graph, description = mechanism.graph, mechanism.description
+        graph = mechanism.graph
         self.owner: dict[str, str] = {body: body for body in graph.bodies}
-        for joint in description.joints.values():
-            if isinstance(joint, Fixed):
-                one, other = sorted((self.owner[link] for link in joint.links), key=list(graph.bodies).index)
-                self.owner = {body: one if owner == other else owner for body, owner in self.owner.items()}
+        for clamp in graph.clamps.values():
+            one, other = sorted((self.owner[body] for body in clamp[:2]), key=list(graph.bodies).index)
+            self.owner = {body: one if owner == other else owner for body, owner in self.owner.items()}
         self.ground = self.owner[GROUND]
         self.frames: dict[str, int] = {body: graph.bodies[body][0] for body in self.owner.values()}
         holders: dict[int, list[str]] = {}
@@ -232,25 +230,16 @@ class _Bodies:
         for body, point in graph.points:
             hold(self.owner[body], graph.node(point))
         self.joints: list[tuple[str, str, LoopJoint]] = []
-        edges = {edge.slide: k for k, edge in enumerate(graph.edges) if edge.slide is not None}
-        for name, link in description.links.items():
-            if link.telescopic:
-                self._slide(self.owner[name], self.owner[rod_of(name)], name, edges)
-        for name, joint in description.joints.items():
-            if isinstance(joint, Prismatic):
-                self._slide(self.owner[joint.line.link], self.owner[joint.slider], name, edges)
-            elif isinstance(joint, Slot):
-                carrier, block = self.owner[joint.line.link], f"{name} block"
+        for slide, (name, (guide, slider)) in enumerate(zip(graph.slides, graph.guides, strict=True)):
+            carrier, edge = self.owner[guide], graph.edge_of(slide)
+            block = self.owner.get(slider, f"{name} block")
+            if not slider:
                 self.frames[block] = self.frames[carrier]
-                self._slide(carrier, block, name, edges)
-                hold(block, graph.node(joint.point))
+                hold(block, graph.edges[edge].head)
+            self.joints.append((carrier, block, LoopJoint(name, edge=edge)))
         for node, bodies in holders.items():
             for k, one in enumerate(bodies):
                 self.joints += [(one, other, LoopJoint(graph.nodes[node], node=node)) for other in bodies[k + 1 :]]
-
-    def _slide(self, one: str, other: str, name: str, edges: Mapping[int, int]) -> None:
-        slide = self.mechanism.graph.slides.index(name)
-        self.joints.append((one, other, LoopJoint(name, edge=edges[slide])))
 
     def four_bar(self, links: Sequence[str], joints: Sequence[LoopJoint]) -> FourBar:
         """Order a ring (joint k between links k and k + 1): frame, input, coupler, output."""

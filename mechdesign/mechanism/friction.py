@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.elements.joints import Friction
 from mechdesign.mechanism.forces import Forces
@@ -22,7 +23,6 @@ from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.joint_contacts import PIN, Joints
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
-from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Members whose relative rate is below this part of the fastest in the mechanism do not move against each other.
@@ -69,9 +69,9 @@ def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]
             continue
         slide = slides.get(contact.joint)
         if slide is not None:
-            guide, slider = joints.guides[slide]
+            guide, slider = graph.guides[slide]
             edge = graph.edge_of(slide)
-            contacts.append(Rubbing(contact.joint, k, slider or "", guide, slide, edge, frictions[contact.joint]))
+            contacts.append(Rubbing(contact.joint, k, slider, guide, slide, edge, frictions[contact.joint]))
         elif contact.turns and (by := carriers.get(contact.by, contact.by)) != contact.on:
             contacts.append(Rubbing(contact.joint, k, contact.on, by, None, -1, frictions[contact.joint]))
     return contacts

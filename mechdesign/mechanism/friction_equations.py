@@ -17,13 +17,12 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.linear import solved
 
 # Residual of a solution, as a part of the sum of its terms.
 SOLVED = 1e-12
 # Part of the largest force that counts as borne by every contact, so that its rounding is a solution.
 ROUNDING = 1e-3
-# Most steps of Newton's method; where there is one solution, with steps of the contraction between them.
-STEPS = 200
 # Following a solution: steps of Newton's method, the longest and the shortest step of the coefficients' growth.
 FOLLOWING_STEPS, LONGEST, SHORTEST = 12, 1 / 16, 1e-6
 
@@ -91,43 +90,23 @@ class FrictionSystem:
         finite = np.isfinite(self.bounds).all(axis=(0, 1)) & np.isfinite(self._least).all(axis=0)
         # A matrix K >= 0 has a spectral radius below 1 where (I - K) v = 1 has a solution v > 0.
         bounds = np.where(finite, self.bounds, 0.0)
-        weights, regular = _solved(np.eye(self.count)[:, :, None] - bounds, np.ones((self.count, self.poses)))
-        single = finite & regular & (weights > 0).all(axis=0)
-        rows = np.flatnonzero(single)
-        friction[:, rows] = self.take(rows)._contracted(weights[:, rows])
-        rows = np.flatnonzero(finite & np.isnan(friction).any(axis=0))
-        if len(rows):
-            friction[:, rows], jams[rows] = self.take(rows)._followed(rates[:, rows])
+        weights = _solved(np.eye(self.count)[:, :, None] - bounds, np.ones((self.count, self.poses)))
+        # One step leads to a solution that is the only one.
+        step = np.where((weights > 0).all(axis=0), 1.0, LONGEST)
+        if len(rows := np.flatnonzero(finite)):
+            friction[:, rows], jams[rows] = self.take(rows)._followed(rates[:, rows], step[rows])
         # One step more, which is exact beside the corners of the sizes.
         residual, matrix, _ = self.residual(friction, np.ones(self.poses))
-        better = friction - _solved(matrix, residual)[0]
+        better = friction - _solved(matrix, residual)
         good = (np.abs(self.residual(better, np.ones(self.poses))[0]) <= np.abs(residual)).all(axis=0)
         return np.where(good, better, friction), jams, np.clip(_determinant(matrix), 0.0, 1.0)
 
-    def _contracted(self, scale: Floats) -> Floats:
-        """The one solution, where the equations are a contraction in the largest of the residuals over `scale`."""
-        friction, growth = np.zeros((self.count, self.poses)), np.ones(self.poses)
-        residual, matrix, _ = self.residual(friction, growth)
-        for _ in range(STEPS):
-            if (np.abs(residual) <= self.tolerance(friction)).all():
-                return friction
-            newton = friction - _solved(matrix, residual)[0]
-            trial, trial_matrix, _ = self.residual(newton, growth)
-            before, after = (np.abs(values / scale).max(axis=0) for values in (residual, trial))
-            good = after < 0.9 * before
-            plain = np.where(good, newton, friction - residual)
-            if not good.all():
-                trial, trial_matrix, _ = self.residual(plain, growth)
-            done = (np.abs(residual) <= self.tolerance(friction)).all(axis=0)
-            friction = np.where(done, friction, plain)
-            residual = np.where(done, residual, trial)
-            matrix = np.where(done, matrix, trial_matrix)
-        return np.where((np.abs(residual) <= self.tolerance(friction)).all(axis=0), friction, np.nan)
+    def _followed(self, rates: Floats, step: Floats) -> tuple[Floats, Ints]:
+        """Solutions followed from no friction on, and which contact jams where they end before the coefficients.
 
-    def _followed(self, rates: Floats) -> tuple[Floats, Ints]:
-        """Solutions followed from no friction on, and which contact jams where they end before the coefficients."""
-        friction = np.zeros((self.count, self.poses))
-        growth, step = np.zeros(self.poses), np.full(self.poses, LONGEST)
+        The coefficients first grow by the part `step`.
+        """
+        friction, growth = np.zeros((self.count, self.poses)), np.zeros(self.poses)
         while len(rows := np.flatnonzero((growth < 1) & (step > SHORTEST))):
             part = self.take(rows)
             ahead = np.minimum(growth[rows] + step[rows], 1.0)
@@ -136,7 +115,7 @@ class FrictionSystem:
             step[rows] = np.where(good, np.minimum(2 * step[rows], LONGEST), step[rows] / 2)
         # What grows fastest where it ends takes most of the power.
         _, matrix, size = self.residual(friction, growth)
-        lost = np.abs(_solved(matrix, size)[0] * rates)
+        lost = np.abs(_solved(matrix, size) * rates)
         jammed = growth < 1
         return np.where(jammed, np.nan, friction), np.where(jammed, np.nan_to_num(lost).argmax(axis=0), -1)
 
@@ -145,7 +124,7 @@ class FrictionSystem:
         residual, matrix, _ = self.residual(friction, growth)
         good: Flags = np.zeros(self.poses, dtype=bool)
         for _ in range(FOLLOWING_STEPS):
-            friction = friction - _solved(matrix, residual)[0]
+            friction = friction - _solved(matrix, residual)
             residual, matrix, _ = self.residual(friction, growth)
             good = np.asarray((np.abs(residual) <= self.tolerance(friction)).all(axis=0))
             if good.all():
@@ -160,9 +139,6 @@ def _determinant(matrix: Floats) -> Floats:
     return np.asarray(np.linalg.det(np.where(good[:, None, None], lead, 0.0)))
 
 
-def _solved(matrix: Floats, right: Floats) -> tuple[Floats, Flags]:
-    """Solutions of linear systems, shape (k, poses), nan where a matrix is singular; and where it is regular."""
-    lead, good = np.moveaxis(matrix, -1, 0), np.asarray(_determinant(matrix) != 0)
-    safe = np.where(good[:, None, None], lead, np.eye(lead.shape[-1]))
-    solution = np.linalg.solve(safe, right.T[..., None])[..., 0].T
-    return np.where(good, solution, np.nan), good
+def _solved(matrix: Floats, right: Floats) -> Floats:
+    """Solutions of linear systems, shape (k, poses), nan where a matrix is singular."""
+    return solved(np.moveaxis(matrix, -1, 0), right.T[..., None])[0][..., 0].T

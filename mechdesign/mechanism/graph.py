@@ -8,13 +8,12 @@ graph are the vector loops of the mechanism; nothing else is needed by the solve
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
-from mechdesign.errors import MechanismError
 from mechdesign.mechanism.elements.declared import Term
-from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, LinkLine, Prismatic
+from mechdesign.mechanism.elements.joints import Fixed, LinkLine, Prismatic
 from mechdesign.mechanism.model import Description
 
 GROUND = "ground"
@@ -69,8 +68,23 @@ class Graph:
     points: Mapping[tuple[str, str], tuple[Term, Term]]  # by body and point, the coordinates in the body's frame
     slides: tuple[str, ...]  # joints and telescopic legs whose displacement is a coordinate
     telescopic: frozenset[int]  # indices of the slides that are telescopic legs
+    guides: tuple[tuple[str, str], ...]  # of each slide the body with its line, and its slider, "" for a pin in a slot
+    clamps: Mapping[str, tuple[str, str, str]]  # by fixed joint, the two bodies and their point
     # Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
+
+    @cached_property
+    def bases(self) -> dict[str, int]:
+        """By body, its base: the node of its first point, from which its edges run."""
+        return {body: self.nodes.index(point) for body, point in reversed([*self.points])}
+
+    @cached_property
+    def holders(self) -> dict[str, list[str]]:
+        """By point, the bodies that have it."""
+        holders: dict[str, list[str]] = {}
+        for body, point in self.points:
+            holders.setdefault(point, []).append(body)
+        return holders
 
     def node(self, name: str) -> int:
         """Index of the node of a point, ``B``; the point of a link, ``rod.B``, has the node of its pin."""
@@ -79,6 +93,10 @@ class Graph:
     def edge_of(self, slide: int) -> int:
         """Index of the edge of a slide."""
         return next(k for k, edge in enumerate(self.edges) if edge.slide == slide)
+
+    def sliding(self, slide: int) -> str:
+        """Name of the point that moves along a slide."""
+        return self.nodes[self.edges[self.edge_of(slide)].head]
 
     def is_point(self, name: str) -> bool:
         """Whether a name is that of a point, ``B``, or of a point of a link, ``rod.B``."""
@@ -92,7 +110,7 @@ class Graph:
 
     def links_at(self, point: str) -> list[str]:
         """Names of the links that meet at a point."""
-        return list(dict.fromkeys(body.removesuffix(":rod") for body, name in self.points if name == point))
+        return list(dict.fromkeys(body.removesuffix(":rod") for body in self.holders.get(point, ())))
 
     def joined(self, edges: Iterable[int]) -> list[str]:
         """Names of the points at the ends of edges, in their order; given distances, no links, are left out."""
@@ -125,9 +143,8 @@ def _classes(
         if root in class_of:
             continue
         class_of[root] = (count, ())
-        queue = deque([root])
-        while queue:
-            body = queue.popleft()
+        queue = [root]
+        for body in queue:
             for other, turns in neighbours[body]:
                 if other not in class_of:
                     class_of[other] = (count, class_of[body][1] + turns)
@@ -137,17 +154,10 @@ def _classes(
 
 
 def build_graph(description: Description) -> Graph:
-    """Compile a description into its graph.
-
-    Raises
-    ------
-    MechanismError
-        Where a joint names a point that its link does not have.
-    """
+    """Compile a description into its graph."""
     points: dict[tuple[str, str], tuple[Term, Term]] = {}
     on_body: dict[str, list[str]] = {}
     ties: list[tuple[str, str, tuple[Turn, ...]]] = []
-    legs: list[tuple[str, str, str]] = []
 
     def put(body: str, point: str, local: tuple[Term, Term]) -> None:
         if (body, point) not in points:
@@ -168,27 +178,22 @@ def build_graph(description: Description) -> Graph:
             on_body[rod] = []
             put(rod, link.ends[1], (0.0, 0.0))
             ties.append((name, rod, ()))
-            legs.append((name, *link.ends))
 
-    lines: list[tuple[str, LinkLine, str, tuple[tuple[int, str, str], ...]]] = []
+    def holder(link: str, point: str) -> str:
+        return link if (link, point) in points else rod_of(link)
+
+    clamps: dict[str, tuple[str, str, str]] = {}
     for joint in description.joints.values():
         if isinstance(joint, Fixed):
-            a, b = joint.links
+            (a, b), point = joint.links, joint.point
             ties.append((a, b, (Turn(1, joint.angle),)))
+            clamps[joint.name] = holder(a, point), holder(b, point), point
             continue
         line = joint.line
         if line.through is None:
             put(line.link, origin_of(line.link), (0.0, 0.0))
-        seats = [(-1, line.link, line.through)] if line.through is not None else []
-        seats += [(1, joint.slider, joint.point)] if isinstance(joint, Prismatic) else []
-        lines.append((joint.name, line, joint.point, tuple(seats)))
         if isinstance(joint, Prismatic):
             ties.append((line.link, joint.slider, (*turns_of(line), Turn(1, joint.angle))))
-
-    for name, joint in description.joints.items():
-        for body, point in _named_points(joint):
-            if (body, point) not in points and (rod_of(body), point) not in points:
-                raise MechanismError(f"link '{body}' has no point '{point}'", f"mechanism.joints.{name}")
 
     classes, count = _classes(bodies, ties)
     nodes = list(dict.fromkeys(point for body in bodies for point in on_body[body]))
@@ -198,26 +203,27 @@ def build_graph(description: Description) -> Graph:
         base, *others = on_body[body] or [""]
         for point in others:
             edges.append(Edge(index[base], index[point], classes[body][0], ((1, body, point), (-1, body, base))))
-    slides: list[str] = []
-    for leg, tail, head in legs:
-        edges.append(
-            Edge(index[tail], index[head], classes[leg][0], ((1, rod_of(leg), head), (-1, leg, tail)),
-                 len(slides), classes[leg][1])
-        )  # fmt: skip
-        slides.append(leg)
-    for name, line, point, pins in lines:
+    guides: dict[str, tuple[str, str]] = {}
+    for name, link in description.links.items():
+        if link.telescopic and link.ends is not None:
+            (tail, head), (frame, offset) = link.ends, classes[name]
+            arm = (1, rod_of(name), head), (-1, name, tail)
+            edges.append(Edge(index[tail], index[head], frame, arm, len(guides), offset))
+            guides[name] = name, rod_of(name)
+    legs = len(guides)
+    for joint in description.joints.values():
+        if isinstance(joint, Fixed):
+            continue
+        line, slider = joint.line, ""
         through = line.through if line.through is not None else origin_of(line.link)
-        frame, offset = classes[line.link]
-        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *turns_of(line)), pins))
-        slides.append(name)
+        pins = [(-1, line.link, through)] if line.through is not None else []
+        if isinstance(joint, Prismatic):
+            pins.append((1, joint.slider, joint.point))
+            slider = holder(joint.slider, joint.point)
+        (frame, offset), ends = classes[line.link], (index[through], index[joint.point])
+        edges.append(Edge(*ends, frame, (), len(guides), (*offset, *turns_of(line)), tuple(pins)))
+        guides[joint.name] = holder(line.link, through), slider
     return Graph(
-        tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))), tuple(ties)
-    )
-
-
-def _named_points(joint: AnyJoint) -> list[tuple[str, str]]:
-    if isinstance(joint, Fixed):
-        return [(link, joint.point) for link in joint.links]
-    line = joint.line
-    ends = [(line.link, point) for point in (line.through, line.toward) if point is not None]
-    return ends + [(link, joint.point) for link in joint.links[1:]]
+        tuple(nodes), tuple(edges), count, classes, points, tuple(guides), frozenset(range(legs)),
+        tuple(guides.values()), clamps, tuple(ties),
+    )  # fmt: skip

@@ -8,13 +8,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 from mechdesign.mechanism.algebra import Vector
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import coupled
-from mechdesign.mechanism.elements.joints import Fixed, Prismatic, Slot
-from mechdesign.mechanism.forces import bases
-from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
+from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.wheels import Engagement
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"
@@ -63,20 +61,14 @@ class Joints:
         self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(),
         engaged: Sequence[Engagement] = (),
     ) -> None:  # fmt: skip
-        self.description, self.graph, self.bases = description, graph, bases(graph)
+        self.description, self.graph, self.bases = description, graph, graph.bases
         self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
         self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
         #: By node at which one body alone has a point, this body: it bears what acts on the pin.
         self.sole: dict[int, str] = {}
         #: By leg, prismatic or fixed joint, the two bodies that it keeps from turning against each other.
-        self.ties = {name: (name, rod_of(name)) for name, link in description.links.items() if link.telescopic}
-        for slide, (guide, slider) in self.guides.items():
-            if slider is not None:
-                self.ties[graph.slides[slide]] = guide, slider
-        for name, joint in description.joints.items():
-            if isinstance(joint, Fixed):
-                one, other = joint.links
-                self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
+        self.ties = {name: pair for name, pair in zip(graph.slides, graph.guides, strict=True) if pair[1]}
+        self.ties |= {name: (one, other) for name, (one, other, _) in graph.clamps.items()}
         touching = [Contact(pair.coupling, *pair.links, pair.nodes[0], (), engaged=pair) for pair in engaged]
         self.contacts = (*self._slides(), *self._pins(), *touching)
         self.order, self.open = self._tie_order()
@@ -87,27 +79,11 @@ class Joints:
         counts = Counter(contact.joint for contact in self.contacts)
         return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
 
-    @cached_property
-    def guides(self) -> dict[int, tuple[str, str | None]]:
-        """By slide, the body that carries its line, and its slider; None for the pin of a slot."""
-        guides: dict[int, tuple[str, str | None]] = {}
-        for slide, name in enumerate(self.graph.slides):
-            if slide in self.graph.telescopic:
-                guides[slide] = name, rod_of(name)
-                continue
-            joint = self.description.joints[name]
-            assert isinstance(joint, Prismatic | Slot)
-            line = joint.line
-            guide = self.graph.holder(line.link, line.through or origin_of(line.link))
-            slider = self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
-            guides[slide] = guide, slider
-        return guides
-
     def _slides(self) -> list[Contact]:
         contacts = []
         for k, edge in enumerate(self.graph.edges):
-            if edge.slide is not None and (slider := self.guides[edge.slide][1]) is not None:
-                name, guide = self.graph.slides[edge.slide], self.guides[edge.slide][0]
+            if edge.slide is not None and (pair := self.graph.guides[edge.slide])[1]:
+                name, (guide, slider) = self.graph.slides[edge.slide], pair
                 contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), turns=False, slides=True))
         return contacts
 
@@ -121,9 +97,8 @@ class Joints:
             if edge.slide is None:
                 tail = head = edge.locals[0][1]
             else:
-                tail, slider = self.guides[edge.slide]
-                head = slider or ""
-                if slider is None:
+                tail, head = self.graph.guides[edge.slide]
+                if not head:
                     name = self.graph.slides[edge.slide]
                     slots.setdefault(edge.head, []).append(_Member(tail, ((k, -1),), (), name))
             forces[edge.tail, tail].append((k, 1))
@@ -174,10 +149,7 @@ class Joints:
         Each clamp holds what hangs on it, seen from this one.
         """
         apart = {member.name: member for member in members if not member.slot}
-        clamps = {
-            name: self.ties[name] for name, joint in self.description.joints.items()
-            if isinstance(joint, Fixed) and joint.point == self.graph.nodes[node]
-        }  # fmt: skip
+        clamps = {name: self.ties[name] for name, (*_, at) in self.graph.clamps.items() if at == self.graph.nodes[node]}
         contacts = []
 
         def hold(member: _Member) -> _Member:

@@ -68,7 +68,7 @@ class Loops:
         values = [*given, *(np.nan if k in structure.coupled else 0.0 for k in structure.numbers)]
         ties = [tie_rotation(tie, values, vectors) for tie in structure.ties]
         rotations = [
-            turn if tie.root == 0 and structure.solved_before(tie) else None
+            turn if tie.root == 0 and structure.coupled.isdisjoint(k for _, k in tie.given) else None
             for tie, turn in zip(structure.ties, ties, strict=True)
         ]
         for slide, k in structure.known_slides:

@@ -12,6 +12,7 @@ from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
@@ -23,7 +24,6 @@ from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH
-from mechdesign.mechanism.wheels import Engagement
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps around a closed chain may differ by this (radians): they are written with ten digits.

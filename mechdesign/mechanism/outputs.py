@@ -125,14 +125,15 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
 
 @quiet
 def acceleration_sensitivity(
-    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
-    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+    configuration: Configuration, coordinate: Coordinate, by_time: Sequence[Rates], by_z: Sequence[Rates]
 ) -> Value:  # fmt: skip
-    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis)."""
+    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis).
+
+    `by_time` are velocities and accelerations, `by_z` the derivatives of positions, velocities and accelerations.
+    """
+    (velocity, acceleration), (position_z, velocity_z, acceleration_z) = by_time, by_z
     if coordinate.kind == "expression":
-        return _curved_sensitivity(
-            configuration, coordinate, velocity, acceleration, position_z, velocity_z, acceleration_z
-        )
+        return _curved_sensitivity(configuration, coordinate, by_time, by_z)
     if coordinate.kind == "distance":
         rate, rate_z = first(configuration, coordinate, velocity), first(configuration, coordinate, position_z)
         bend = second(configuration, coordinate, velocity, velocity, acceleration)
@@ -148,25 +149,20 @@ def acceleration_sensitivity(
 
 
 def _curved_sensitivity(
-    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
-    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+    configuration: Configuration, coordinate: Coordinate, by_time: Sequence[Rates], by_z: Sequence[Rates]
 ) -> Value:  # fmt: skip
     """`acceleration_sensitivity` of an expression f of parts p.
 
     f''_z = sum_i f_i p_i''_z + 2 sum_ij f_ij p_i' p_j'_z + sum_ij f_ij p_i'' p_j_z + sum_ijk f_ijk p_i' p_j' p_k_z
     """
+    (velocity, acceleration), (position_z, velocity_z, _) = by_time, by_z
     by_part = partial(_by_part, coordinate)
     rate, shift = (by_part(partial(first, configuration, rates=rates)) for rates in (velocity, position_z))
     rise, rate_z = (
         by_part(partial(second, configuration, one=velocity, other=other, both=both))
         for other, both in ((velocity, acceleration), (position_z, velocity_z))
     )
-    rise_z = by_part(
-        partial(
-            acceleration_sensitivity, configuration, velocity=velocity, acceleration=acceleration,
-            position_z=position_z, velocity_z=velocity_z, acceleration_z=acceleration_z,
-        )
-    )  # fmt: skip
+    rise_z = by_part(partial(acceleration_sensitivity, configuration, by_time=by_time, by_z=by_z))
     by_rise = _gradient_along(configuration, coordinate, rise)
     total: Value = 0.0
     for name, slope in _gradient_along(configuration, coordinate, rate, twice=True).items():
@@ -181,19 +177,16 @@ def _span(nodes: Sequence[Vector], coordinate: Coordinate) -> Vector:
 
 
 def _user(part: Coordinate, value: Value, whole: Coordinate) -> Value:
-    assert whole.expression is not None
-    return value / whole.expression.angle_unit if part.quantity == "angle" else value
+    return value / whole.formula.angle_unit if part.quantity == "angle" else value
 
 
 def _radians(coordinate: Coordinate, value: Value) -> Value:
     """The value of an expression, or a derivative of it, in radians if it is an angle."""
-    assert coordinate.expression is not None
-    return value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
+    return value * coordinate.formula.angle_unit if coordinate.quantity == "angle" else value
 
 
 def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
-    assert coordinate.expression is not None
-    partials = coordinate.expression.derivatives(values)
+    partials = coordinate.formula.derivatives(values)
     return [partials.get(part.name, 0.0) for part in coordinate.parts]
 
 
@@ -206,8 +199,7 @@ def _gradient_along(
     configuration: Configuration, coordinate: Coordinate, rate: Mapping[str, Value], *, twice: bool = False
 ) -> dict[str, Any]:
     """Gradient of an expression with its slope along a change of its parts, and with that of the slope if `twice`."""
-    assert coordinate.expression is not None
     duals = {name: Dual(value, rate[name]) for name, value in configuration.user_values(coordinate).items()}
     if twice:
         duals = {name: Dual(dual, Dual(rate[name], 0.0)) for name, dual in duals.items()}
-    return coordinate.expression.derivatives(duals)
+    return coordinate.formula.derivatives(duals)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, pi
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start
-from mechdesign.mechanism.coordinates import Coordinate, angles_of, leaves
+from mechdesign.mechanism.coordinates import angles_of, leaves
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.loops import Unknowns, unknowns_of
@@ -53,7 +53,9 @@ class Plan:
         self.iterative = any(group.form == "newton" for group in structure.groups)
         #: Angles in given expressions and in couplings whose turns are counted on the way from a start, as they do not
         #: follow from values.
-        self.angles = self._counted_on_the_way()
+        inner = angles_of(c for c in structure.values if c.kind == "expression")
+        open_ = [angle for name, angle in inner.items() if name not in self.counted.union(self.solved)]
+        self.angles = tuple(angle for angle in open_ if structure.counted(angle, core.graph) is None)
         self.followers = tuple(coupling.follower for coupling in core.couplings)
         # Given and coupled values that move these angles.
         behind = frozenset[int]().union(*(structure.behind(angle, core.graph) for angle in self.angles))
@@ -70,14 +72,6 @@ class Plan:
     def continued(self) -> bool:
         """Whether poses are continued from a start: for groups without a closed form, or to count turns."""
         return self.iterative or bool(self.angles)
-
-    def _counted_on_the_way(self) -> tuple[Coordinate, ...]:
-        structure, graph = self.structure, self.core.graph
-        inner = angles_of(c for c in structure.values if c.kind == "expression")
-        return tuple(
-            angle for name, angle in inner.items()
-            if name not in self.counted.union(self.solved) and structure.counted(angle, graph) is None
-        )  # fmt: skip
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -211,16 +205,10 @@ class Plan:
             drives = [picked(v, rows) for v in columns]
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
-        parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
+        parts = map_chunks(part, range(0, count, length), jobs)
         counted = sorted({*(angle.name for angle in self.angles), *self._within_given, *self.coupled})
-        parts = [*parts] if counted else parts
-        whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
-        near = {
-            name: np.concatenate([np.broadcast_to(some.near[name], some.shape) for some in parts]).reshape(shape)
-            for name in counted
-            if all(name in some.near for some in parts)
-        }
-        return replace(whole, near={**self.turns(values, dims), **near}, counted=self.counted)
+        whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims, counted)
+        return replace(whole, near={**self.turns(values, dims), **whole.near}, counted=self.counted)
 
     def _at_once(
         self,

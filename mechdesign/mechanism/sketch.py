@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, Vector, cross
+from mechdesign.mechanism.algebra import Value, Vector, cross, fit
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
@@ -162,8 +162,7 @@ def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
             if owner == body and (place := nodes[graph.node(point)]) is not None
         ]
         if len(pairs) > 1:
-            middle = [sum(part, 0j) / len(pairs) for part in zip(*pairs, strict=True)]
-            total += sum(((place - middle[1]) * (local - middle[0]).conjugate() for local, place in pairs), 0j)
+            total += fit(*zip(*pairs, strict=True))
     for k, edge in enumerate(graph.edges):
         tail, head = nodes[edge.tail], nodes[edge.head]
         if edge.frame == frame and edge.slide in graph.telescopic and tail is not None and head is not None:

@@ -28,6 +28,7 @@ from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
+from mechdesign.numerics.linear import solved
 
 # In products of complex arrays a temporary stands first, or `np.multiply` is called: with a temporary as second factor
 # NumPy exchanges the factors of long arrays, and their last bits would differ from those of short ones.
@@ -151,14 +152,8 @@ def _by_matrix(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
     shape = np.broadcast_shapes(*(np.shape(e) for row in rows for e in row), *(np.shape(e) for e in right))
     matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
     sides = np.stack([np.broadcast_to(e, shape) for e in right], axis=-1)
-    good = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)) & np.isfinite(sides).all(axis=-1))
-    identity = np.eye(len(rows))
-    determinant = np.linalg.det(np.where(good[..., None, None], matrix, identity))
-    determinant = np.where(good, determinant, 0.0)
-    good &= determinant != 0
-    solution = np.linalg.solve(np.where(good[..., None, None], matrix, identity), sides[..., None])[..., 0]
-    solution = np.where(good[..., None], solution, np.nan)
-    return [solution[..., j] for j in range(len(rows))], determinant
+    solution, determinant = solved(matrix, sides[..., None])
+    return [solution[..., j, 0] for j in range(len(rows))], determinant
 
 
 def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, begin: int = 0) -> State:

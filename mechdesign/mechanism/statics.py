@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
@@ -28,7 +29,7 @@ from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.mechanism.structure import Group
-from mechdesign.mechanism.wheels import Engagement, Pressed
+from mechdesign.mechanism.wheels import Pressed
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from mechdesign.mechanism.friction import ROUNDS, Rubs
 from mechdesign.mechanism.friction_equations import FrictionSystem
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.linear import solved
 
 # Most rounds in which limits are found, and the change of friction, as a part of the largest, that ends them.
 LIMIT_ROUNDS, CONVERGED = 400, 1e-13
@@ -79,7 +80,7 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
     # What a unit of friction takes off the efforts is how fast the coordinate moves the contact.
     matrix, moves = slopes[:, :, :count], -slopes[:, :, count:]
     right = np.concatenate([-table[:, 0].T[..., None], moves], axis=2)
-    solution = np.moveaxis(solved_each(matrix, right), 0, -1)
+    solution = np.moveaxis(solved(matrix, right)[0], 0, -1)
     free, gains = solution[:, 0], solution[:, 1:]
     freely = offsets + np.einsum("nkp,np->kp", np.moveaxis(moves, 0, -1), free)
     mobility = np.einsum("njp,nkp->jkp", np.moveaxis(moves, 0, -1), gains)
@@ -110,15 +111,6 @@ def accelerate(rubs: Rubs, signs: Floats, rates: Floats, offsets: Floats) -> Acc
     else:
         values = np.full_like(values, np.nan)
     return Accelerations(values, friction, jams, slack)
-
-
-def solved_each(matrix: Floats, right: Floats) -> Floats:
-    """Solutions of linear systems, shape (poses, n, r), of matrices of shape (poses, n, n); nan where there is none."""
-    good = np.array(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
-    good[good] = np.linalg.det(matrix[good]) != 0
-    solution = np.full(right.shape, np.nan)
-    solution[good] = np.linalg.solve(matrix[good], right[good])
-    return solution
 
 
 def _along(effort: object, accelerations: Floats, friction: Floats, cases: int) -> Floats:

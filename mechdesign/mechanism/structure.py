@@ -133,10 +133,6 @@ class Structure:
         one, other = (self.ties[graph.bodies[body][0]] for body in (angle.body, angle.reference))
         return (one, other) if one.root == other.root else None
 
-    def solved_before(self, tie: Tie) -> bool:
-        """Whether a tie has no value that a group solves."""
-        return self.coupled.isdisjoint(k for _, k in tie.given)
-
     @cached_property
     def unknowns(self) -> dict[int, slice]:
         """By group without a closed form, its part of their unknowns: angles, slides, then x and y of bases."""

@@ -49,21 +49,12 @@ class Way(NamedTuple):
             shape = near.shape[1:]
             return state, np.array([np.broadcast_to(value, shape) for value in turned]).reshape(near.shape)
 
-        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags, Floats]:
-            def some(value: Value) -> Value:
-                return value if rows is None else picked(value, rows)
-
-            return follow(
-                self.structure,
-                stepped,
-                begin.map(some),
-                [some(v) for v in given],
-                {name: some(v) for name, v in places.items()},
-                self.core.nominal,
-                self.core.size,
-                count if rows is None else len(rows),
-                units,
-            )
+        def solve(given: Sequence[Value], rows: Ints) -> tuple[Floats, Flags, Floats]:
+            own = [picked(v, rows) for v in given]
+            sizes = {name: picked(v, rows) for name, v in places.items()}
+            start = begin.map(lambda value: picked(value, rows))
+            nominal, size = self.core.nominal, self.core.size
+            return follow(self.structure, stepped, start, own, sizes, nominal, size, len(rows), units)
 
         pacing = [self.structure.values[k] for k in self.pacing]
         units = np.array([
@@ -71,7 +62,7 @@ class Way(NamedTuple):
             *(1.0 if c.quantity == "angle" else self.core.size for c in pacing),
         ])  # fmt: skip
         given = [flat(v, shape) for v in values]
-        unknowns, reached, near = solve(given, None)
+        unknowns, reached, near = solve(given, np.arange(count))
         # Where the given turns are not reached, the pose is the same with its angles less than half a turn away.
         turned = [
             nearest(v, at) if c.quantity == "angle" else v

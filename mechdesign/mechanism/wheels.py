@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,42 +37,6 @@ class Pressed(NamedTuple):
     place: Vector
     force: Vector
     normal: Value = np.nan
-
-
-class Engagement(Protocol):
-    """Two links that touch as a coupling has them move: wheels, or a cam and its follower."""
-
-    @property
-    def coupling(self) -> str:
-        """Name of the coupling."""
-
-    @property
-    def index(self) -> int:
-        """Its number."""
-
-    @property
-    def links(self) -> tuple[str, str]:
-        """The link that follows, then what moves it."""
-
-    @property
-    def nodes(self) -> tuple[int, int]:
-        """Nodes of both, at which they hold their wheels, or the roller or face and the cam."""
-
-    @property
-    def presses(self) -> bool:
-        """Whether the forces between its links are known."""
-
-    def place(self, configuration: Configuration) -> Vector:
-        """Where they touch."""
-
-    def lever(self, configuration: Configuration) -> Value:
-        """How fast they move along the pitch circles, the belt or the normal for each unit of what follows."""
-
-    def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
-        """The force of an effort on the coordinate that follows.
-
-        Its direction is that of the `pressed` effort where this is given, which makes it linear in the effort.
-        """
 
 
 @dataclass(frozen=True)
@@ -165,14 +129,15 @@ class Mesh:
         return self.contact(configuration)[0]
 
     def lever(self, configuration: Configuration) -> Value:
-        """Radius of the wheel that follows; see `Engagement`."""
+        """How fast they move along the pitch circles or the belt for each unit of what follows: its radius."""
         return 1 / self.weight(configuration) if self.slide >= 0 else self.radii(configuration)[0]
 
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
-        """The force of an effort on the link that follows; see `Engagement`.
+        """The force on the link that follows of an effort on its coordinate.
 
-        Teeth press each other apart by their pressure angle whichever way they drive, a wheel inside of a ring towards
-        the ring's axis; a belt only pulls, and its pretension is not known.
+        Its direction is that of the `pressed` effort where this is given, which makes it linear in the effort. Teeth
+        press each other apart by their pressure angle whichever way they drive, a wheel inside of a ring towards the
+        ring's axis; a belt only pulls, and its pretension is not known.
         """
         apart: Value = 1.0 if pressed is None else np.sign(effort * pressed)
         driving = effort if pressed is None else pressed

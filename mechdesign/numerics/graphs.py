@@ -1,4 +1,4 @@
-"""Matching of equations and unknowns, and the smallest sets of equations that must be solved together.
+"""Matching of equations and unknowns, the smallest sets of equations that must be solved together, and pieces.
 
 Source: Dulmage and Mendelsohn, "Coverings of bipartite graphs", Canadian Journal of Mathematics 10 (1958).
 """
@@ -6,7 +6,23 @@ Source: Dulmage and Mendelsohn, "Coverings of bipartite graphs", Canadian Journa
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
+from typing import TypeVar
+
+Node = TypeVar("Node", bound=Hashable)
+
+
+def pieces(sets: Iterable[Collection[Node]]) -> list[set[Node]]:
+    """The pieces into which what the sets hold together falls, in the order of their first sets."""
+    whole: list[set[Node]] = []
+    for some in sets:
+        touching = [piece for piece in whole if not piece.isdisjoint(some)]
+        if touching:
+            touching[0].update(some, *touching[1:])
+            whole = [piece for piece in whole if piece not in touching[1:]]
+        else:
+            whole.append(set(some))
+    return whole
 
 
 def perfect_matching(rows: Sequence[Sequence[int]], columns: int) -> list[int] | None:

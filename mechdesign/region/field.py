@@ -168,7 +168,7 @@ class Field:
     def _two_sided(self) -> list[tuple[int, Bound]]:
         """Margins of angles between two limits, and these."""
         bounds, causes = self.mechanism.bounds, [cause.role for cause in self._causes]
-        number = [1 if bound.of_angle else sum(end is not None for end in (bound.minimum, bound.maximum))
+        number = [1 if bound.of_angle else sum(end is not None for end in (bound.limit.min, bound.limit.max))
                   for bound in bounds]  # fmt: skip
         rows = np.cumsum([causes.index("limit"), *number]).tolist() if bounds else []
         return [(row, bound) for row, bound in zip(rows, bounds, strict=False) if bound.of_angle]

@@ -351,7 +351,7 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
                 ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
             steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))
     for bound in mechanism.bounds:
-        if bound.coordinate.kind == "distance" and bound.maximum is not None:
+        if bound.coordinate.kind == "distance" and bound.limit.max is not None:
             size = np.abs(np.asarray(bound.ends(places)[1], dtype=float))
             steps.append((bound.coordinate.node, bound.coordinate.other, -size, size))
     for _ in graph.nodes:

@@ -154,8 +154,8 @@ def load_document(
     parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
-    doubts.note(checker, parts, description)
     assert mechanism is not None
+    doubts.note(checker, parts, mechanism)
     name = parts.get("name") or (source.path.stem if source.path is not None else UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}

@@ -258,6 +258,28 @@ def test_a_telescopic_leg_is_two_bodies() -> None:
     assert links(driven) == ("ground", "cylinder", "cylinder rod", "crank")
 
 
+def test_a_clamp_at_the_tip_of_a_leg_holds_its_rod() -> None:
+    # Leg, its rod with the plate, and a link: the pin B of the plate is apart from the leg's line.
+    text = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A: [-0.6, 0], D: [0.6, 0]}
+    leg: {from: A, to: E, telescopic: true}
+    plate: {E: [-0.2, 0], B: [0.2, 0]}
+    link: [D, B, "hypot(0.4, 1)"]
+  joints: {clamp: {fixed: [leg, plate], point: E}}
+  drives: {theta: {angle: leg}}
+  sketch: {E: [-0.2, 1], B: [0.2, 1]}
+kinematics: {sweep: {theta: {from: 60, to: 75, step: 5}}}
+"""
+    (loop,) = loops(text)
+    assert links(loop) == ("ground", "leg", "leg rod", "link")
+    assert loop["joints"] == "A leg B D"
+    # Of B from the leg's line, which leads from A by (0.4, 1).
+    assert loop["offset"] == pytest.approx(0.4 / np.hypot(0.4, 1))
+
+
 def test_clamped_links_are_one_body() -> None:
     text = """
 mechanism:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -69,18 +69,16 @@ class Values(fields.Model):
             return dict(zip(_PARTS, (part.strip() for part in raw.split(":")), strict=False))
         return raw if isinstance(raw, dict | Values) else {"values": raw}
 
-    @model_validator(mode="after")
-    def _range(self) -> Self:
+    def faults(self) -> Iterator[str]:
         beside = self.given("to", "step", "number")
         if self.values is not None and beside:
-            raise failure(f"a list of values has no {beside[0]!r}")
+            yield f"a list of values has no {beside[0]!r}"
         if self.from_ is not None and self.to is None:
-            raise failure("a range needs 'to'")
+            yield "a range needs 'to'"
         if self.from_ is not None and self.to is not None and not self.to > self.from_:
-            raise failure(f"a range goes upwards; {self.to:g} is not above {self.from_:g}")
+            yield f"a range goes upwards; {self.to:g} is not above {self.from_:g}"
         if self.step is not None and self.number is not None:
-            raise failure("either 'step' or 'number', not both")
-        return self
+            yield "either 'step' or 'number', not both"
 
     @property
     def spaced(self) -> bool:
@@ -162,14 +160,12 @@ class Best(fields.Model):
     sort: bool = False
     """Whether the best case is the first row of the table; those without a rank come last, in their order."""
 
-    @model_validator(mode="after")
-    def _goals(self) -> Self:
+    def faults(self) -> Iterator[str]:
         if not self.maximize and not self.minimize:
-            raise failure("say what to 'maximize' or 'minimize'")
+            yield "say what to 'maximize' or 'minimize'"
         for named in self.minimize:
             if named in self.maximize:
-                raise failure(f"{shown(named.name)} cannot be both large and small")
-        return self
+                yield f"{shown(named.name)} cannot be both large and small"
 
 
 class CaseTable(NamedTuple):
@@ -203,26 +199,24 @@ class MatrixSection(fields.Model):
     each normalised by its range over these cases. Example: {maximize: kinematics.mu.min, minimize: GII}
     """
 
-    @model_validator(mode="after")
-    def _design(self) -> Self:
+    def faults(self) -> Iterator[str]:
         if self.vary is None:
             if beside := [key for key in ("method", "samples") if key in self.model_fields_set]:
-                raise failure(f"the cases of a file are as they are; {beside[0]!r} is of 'vary'")
-            return self
+                yield f"the cases of a file are as they are; {beside[0]!r} is of 'vary'"
+            return
         if not self.vary:
-            raise failure("'vary' names nothing; name entries and their values, {mechanism.parameters.r: 30:50:5}")
+            yield "'vary' names nothing; name entries and their values, {mechanism.parameters.r: 30:50:5}"
         for name, values in self.vary.items():
             if self.method == GRID and not values.spaced:
-                raise failure(f"a grid needs a step: {name}: START:STOP:STEP; or choose a 'method' and 'samples'")
+                yield f"a grid needs a step: {name}: START:STOP:STEP; or choose a 'method' and 'samples'"
             if self.method != GRID and values.given("step", "number"):
-                raise failure(f"{self.method} takes a range without a step: {name}: LOW:HIGH")
+                yield f"{self.method} takes a range without a step: {name}: LOW:HIGH"
         if self.method == GRID and self.samples is not None:
-            raise failure("the cases of a grid follow from its values; 'samples' is of latin_hypercube and sobol")
+            yield "the cases of a grid follow from its values; 'samples' is of latin_hypercube and sobol"
         if self.method != GRID and self.samples is None:
-            raise failure(f"{self.method} needs 'samples', the number of cases")
+            yield f"{self.method} needs 'samples', the number of cases"
         if self.method == GRID and (count := math.prod(values.count for values in self.vary.values())) > MAX_CASES:
-            raise failure(f"a grid of {count:,} cases, and at most {MAX_CASES:,} are answered; take longer steps")
-        return self
+            yield f"a grid of {count:,} cases, and at most {MAX_CASES:,} are answered; take longer steps"
 
     def checked(self, checker: Checker) -> Self:
         """Check the commands that results name; `experiments` checks that they have such a result."""

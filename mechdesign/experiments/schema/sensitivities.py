@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Self
-
-from pydantic import model_validator
 
 from mechdesign.experiments.schema.matrix import Results
 from mechdesign.study.schema.checker import Checker
@@ -40,12 +39,10 @@ class SensitivitiesSection(fields.Model):
     parameters: Annotated[tuple[Changed, ...], fields.BeforeValidator(fields.as_list), fields.OrShort()]
     """Numbers of the study that change. Example: [r, {parameter: e, step: 0.5}]"""
 
-    @model_validator(mode="after")
-    def _something(self) -> Self:
+    def faults(self) -> Iterator[str]:
         for key, example in (("results", "kinematics.mu.min"), ("parameters", "r")):
             if not getattr(self, key):
-                raise failure(f"{key!r} names nothing; name what there is, e.g. {key}: [{example}]")
-        return self
+                yield f"{key!r} names nothing; name what there is, e.g. {key}: [{example}]"
 
     def checked(self, checker: Checker) -> Self:
         """Check the commands that results name; `experiments` checks that they have such a result."""

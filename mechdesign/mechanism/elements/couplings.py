@@ -64,7 +64,7 @@ class Cam(Element):
     face: LinkLine = field(kw_only=True)  # of the follower; of a roller only the point counts
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if given.roller is not None and given.radius is None:
             yield "a roller has a 'radius', 0 of a knife edge"
@@ -94,7 +94,7 @@ class Coupling(Element):
     """
     # From coordinates and parameters in the study's units, whichever key gives it. A name in it is a parameter as in a
     # `Measure`, or a place of the coupling's own.
-    to: Annotated[Expression, declared.Notation("function")] | None = None
+    to: Annotated[Expression, declared.Notation("Bound")] | None = None
     """Expression of coordinates and parameters, in the study's units; the name of a link, joint or leg stands for its
     coordinate. Example: -2.5*sun + 3.5*arm
     """
@@ -123,7 +123,7 @@ class Coupling(Element):
     """
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if given.to is not None and given.of is not None:
             yield "'of' belongs to a 'ratio' or a 'table'; an expression names its coordinates itself"

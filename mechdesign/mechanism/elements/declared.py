@@ -57,9 +57,10 @@ class Whole(NamedTuple):
 
 
 class Notation(NamedTuple):
-    """Mark of a name, or of what is written in a way of its own: `mechdesign.study.building.elements` reads it.
+    """Mark of a name, or of what is written in a way of its own.
 
-    A ``part`` is an element inside of another.
+    The word is that of an annotation of `mechdesign.study.text.fields` or `mechdesign.study.building.notations`, or
+    ``part`` of an element inside of another.
     """
 
     word: str
@@ -95,18 +96,18 @@ class Element:
         return named if isinstance(named, tuple) else (named,)
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together; `given` has them as attributes, None where it has not."""
         return iter(())
 
 
-LinkName = Annotated[str, Notation("link")]
-PointName = Annotated[str, Notation("point")]
-EndName = Annotated[str, Notation("end")]
-JointName = Annotated[str, Notation("joint")]
-DriveName = Annotated[str, Notation("drive")]
-MeasureName = Annotated[str, Notation("measure")]
-CoordinateName = Annotated[str, Notation("coordinate")]
+LinkName = Annotated[str, Notation("LinkName")]
+PointName = Annotated[str, Notation("PointName")]
+EndName = Annotated[str, Notation("EndName")]
+JointName = Annotated[str, Notation("JointName")]
+DriveName = Annotated[str, Notation("DriveName")]
+MeasureName = Annotated[str, Notation("MeasureName")]
+CoordinateName = Annotated[str, Notation("CoordinateName")]
 TwoLinks = Annotated[tuple[LinkName, LinkName], Two("a list of two names")]
 TwoPoints = Annotated[tuple[PointName, PointName], Two("a list of two names")]
 TwoEnds = Annotated[tuple[EndName, EndName], Two("a list of two names")]

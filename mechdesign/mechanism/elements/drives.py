@@ -26,7 +26,7 @@ class Drive(Element):
     """Joint (slide or slot) whose displacement is driven: from ``through`` along the line. Example: guide"""
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if given.from_ is not None and given.angle is None:
             yield "'from' belongs to an angle"

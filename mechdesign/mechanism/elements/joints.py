@@ -54,7 +54,7 @@ class Joint(Element):
     """
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         foreign = {"prismatic": (), "slot": ("angle",), "fixed": ("through", "direction")}
         for key in given.given(*foreign[given.kind]):

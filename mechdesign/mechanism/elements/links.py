@@ -56,7 +56,7 @@ class Link(Element):
     """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its joints; of a link
     with a single joint, of its ends, or of all its points. Example: [45, 0]
     """
-    inertia: Annotated[Term, declared.Notation("inertia")] | None = None
+    inertia: Annotated[Term, declared.Notation("BarInertiaPlace")] | None = None
     """Moment of inertia about the centre of mass; 'rod' is that of a slender bar between its two joints, m l^2/12. Left
     out: 0, a point mass. Example: 0.002 kg*m^2 Example: rod
     """
@@ -70,7 +70,7 @@ class Link(Element):
     """
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if (given.from_ is None) != (given.to is None):
             yield "a binary link needs both 'from' and 'to'"

@@ -64,7 +64,7 @@ class Limit(Element):
     """Highest value. Left out: none. Example: 2*r + 10"""
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if not given.given("min", "max"):
             yield "a limit needs 'min', 'max' or both"

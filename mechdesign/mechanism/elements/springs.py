@@ -42,7 +42,7 @@ class Spring(Element):
     turning: bool = False
 
     @classmethod
-    def misfits(cls, given: Any) -> Iterator[str]:
+    def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if given.force is not None:
             for other in given.given("stiffness", "preload", "free_angle"):

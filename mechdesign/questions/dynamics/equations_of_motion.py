@@ -28,13 +28,14 @@ from mechdesign.mechanism.friction import Rubbing, Rubs
 from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
-from mechdesign.mechanism.stick_slip import accelerate, solved_each
+from mechdesign.mechanism.stick_slip import accelerate
 from mechdesign.motion.curve import from_sketch
 from mechdesign.motion.motion import in_study_units, radians
 from mechdesign.motion.rows import Poses, instants
 from mechdesign.motion.rules import GivenRows
 from mechdesign.notation import Step
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.linear import solved
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
 from mechdesign.questions.loads import Loading
@@ -257,7 +258,7 @@ class EquationsOfMotion:
             table = np.array([np.broadcast_to(effort, (count + 1, *shape)) for effort in efforts])
             matrix = np.moveaxis(table[:, 1:] - table[:, :1], -1, 0)
             return (
-                solved_each(matrix, -table[:, 0].T[..., None])[..., 0].T,
+                solved(matrix, -table[:, 0].T[..., None])[0][..., 0].T,
                 np.empty((0, *shape)),
                 np.empty((0, *shape)),
             )

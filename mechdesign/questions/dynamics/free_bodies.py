@@ -172,7 +172,7 @@ class _Poses:
                     yield self._acting("effort", drive, _link(body), self._base(body), 0j, sign * effort)
 
     def _base(self, link: str) -> Vector:
-        bases = Forces(self.configuration).bases
+        bases = self.configuration.graph.bases
         return self.configuration.nodes[bases[link]] if link in bases else 0j
 
 

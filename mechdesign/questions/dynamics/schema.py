@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
@@ -25,7 +26,6 @@ from mechdesign.study.schema.motions import Time
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.reading import failure
 from mechdesign.study.text.units import Amount
 
 # Columns of a mechanism with friction, without units.
@@ -70,11 +70,9 @@ class ForwardSection(fields.Model):
     rows: Annotated[int, fields.whole(2, MAX_ROWS)] = ROWS
     """Number of instants in the tables, evenly spread over the duration. Left out: |ROWS|. Example: 1001"""
 
-    @model_validator(mode="after")
-    def _bounces(self) -> ForwardSection:
+    def faults(self) -> Iterator[str]:
         if self.restitution is not None and self.restitution > 1:
-            raise failure(f"a restitution is at most 1, where nothing is lost, not {self.restitution:g}")
-        return self
+            yield f"a restitution is at most 1, where nothing is lost, not {self.restitution:g}"
 
     def checked(self, checker: Checker, path: KeyPath) -> None:
         """Check names and units of drives, velocities and events."""

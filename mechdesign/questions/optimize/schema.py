@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag, ValidationInfo
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
@@ -144,13 +144,11 @@ class OptimizeSection(fields.Model):
     and goals. Example: 20000
     """
 
-    @model_validator(mode="after")
-    def _goals(self) -> OptimizeSection:
+    def faults(self) -> Iterator[str]:
         goals = [goal.name for goal in self.maximize + self.minimize]
         twice = [goal for goal in goals if goals.count(goal) > 1]
         if twice:
-            raise failure(f"{twice[0]!r} is named twice among the goals")
-        return self
+            yield f"{twice[0]!r} is named twice among the goals"
 
     def checked(self, checker: Checker) -> Self:
         """Check the method, and the results that goals name, against the mechanism."""

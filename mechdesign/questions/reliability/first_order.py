@@ -234,7 +234,7 @@ def derivatives(
             row[rows] = second(configuration, coordinate, velocity, position, velocity_z)
         else:
             row[rows] = acceleration_sensitivity(
-                configuration, coordinate, velocity, acceleration, position, velocity_z, acceleration_z
+                configuration, coordinate, (velocity, acceleration), (position, velocity_z, acceleration_z)
             )
     if columns:
         assert forces is not None

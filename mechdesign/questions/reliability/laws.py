@@ -10,18 +10,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import model_validator
 
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.text import fields
-from mechdesign.study.text.reading import failure
 
 # Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].
 SIGMAS = 3.0
@@ -356,11 +354,9 @@ class Distribution(fields.Model):
     ) = None
     """The two shape parameters of a beta distribution. Example: [2, 5]"""
 
-    @model_validator(mode="after")
-    def _keys_of_the_law(self) -> Self:
+    def faults(self) -> Iterator[str]:
         for key in [key for key in Distribution.model_fields if key != "distribution"]:
             if (key in LAWS[self.distribution].keys) != (getattr(self, key) is not None):
                 owners = " or ".join(law.name for law in LAWS.values() if key in law.keys)
                 example = self.said(key).examples[0]
-                raise failure(f"'distribution: {owners}' and its {key!r}, such as {example}, go together")
-        return self
+                yield f"'distribution: {owners}' and its {key!r}, such as {example}, go together"

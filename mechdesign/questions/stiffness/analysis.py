@@ -26,21 +26,13 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import Shown, shown_of, study_poses
+from mechdesign.questions.stiffness import tables
 from mechdesign.questions.stiffness.body import Body, ask, hold, pushes, under_loads
 from mechdesign.questions.stiffness.compliance import Held
 from mechdesign.questions.stiffness.effects import Effects, effects_of
 from mechdesign.questions.stiffness.elements import Hinge, SlideElement
 from mechdesign.questions.stiffness.screws import RIGID
-from mechdesign.questions.stiffness.tables import (
-    Springs,
-    compliance_table,
-    deflections_table,
-    displacements_table,
-    eigen_table,
-    forces_table,
-    springs_table,
-    stiffness_table,
-)
+from mechdesign.questions.stiffness.tables import Springs
 from mechdesign.results import Drawn, Result, Table
 from mechdesign.statistics import Request
 from mechdesign.study import Study
@@ -181,9 +173,9 @@ class Stiffness(MotionQuestion):
         """
         values = unfilled(self.at(there.poses))
         values.fill(there)
-        tables = values.question.chosen(values, self.a_row_a_pose)
+        made = values.question.chosen(values, self.a_row_a_pose).values()
         numbers = {column.name: column.values.astype(float)
-                   for table in tables.values() for column in table.columns if column.numeric}  # fmt: skip
+                   for table in made for column in table.columns if column.numeric}  # fmt: skip
         soft = values.arrays["compliance"]
         size = np.append(np.ones(2), self.body.extent)[: soft.shape[1]]
         soft = soft * size[:, None] * size
@@ -206,21 +198,21 @@ class Stiffness(MotionQuestion):
         effects = _read(Effects, values) if self.loaded else None
         count, method = len(section.wrenches), "serial legs" if legs is not None else "force method"
         makers: dict[str, Callable[[], Table]] = {
-            "stiffness": lambda: stiffness_table(motion, held, values.valid, method, section.direction),
-            "compliance": lambda: compliance_table(motion, soft),
+            "stiffness": lambda: tables.stiffness_table(motion, held, values.valid, method, section.direction),
+            "compliance": lambda: tables.compliance_table(motion, soft),
         }
         length = section.characteristic_length
         if body.size == 3 and length is not None:
-            makers["eigen"] = lambda: eigen_table(motion, soft, length)
+            makers["eigen"] = lambda: tables.eigen_table(motion, soft, length)
         if legs is not None:
-            makers["springs"] = lambda: springs_table(motion, [leg.name for leg in legs], springs)
+            makers["springs"] = lambda: tables.springs_table(motion, [leg.name for leg in legs], springs)
         if count:
             loads = np.broadcast_to(body.loads, (motion.poses.count, count, 3))
             moved = effects.moved if effects is not None and body.uneven else None
-            makers["deflections"] = lambda: deflections_table(motion, loads, soft, moved)
+            makers["deflections"] = lambda: tables.deflections_table(motion, loads, soft, moved)
         if effects is not None:
-            makers["forces"] = lambda: forces_table(motion, body.network, effects)
-            makers["displacements"] = lambda: displacements_table(motion, body.network, effects)
+            makers["forces"] = lambda: tables.forces_table(motion, body.network, effects)
+            makers["displacements"] = lambda: tables.displacements_table(motion, body.network, effects)
         return {name: make() for name, make in makers.items() if name in names}
 
     def uneven(self, passage: Passage) -> Mapping[str, Ints]:

@@ -7,14 +7,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, leaves
 from mechdesign.mechanism.elements.drives import Drive
-from mechdesign.mechanism.elements.joints import Fixed, Prismatic
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.wheels import Engagement
 from mechdesign.questions.stiffness.elements import (
     Beam,
     Element,
@@ -135,26 +134,15 @@ def build_bodies(
     target = TARGET if link is None or link in section.elastic else holder(link, at)
     loaded = {*loaded, *(graph.nodes[node] for c in mechanism.couplings for link, node in c.gap.ends if not link)}
     builder = _Builder(mechanism, section, target, loaded)
-    holders: dict[str, list[str]] = {}
-    for body, point in graph.points:
-        if ":" not in point:
-            holders.setdefault(point, []).append(body)
-    for name, leg in description.links.items():
-        if leg.tip is not None:
-            builder.slide(name, name, rod_of(name), leg.tip, base=leg.corners[0])
-    clamps = []
-    for name, joint in description.joints.items():
-        if isinstance(joint, Fixed):
-            clamps.append((holder(joint.links[0], joint.point), holder(joint.links[1], joint.point), joint.point))
-            continue
-        line = joint.line
-        through = line.through if line.through is not None else origin_of(line.link)
-        if isinstance(joint, Prismatic):
-            other = holder(joint.slider, joint.point)
-        else:
-            other = f"slot:{name}"
-            holders[joint.point].append(other)
-        builder.slide(name, holder(line.link, through), other, joint.point)
+    holders = {point: [*bodies] for point, bodies in graph.holders.items() if ":" not in point}
+    for slide, (name, (guide, slider)) in enumerate(zip(graph.slides, graph.guides, strict=True)):
+        point = graph.sliding(slide)
+        if not slider:
+            slider = f"slot:{name}"
+            holders[point].append(slider)
+        base = description.links[name].corners[0] if slide in graph.telescopic else None
+        builder.slide(slide, guide, slider, point, base)
+    clamps = [*graph.clamps.values()]
     if target == TARGET:
         holders[at].append(TARGET)
         if link is not None:
@@ -198,9 +186,9 @@ class _Builder:
         """Add a joint between two bodies at a point, on body `a` at the point or slide `seat`."""
         self.edges.append(NetworkEdge(self._vertex(a, seat or point), self._vertex(b, point), elements, name, point))
 
-    def slide(self, name: str, a: str, b: str, point: str, base: str | None = None) -> None:
+    def slide(self, slide: int, a: str, b: str, point: str, base: str | None) -> None:
         """Add a slide of body `b` along body `a`; the bearing of a telescopic leg is at its `base`."""
-        slide = self.mechanism.graph.slides.index(name)
+        name = self.mechanism.graph.slides[slide]
         drives = self.mechanism.description.drives.values()
         drive = next((d.name for d in drives if d.kind != "angle" and d.target == name), None)
         elements = (*self._freedom(SlideElement(slide, drive)), *self._bearing(name, base or point, slide))

@@ -14,6 +14,7 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.graphs import pieces
 from mechdesign.questions.stiffness.bodies import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.questions.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, screw_origin
@@ -63,17 +64,9 @@ def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
 
 def _pieces(edges: Sequence[NetworkEdge], body: str) -> Iterator[list[NetworkEdge]]:
     """Edges by the pieces into which the network falls without the ground and the body."""
-    remaining = list(edges)
-    while remaining:
-        piece, reached = [remaining.pop(0)], set[str]()
-        while True:
-            reached |= {end for edge in piece for end in (edge.a, edge.b)} - {GROUND, body}
-            touching = [edge for edge in remaining if edge.a in reached or edge.b in reached]
-            if not touching:
-                break
-            piece += touching
-            remaining = [edge for edge in remaining if edge not in touching]
-        yield piece
+    inner: list[set[int | str]] = [{k, *{edge.a, edge.b} - {GROUND, body}} for k, edge in enumerate(edges)]
+    for piece in pieces(inner):
+        yield [edge for k, edge in enumerate(edges) if k in piece]
 
 
 def _path(piece: list[NetworkEdge], body: str) -> list[str] | None:

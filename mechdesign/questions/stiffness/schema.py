@@ -52,17 +52,15 @@ class CrossSection(fields.Model):
     bar, 1/2 of a thin tube; 5/6 of {area, inertia}. Example: 0.85
     """
 
-    @model_validator(mode="after")
-    def _one_form(self) -> CrossSection:
+    def faults(self) -> Iterator[str]:
         if tuple(self.given(*dict.fromkeys(key for form in _FORMS for key in form))) not in _FORMS:
-            raise failure(
+            yield (
                 "a section is {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}"
             )
         if self.shear and self.G is None:
-            raise failure("'shear: true' needs the shear modulus 'G'")
+            yield "'shear: true' needs the shear modulus 'G'"
         if self.shear_factor is not None and not self.shear:
-            raise failure("a 'shear_factor' counts with 'shear: true' only")
-        return self
+            yield "a 'shear_factor' counts with 'shear: true' only"
 
     def misfits(self) -> Iterator[fields.Misfit]:
         if self.inner_diameter is not None and self.diameter is not None:
@@ -99,11 +97,9 @@ class Bearing(fields.Model):
     moment: fields.PositiveNumber | None = None
     """Moment per radian against turning, of a slide. Example: 1e6 N*m/rad"""
 
-    @model_validator(mode="after")
-    def _some(self) -> Bearing:
+    def faults(self) -> Iterator[str]:
         if not self.given("radial", "moment"):
-            raise failure("a bearing has a 'radial' stiffness, and that of a slide a 'moment' stiffness too")
-        return self
+            yield "a bearing has a 'radial' stiffness, and that of a slide a 'moment' stiffness too"
 
 
 class CouplingStiffness(fields.Model):
@@ -117,11 +113,9 @@ class CouplingStiffness(fields.Model):
     moment: fields.PositiveNumber | None = None
     """Moment per radian of the angle that follows. Example: 1e4 N*m/rad"""
 
-    @model_validator(mode="after")
-    def _some(self) -> CouplingStiffness:
+    def faults(self) -> Iterator[str]:
         if not self.given("force", "moment"):
-            raise failure("a coupling that gives has a 'force' stiffness or, where an angle follows, one of 'moment'")
-        return self
+            yield "a coupling that gives has a 'force' stiffness or, where an angle follows, one of 'moment'"
 
 
 def _series(raw: Any, context: Context) -> float:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
@@ -65,11 +66,9 @@ class Integrate(fields.Model):
     nodes: Annotated[int, fields.whole(1, 100_000)] | None = None
     """Nodes along each ray, of midpoint and sector_mean. Left out: 200 and 49. Example: 49"""
 
-    @model_validator(mode="after")
-    def _fitting(self) -> Integrate:
+    def faults(self) -> Iterator[str]:
         if self.rule == "gauss" and self.nodes is not None:
-            raise failure("rule 'gauss' chooses its nodes by 'tolerance'; 'nodes' belongs to midpoint and sector_mean")
-        return self
+            yield "rule 'gauss' chooses its nodes by 'tolerance'; 'nodes' belongs to midpoint and sector_mean"
 
 
 _Index = Annotated[str, fields.choice(INDEX_NAMES, "local index")]

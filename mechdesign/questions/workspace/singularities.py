@@ -63,7 +63,7 @@ def causes(field: Field) -> list[tuple[str, str]]:
         first = field.members[0]
         return causes(first)[: len(first.labels)] * len(field.members)
     names = forward_names(field.mechanism)
-    stated = {bound.label: bound.coordinate.name for bound in field.mechanism.bounds}
+    stated = {bound.limit.name: bound.coordinate.name for bound in field.mechanism.bounds}
     words = []
     for kind, label in field.labels:
         if kind == "limit":

@@ -9,6 +9,8 @@ from typing import Any
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.algebra import fit
+from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.elements.declared import Physical, Quantity, Term
 from mechdesign.mechanism.elements.links import Link, Mass
 from mechdesign.mechanism.graph import GROUND, rod_of
@@ -98,6 +100,11 @@ class Builder:
         if measured:
             self.measured.add(name)
         return name
+
+    def parameters_in(self, expression: Expression) -> None:
+        """Register the parameters that an expression of coordinates names."""
+        for name in expression.names & self.parameter_values.keys():
+            self.place((MEASURED + name,), Amount(self.parameter_values[name], "", Expression.parse(name)), "none")
 
     def numbers(self, given: Keys, *path: str, turning: bool = False) -> dict[str, Term]:
         """Register the numbers of an element that are given as places of the geometry; their names by their keys."""
@@ -315,7 +322,5 @@ class Builder:
 
 def rotation(local: list[complex], drawn: list[complex]) -> complex:
     """Unit complex number that turns local vectors best onto the first of the drawn ones (least squares)."""
-    drawn = drawn[: len(local)]
-    centre, drawn_centre = sum(local) / len(local), sum(drawn) / len(drawn)
-    fit = sum(((b - drawn_centre) * (a - centre).conjugate() for a, b in zip(local, drawn, strict=True)), 0j)
-    return fit / abs(fit) if abs(fit) > 0 and math.isfinite(abs(fit)) else 1 + 0j
+    along = fit(local, drawn[: len(local)])
+    return along / abs(along) if abs(along) > 0 and math.isfinite(abs(along)) else 1 + 0j

@@ -12,7 +12,7 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.expressions import Expression
 from mechdesign.functions import Tabulated
 from mechdesign.mechanism.coordinates import coupled
-from mechdesign.mechanism.elements.couplings import MEASURED, Cam, Coupling, play
+from mechdesign.mechanism.elements.couplings import Cam, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.joints import LinkLine
 from mechdesign.mechanism.geometry import Geometry
@@ -27,7 +27,6 @@ from mechdesign.study.building.joints import WrongJoint, check_named, line_of, r
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reading import APART
-from mechdesign.study.text.units import Amount
 
 # Rows from which a cubic spline is told.
 FEWEST_ROWS = 4
@@ -74,7 +73,6 @@ def build_couplings(builder: Builder) -> dict[str, Coupling]:
 def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, function: Expression) -> Cam:
     """The cam of a coupling; `sets` is the coordinate that follows."""
     section, given, path = builder.section, coupling.cam, ("couplings", name, "cam")
-    assert given is not None
     check_named(builder, "link", [given.link], (*path, "link"))
     followed = sorted(function.names - builder.parameter_values.keys() - {f"{name}.ratio", f"{name}.phase"})
     if len(followed) != 1:
@@ -122,12 +120,10 @@ def _function(
         listed = [*section.coordinates, *section.moving, *section.slides, *parameters]
         if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
             return None
-        for item in to.names & parameters.keys():
-            builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
+        builder.parameters_in(to)
         coordinates = {item: item if item in parameters else section.coordinate_named(item) for item in names}
         named = {item: Expression(item, (("name", coordinate),), unit) for item, coordinate in coordinates.items()}
         return replace(to.substituted(named), angle_unit=unit)
-    assert given.of is not None
     listed = [*section.coordinates, *section.moving, *section.slides]
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
         return None
@@ -135,7 +131,6 @@ def _function(
     if given.table is not None:
         table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
-    assert given.ratio is not None
     if float(given.ratio) == 0.0:
         message = f"with a ratio of 0 {given.set_!r} would stand still: give it a value by 'to', or clamp its link"
         builder.report((*path, "ratio"), message)

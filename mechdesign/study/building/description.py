@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 
 from mechdesign.expressions import Expression
-from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.measures import Limit, Measure
@@ -22,7 +21,6 @@ from mechdesign.study.building.elements import Written
 from mechdesign.study.building.joints import build_friction, build_joints, check_connected, check_pins
 from mechdesign.study.building.plates import build_plates
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.units import Amount
 
 
 def build(builder: Builder) -> Description:
@@ -96,11 +94,9 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             except ExpressionError as error:
                 builder.report(path, str(error))
                 continue
-            parameters = builder.parameter_values
-            noun, listed = "coordinate or parameter", [*above, *parameters]
+            noun, listed = "coordinate or parameter", [*above, *builder.parameter_values]
             if all(builder.check_name(item, listed, noun, path) for item in sorted(expression.names)):
-                for item in expression.names & parameters.keys():
-                    builder.place((MEASURED + item,), Amount(parameters[item], "", Expression.parse(item)), "none")
+                builder.parameters_in(expression)
                 measures[name] = Measure(name, expression=expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             measures[name] = Measure(name, **{section.kind: pair})

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from functools import cache
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import Field, create_model, model_validator
 
@@ -14,7 +14,6 @@ from mechdesign.mechanism.elements.declared import Choice, Element, Notation, Si
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.study.building import notations
 from mechdesign.study.text import fields
-from mechdesign.study.text.reading import failure
 from mechdesign.study.text.units import Amount
 
 E = TypeVar("E", bound=Element)
@@ -27,11 +26,8 @@ class Keys(fields.Model):
     sizes: ClassVar[Mapping[str, Size]]
     items = Element.items
 
-    @model_validator(mode="after")
-    def _fitting(self) -> Self:
-        for message in self.declares.misfits(self):
-            raise failure(message)
-        return self
+    def faults(self) -> Iterator[str]:
+        return self.declares.faults(self)
 
     def numbers(self) -> Iterator[tuple[str, Size, Amount]]:
         """The numbers of the geometry that are given, with their keys."""
@@ -51,22 +47,17 @@ class _LinkKeys(Keys):
         return notations.long_link(raw)
 
 
-if TYPE_CHECKING:
+class Written(Keys, Generic[E]):
+    """The keys of an element, as ``Written[Spring]``."""
 
-    class Written(Keys, Generic[E]):
-        """The keys of an element."""
+    if TYPE_CHECKING:
 
         def __getattr__(self, key: str) -> Any: ...
 
-else:
+    else:
 
-    class _Written:
-        """Annotation of the keys of an element, as ``Written[Spring]``."""
-
-        def __getitem__(self, element):
+        def __class_getitem__(cls, element):
             return _keys_of(element)
-
-    Written = _Written()
 
 
 @cache
@@ -118,7 +109,7 @@ def _read(hint: Any) -> Any:
         case Notation("part"):
             return _keys_of(get_args(hint)[0])
         case Notation():
-            return notations.BY_WORD[mark.word]
+            return notations.BY_WORD.get(mark.word) or getattr(fields, mark.word)
         case Size():
             kind = None if mark.between else mark.kind
             number = fields.number(kind, mark.least, exclusive=mark.exclusive, place=not mark.fixed, fixed=mark.fixed)

@@ -10,6 +10,7 @@ from mechdesign.errors import suggestion
 from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.numerics.graphs import pieces
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text.document import KeyPath
@@ -161,10 +162,7 @@ def check_connected(builder: Builder) -> None:
         ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
         if joint.slot and joint.point:
             ties.append({joint.slot, *owners.get(joint.point, ())})
-    reached, before = {GROUND}, 0
-    while len(reached) > before:
-        before = len(reached)
-        reached.update(*(tie for tie in ties if tie & reached))
+    (reached,) = (piece for piece in pieces([{GROUND}, *ties]) if GROUND in piece)
     for name in section.links:
         if name in reached or GROUND not in section.links:
             continue
@@ -213,6 +211,5 @@ def build_friction(builder: Builder) -> dict[str, Friction]:
 
 
 def _clamped_at(builder: Builder, clamp: Written[Joint], point: str) -> bool:
-    assert clamp.fixed is not None
     one, other = (builder.section.points_of(link) for link in clamp.fixed)
     return point == (clamp.point or next((shared for shared in one if shared in other), None))

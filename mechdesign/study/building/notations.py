@@ -87,22 +87,13 @@ def _table(raw: Any, context: Context) -> str | tuple[tuple[float, ...], ...]:
     return read_rows(raw, context, 2, "every row holds two numbers", "an empty table")
 
 
-# What a mark of a notation reads.
+# What a mark of a notation reads, where it is not an annotation of `fields`.
 BY_WORD: dict[str, Any] = {
-    "link": fields.LinkName,
-    "point": fields.PointName,
-    "end": fields.EndName,
-    "joint": fields.JointName,
-    "drive": fields.DriveName,
-    "measure": fields.MeasureName,
-    "coordinate": fields.CoordinateName,
     "text": str,
     "flag": bool,
-    "inertia": fields.BarInertiaPlace,
     "points": Annotated[
         dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ],
-    "function": fields.Bound,
     "points of a line": _LINE,
     "range": Annotated[tuple[fields.Number, fields.Number], fields.pair_of("[first, last]")],
     "table": Annotated[Any, fields.Read(_table, _TABLE_FORM)],

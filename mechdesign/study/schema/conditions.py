@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
@@ -101,12 +101,10 @@ class Span(fields.Model):
     at_most: fields.Number | None = None
     """Highest value, likewise. Example: 2 mm"""
 
-    @model_validator(mode="after")
-    def _ends(self) -> Self:
+    def faults(self) -> Iterator[str]:
         given = self.given("from_", "to", "at_least", "at_most")
         if not given or (given != ["from_", "to"] and {"from_", "to"} & {*given}):
-            raise failure("a part of a motion has 'from' and 'to', or 'at_least', 'at_most' or both")
-        return self
+            yield "a part of a motion has 'from' and 'to', or 'at_least', 'at_most' or both"
 
     def misfits(self) -> Iterator[fields.Misfit]:
         if self.from_ is not None:
@@ -178,11 +176,9 @@ class Chosen(fields.Model):
         text = self.result if isinstance(self.result, str) else self.result.text
         return f"{text} ({where})" if where else text
 
-    @model_validator(mode="after")
-    def _of_rows(self) -> Self:
+    def faults(self) -> Iterator[str]:
         if self.where and isinstance(self.result, Expression):
-            raise failure(f"{self.result.text!r} is one number for each design: it has no rows, so leave out 'where'")
-        return self
+            yield f"{self.result.text!r} is one number for each design: it has no rows, so leave out 'where'"
 
 
 class Judged(Chosen):
@@ -196,11 +192,10 @@ class Judged(Chosen):
     design is infeasible, where one pose or sample is not valid or the motion ends between two. Example: allowed
     """
 
-    @model_validator(mode="after")
-    def _of_poses(self) -> Self:
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if self.unassembled and not self.name.startswith(("kinematics.", "reliability.", "stiffness.", "dynamics.")):
-            raise failure(f"{self.name!r} is of no poses that could be missing: leave out 'unassembled'")
-        return self
+            yield f"{self.name!r} is of no poses that could be missing: leave out 'unassembled'"
 
 
 class Condition(Judged):
@@ -214,11 +209,10 @@ class Condition(Judged):
     at_most: fields.Number | None = None
     """Highest value, likewise. Example: 2.5"""
 
-    @model_validator(mode="after")
-    def _bounded(self) -> Condition:
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if self.at_least is None and self.at_most is None:
-            raise failure("a condition needs 'at_least', 'at_most' or both")
-        return self
+            yield "a condition needs 'at_least', 'at_most' or both"
 
     def misfits(self) -> Iterator[fields.Misfit]:
         if self.at_least is not None and self.at_most is not None:

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from mechdesign.mechanism.elements.links import Link
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.wheels import carrier_of
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection, PoseSection
@@ -34,17 +33,17 @@ ONE_CIRCLE, SHIFTED = 1e-3, 0.05
 APART = 1000
 
 
-def note(checker: Checker, parts: Mapping[str, Any], description: Description) -> None:
+def note(checker: Checker, parts: Mapping[str, Any], mechanism: Mechanism) -> None:
     """Warn of likely mistakes in the parts of a valid study."""
     for part in parts.values():
         if isinstance(part, PoseSection):
             _angles(checker, part)
     if (dynamics := parts.get("dynamics")) is not None:
         _gravity(checker, dynamics.gravity)
-    _lengths(checker, description)
-    _pivots(checker, description.links[GROUND], description)
-    _wheels(checker)
-    _planets(checker)
+    _lengths(checker, mechanism)
+    _pivots(checker, mechanism)
+    _wheels(checker, mechanism)
+    _planets(checker, mechanism)
     data = checker.reporter.document.data
     if data.get("requirements", ()) is None:
         checker.doubt(("requirements",), "lists nothing, so that no result is judged", at_key=True)
@@ -105,11 +104,11 @@ def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
         yield (section.command, "motion", name), [abs(end) for end in ends if not text_of(end)]
 
 
-def _lengths(checker: Checker, description: Description) -> None:
+def _lengths(checker: Checker, mechanism: Mechanism) -> None:
     """Warn of links whose sizes are so different that their units likely differ."""
     sizes = {
-        name: max((abs(a - b) for a, b in combinations(_points(link, description).values(), 2)), default=0.0)
-        for name, link in description.links.items() if not link.telescopic
+        name: max((abs(a - b) for a, b in combinations(_points(name, mechanism).values(), 2)), default=0.0)
+        for name, link in mechanism.description.links.items() if not link.telescopic
     }  # fmt: skip
     positive = {name: size for name, size in sizes.items() if size > 0}
     if not positive:
@@ -121,9 +120,9 @@ def _lengths(checker: Checker, description: Description) -> None:
         checker.doubt(("mechanism", "links", least), f"{sentence}, a thousand times apart; are both in one unit?")
 
 
-def _pivots(checker: Checker, ground: Link, description: Description) -> None:
+def _pivots(checker: Checker, mechanism: Mechanism) -> None:
     """Warn of two pins of the ground at the same place."""
-    pins = {name: at for name, at in _points(ground, description).items() if len(checker.mechanism.owners[name]) > 1}
+    pins = {name: at for name, at in _points(GROUND, mechanism).items() if len(checker.mechanism.owners[name]) > 1}
     for one, other in combinations(pins, 2):
         if abs(pins[one] - pins[other]) <= 1e-9 * max(map(abs, pins.values())):
             checker.doubt(
@@ -132,11 +131,8 @@ def _pivots(checker: Checker, ground: Link, description: Description) -> None:
             )
 
 
-def _wheels(checker: Checker) -> None:
+def _wheels(checker: Checker, mechanism: Mechanism) -> None:
     """Warn of wheels that are described, and that cannot make what their coupling says."""
-    mechanism = checker.compiled
-    if mechanism is None:
-        return
     for coupling in mechanism.couplings:
         given = checker.mechanism.couplings[coupling.name]
         described = [key for key in ("wheels", "radius", "pressure_angle") if key in given.model_fields_set]
@@ -163,11 +159,8 @@ def _wheels(checker: Checker) -> None:
         checker.doubt(("mechanism", "couplings", coupling.name, described[0]), message)
 
 
-def _planets(checker: Checker) -> None:
+def _planets(checker: Checker, mechanism: Mechanism) -> None:
     """Refuse wheels between coaxial ones that need two pitch circles far apart, and warn of those a little apart."""
-    mechanism = checker.compiled
-    if mechanism is None:
-        return
     drawn = mechanism.sketch_configuration
     circles: dict[tuple[str, frozenset[int]], tuple[str, float]] = {}
     for mesh in (mesh for mesh in mechanism.meshes if mesh.slide < 0 and not mesh.belt):
@@ -186,13 +179,10 @@ def _planets(checker: Checker) -> None:
             say(("mechanism", "couplings", mesh.coupling), message)
 
 
-def _points(link: Link, description: Description) -> dict[str, complex]:
+def _points(link: str, mechanism: Mechanism) -> dict[str, complex]:
     """Points of a link in its frame."""
-
-    def number(term: str | float) -> float:
-        return description.places[term].nominal if isinstance(term, str) else term
-
-    return {name: complex(number(x), number(y)) for name, (x, y) in link.points.items()}
+    points = mechanism.description.links[link].points
+    return {name: complex(mechanism.geometry.place(link, name, {})) for name in points}
 
 
 def _tolerances(checker: Checker, section: ReliabilitySection) -> None:

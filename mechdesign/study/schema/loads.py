@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
@@ -63,20 +63,16 @@ class Load(fields.Model):
     moment: Annotated[Quantity | None, fields.Read(read_quantity, fields.NUMBER_FORM)] = None
     """Moment, counter-clockwise positive, or an expression. Example: 3000 Example: -50*sin(theta)"""
 
-    @model_validator(mode="after")
-    def _whole(self) -> Load:
+    def faults(self) -> Iterator[str]:
         places = self.given("at", "between")
         if len(places) > 1 or bool(places) != (self.force is not None) or (self.moment is None) != (self.link is None):
-            raise failure(
-                "a load is {at: point, force: [fx, fy]}, {between: [P, Q], force: f} or {link: name, moment: m}"
-            )
+            yield "a load is {at: point, force: [fx, fy]}, {between: [P, Q], force: f} or {link: name, moment: m}"
         if self.force is None and self.moment is None:
-            raise failure("a load needs a force or a moment")
+            yield "a load needs a force or a moment"
         if self.force is not None and len(self.force) != (1 if self.between else 2):
-            raise failure("a force at a point is [fx, fy], one between two points a single number")
+            yield "a force at a point is [fx, fy], one between two points a single number"
         if self.in_ is not None and self.at is None:
-            raise failure("'in' turns the directions of a force 'at' a point")
-        return self
+            yield "'in' turns the directions of a force 'at' a point"
 
     @property
     def numbers(self) -> Iterator[tuple[KeyPath, Quantity, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
@@ -39,14 +40,12 @@ class Segment(fields.Model):
     dwell: Time | None = None
     """How long the coordinate stands still. Example: 0.1"""
 
-    @model_validator(mode="after")
-    def _whole(self) -> Segment:
+    def faults(self) -> Iterator[str]:
         if self.to is not None and self.time is None:
-            raise failure(f"the move to {self.to:g} needs a time: {{to: {self.to:g}, time: 0.3}}")
+            yield f"the move to {self.to:g} needs a time: {{to: {self.to:g}, time: 0.3}}"
         beside = [key for key in ("time", "law") if key in self.model_fields_set]
         if self.dwell is not None and beside:
-            raise failure(f"a dwell has no {beside[0]!r}: write {{dwell: {self.dwell:g}}}")
-        return self
+            yield f"a dwell has no {beside[0]!r}: write {{dwell: {self.dwell:g}}}"
 
     @property
     def duration(self) -> float:
@@ -89,20 +88,18 @@ class CourseText(fields.Model):
             return raw
         return {"segments" if isinstance(raw, list) else "file" if file_of(raw) is not None else "held": raw}
 
-    @model_validator(mode="after")
-    def _begins(self) -> CourseText:
+    def faults(self) -> Iterator[str]:
         if self.segments is None:
-            return self
+            return
         for number, segment in enumerate(self.segments[1:], start=2):
             if segment.from_ is not None:
-                raise failure(f"segment {number} begins where the one before it ends: 'from' is for the first one")
+                yield f"segment {number} begins where the one before it ends: 'from' is for the first one"
         moves = [segment.to for segment in self.segments if segment.to is not None]
         if self.segments[0].from_ is None and len(moves) < 2:
-            raise failure(
+            yield (
                 "without 'from' a motion is a cycle that begins where it ends, and so needs two moves or more, "
                 f"[{{to: 90, time: 0.3}}, {{to: 0, time: 0.4}}]; else say where it begins, {_RIGHT}"
             )
-        return self
 
     def checked(self, checker: Checker, name: str, path: KeyPath) -> None:
         """Check the name of the coordinate, and the units of its values."""

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from mechdesign.study.text import fields
 from mechdesign.study.text.inputs import file_of
-from mechdesign.study.text.reading import Context, failure, read_number, read_rows
+from mechdesign.study.text.reading import Context, read_number, read_rows
 from mechdesign.study.text.units import Amount
 
 # Default numbers of poses: of a circle (steps of 5 deg); of a line or an arc, both ends included.
@@ -114,12 +114,8 @@ class PathSection(fields.Model):
             return {"file": raw}
         return raw if isinstance(raw, dict | PathSection) else {"through": raw}
 
-    @model_validator(mode="after")
-    def _fitting(self) -> PathSection:
+    def faults(self) -> Iterator[str]:
         if self.spline and self.shape:
-            raise failure(f"{self.shape!r} is smooth already: 'spline' is for a list of points")
+            yield f"{self.shape!r} is smooth already: 'spline' is for a list of points"
         if self.points is not None and not self.shape and not self.spline:
-            raise failure(
-                "a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line"
-            )
-        return self
+            yield ("a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line")

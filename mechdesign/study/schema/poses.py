@@ -51,11 +51,9 @@ class SweepText(fields.Model):
             raise failure(f"a sweep is written {{{ends}}}, not {raw}")
         return {"from": raw, "to": raw, "number": 1} if isinstance(raw, int | float | str) else raw
 
-    @model_validator(mode="after")
-    def _spacing(self) -> SweepText:
+    def faults(self) -> Iterator[str]:
         if (self.step is None) == (self.number is None):
-            raise failure("a sweep needs either 'step' or 'number'")
-        return self
+            yield "a sweep needs either 'step' or 'number'"
 
     def misfits(self) -> Iterator[fields.Misfit]:
         if self.step is not None:
@@ -132,12 +130,10 @@ class PoseSection(Section):
         """The key that gives the poses; None if there is none."""
         return next(iter(self.given(*self.sources)), None)
 
-    @model_validator(mode="after")
-    def _one_source(self) -> PoseSection:
+    def faults(self) -> Iterator[str]:
         given = self.given(*self.sources)
         if len(given) > 1:
-            raise failure(f"{' and '.join(given)} are both given; poses come from one of them")
-        return self
+            yield f"{' and '.join(given)} are both given; poses come from one of them"
 
     def checked(self, checker: Checker) -> Self:
         """The section; names and units of the coordinates that poses give are checked against the mechanism."""
@@ -198,13 +194,12 @@ class MotionSection(PoseSection):
         """Whether velocities and accelerations are asked for."""
         return bool(self.rates or self.accelerations or self.speed or self.motion)
 
-    @model_validator(mode="after")
-    def _timed(self) -> MotionSection:
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if self.motion is not None and not self.motion:
-            raise failure("an empty motion; give coordinates, {theta: [{from: 0, to: 90, time: 0.3}]}")
+            yield "an empty motion; give coordinates, {theta: [{from: 0, to: 90, time: 0.3}]}"
         if self.motion is None and self.instants is not None:
-            raise failure("'instants' are those of a 'motion', and the section has none")
-        return self
+            yield "'instants' are those of a 'motion', and the section has none"
 
     def checked(self, checker: Checker) -> Self:
         """Check rates, accelerations and the speed as well."""

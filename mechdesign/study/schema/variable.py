@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import in_yaml
@@ -58,24 +59,22 @@ class Variable(fields.Model):
     also words. Example: [8, 10, 12] Example: [h6, h7, h9]
     """
 
-    @model_validator(mode="after")
-    def _spacing(self) -> Variable:
+    def faults(self) -> Iterator[str]:
         if self.step is not None and self.number is not None:
-            raise failure("either 'step' or 'number', not both")
+            yield "either 'step' or 'number', not both"
         if self.choices is None:
             if self.from_ is None or self.to is None:
-                raise failure("a variable has a range, {from: 10, to: 30}, or choices, {choices: [8, 10, 12]}")
+                yield "a variable has a range, {from: 10, to: 30}, or choices, {choices: [8, 10, 12]}"
             if self.integer and self.number is not None:
-                raise failure("whole numbers follow from 'step', 1 where it is left out; leave out 'number'")
+                yield "whole numbers follow from 'step', 1 where it is left out; leave out 'number'"
             if self.integer and self.step is not None and not float(self.step).is_integer():
-                raise failure(f"a step of whole numbers is whole, not {self.step:g}")
-            return self
+                yield f"a step of whole numbers is whole, not {self.step:g}"
+            return
         beside = [key for key in ("from_", "to", "step", "number", "integer") if key in self.model_fields_set]
         if beside:
-            raise failure(f"choices are the values themselves; leave out {beside[0].rstrip('_')!r}")
+            yield f"choices are the values themselves; leave out {beside[0].rstrip('_')!r}"
         if len({*self.words}) < len(self.words):
-            raise failure("two choices read the same in a table: give each a text of its own")
-        return self
+            yield "two choices read the same in a table: give each a text of its own"
 
     @property
     def stepped(self) -> bool:

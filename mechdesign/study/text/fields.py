@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -288,17 +289,13 @@ class Model(BaseModel):
         return raw if not cls.bare or raw is None or isinstance(raw, dict | Model) else {cls.bare: raw}
 
     @model_validator(mode="after")
-    def _exactly_one(self) -> Self:
+    def _consistent(self) -> Self:
         given = self.given(*self.one_of[1:])
         if self.one_of and len(given) != 1:
             raise failure(self.one_of[0] + (f"; {' and '.join(given)} are given" if given else ""))
-        return self
-
-    @model_validator(mode="after")
-    def _fitting_numbers(self) -> Self:
-        for misfit in self.misfits():
-            if misfit.wrong:
-                raise failure(misfit.message())
+        wrong = (misfit.message() for misfit in self.misfits() if misfit.wrong)
+        for sentence in chain(wrong, self.faults()):
+            raise failure(sentence)
         return self
 
     def given(self, *keys: str) -> list[str]:
@@ -309,6 +306,10 @@ class Model(BaseModel):
     def kind(self) -> Any:
         """Which of the keys of `one_of` is given."""
         return self.given(*self.one_of[1:])[0]
+
+    def faults(self) -> Iterator[str]:
+        """Sentences about keys that do not go together, or are missing."""
+        return iter(())
 
     def misfits(self) -> Iterator[Misfit]:
         """Contradictions between the section's numbers, which are arrays for many designs."""

@@ -56,17 +56,15 @@ class ErrorLimit(fields.Model):
             raise failure(f"must be at least 0, not {size:g}")
         return {"min": Amount.by("-size", size=size), "max": size}
 
-    @model_validator(mode="after")
-    def _some(self) -> ErrorLimit:
+    def faults(self) -> Iterator[str]:
         kinds = [present for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (present := self.given(*keys))]
         if not kinds:
-            raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
+            yield "a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'"
         if len(kinds) > 1:
-            raise failure(
+            yield (
                 f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
                 "'usl' the value itself, 'radius' the place of a point"
             )
-        return self
 
     def misfits(self) -> Iterator[fields.Misfit]:
         low, high = self.ends

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import model_validator
 
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
@@ -126,15 +125,14 @@ class Dimension(Distribution, _Width):
     drive or load 0). Example: 0
     """
 
-    @model_validator(mode="after")
-    def _fitting(self) -> Self:
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if LAWS[self.distribution].between_ends and self.tolerance is None:
-            raise failure(f"a {self.distribution} distribution lies between two ends: give 'tolerance'")
+            yield f"a {self.distribution} distribution lies between two ends: give 'tolerance'"
         if self.measured is not None and "distribution" in self.model_fields_set:
-            raise failure("measured values are a distribution of their own: leave 'distribution' out")
+            yield "measured values are a distribution of their own: leave 'distribution' out"
         if self.measured is None and (spare := self.given("column", "nominal")):
-            raise failure(f"{spare[0]!r} goes with 'measured', the name of a file")
-        return self
+            yield f"{spare[0]!r} goes with 'measured', the name of a file"
 
     def ends(self, nominal: Number) -> tuple[Number, Number]:
         """Lowest and highest deviation of the tolerance, none where sigma is given; a class goes by the nominal value.
