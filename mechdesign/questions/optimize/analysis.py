@@ -203,10 +203,8 @@ def _none_feasible(designs: DesignSet) -> str:
     message = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     for condition in designs.conditions:
         index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
-        values = (
-            designs.results[condition][np.isfinite(designs.results[condition])] if statistic == "min" else np.empty(0)
-        )
-        if values.size and (np.abs(values) <= 0).all():
+        values = designs.results[condition]
+        if statistic == "min" and np.isfinite(values).any() and not np.any(values[np.isfinite(values)]):
             message += (
                 f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
                 f"bound {index}_mean, or keep the region off singularities by mechanism.limits"
@@ -241,10 +239,8 @@ def _warnings(question: DesignsQuestion, designs: DesignSet) -> Iterator[Caution
     for goal in filter(lambda goal: goal.unassembled, designs.goals):
         optimum = ask(study_of(question.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
-            words = (
-                f"{goal.name} of the optimum is that of a part of the motion, as 'unassembled: allowed' lets it: {part}"
-            )
-            yield Caution("unassembled", words, "optimum")
+            of = f"{goal.name} of the optimum is that of a part of the motion"
+            yield Caution("unassembled", f"{of}, as 'unassembled: allowed' lets it: {part}", "optimum")
     if not question.regions or question.regions[0].rule != "gauss":
         return
     for goal, error in designs.errors.items():
