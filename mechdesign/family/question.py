@@ -122,11 +122,9 @@ class DesignsQuestion:
         """Unit of a goal, where the study's own design tells it."""
         if goal.expression is not None:
             return unit_of(self.study, goal.column)
-        return (
-            self.columns[goal.column].unit
-            if goal.regional and goal.column in self.columns
-            else self.units.get(goal, "")
-        )
+        if goal.regional and goal.column in self.columns:
+            return self.columns[goal.column].unit
+        return self.units.get(goal, "")
 
     @cached_property
     def regional(self) -> list[Goal]:

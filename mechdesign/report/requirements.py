@@ -277,23 +277,18 @@ def _judged(result: Result, requirement: Requirement, freedom: int, fewer: Colle
     elif judged.row[0] < 0:
         # Of no row, between which the motion has no place either.
         place = _OUTSIDE if worst is None else ""
-    return _scoped(_verdict(requirement, judged, place, chosen.unit), chosen, requirement)
+    return _verdict(requirement, judged, place, chosen)
 
 
 def _of_number(terms: Chosen | Sum, requirement: Requirement, freedom: int) -> Verdict:
     """The verdict on one number: a statistic of a column, or a sum."""
-    judged = judge(
-        terms,
-        _bounds(terms, requirement),
-        absolute=requirement.abs,
-        assembled=bool(requirement.unassembled),
-        number=True,
-    )
+    bounds, assembled = _bounds(terms, requirement), bool(requirement.unassembled)
+    judged = judge(terms, bounds, absolute=requirement.abs, assembled=assembled, number=True)
     place = _place_of_end(terms, requirement, freedom) if isinstance(terms, Chosen) else ""
     if np.isnan(judged.values[0]):
         outside = any(chosen.part for chosen in terms.parts) and not any(chosen.lacking for chosen in terms.parts)
         place = _OUTSIDE if outside else ""
-    return _scoped(_verdict(requirement, judged, place, terms.unit), terms, requirement)
+    return _verdict(requirement, judged, place, terms)
 
 
 def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str:
@@ -320,23 +315,19 @@ def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Limits:
     return low, high
 
 
-def _verdict(requirement: Requirement, judged: Judgement, place: str, unit: str) -> Verdict:
-    value, margin = float(judged.values[0]), float(judged.margins[0])
-    return Verdict(in_words(requirement), margin >= 0, value, place, margin, unit)
-
-
-def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
+def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Chosen | Sum) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
+    value, margin = float(judged.values[0]), float(judged.margins[0])
     scopes = [chosen.table.scope for chosen in terms.parts]
     missing = [gap for chosen in terms.parts for gap in chosen.gaps]
-    if missing and not requirement.unassembled:
-        verdict = replace(verdict, met=False)
+    met = margin >= 0 and (not missing or requirement.unassembled is not None)
     notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
     courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     ends = [scope.until for scope in scopes if scope is not None and scope.until]
-    lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(verdict.worst) else []
-    return replace(verdict, note="; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))]))
+    lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(value) else []
+    note = "; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))])
+    return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
 
 
 def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) -> Verdict:

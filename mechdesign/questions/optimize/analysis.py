@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +12,7 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.family.evaluator import missing
-from mechdesign.family.goals import Goal, shape_of
+from mechdesign.family.goals import shape_of
 from mechdesign.family.question import DesignsQuestion
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.progress import NULL, Progress
@@ -25,6 +25,7 @@ from mechdesign.questions.optimize.explorer import Explorer
 from mechdesign.questions.optimize.files import design_files
 from mechdesign.questions.optimize.judge import DesignSet, Judge
 from mechdesign.questions.optimize.question import VariableFamily, designs_question
+from mechdesign.questions.optimize.schema import Containment
 from mechdesign.questions.optimize.tables import (
     best_table,
     bounds_table,
@@ -33,7 +34,7 @@ from mechdesign.questions.optimize.tables import (
     optimum_table,
     sensitivity_table,
 )
-from mechdesign.questions.optimize.variables import Design, from_cube, grid, in_words, parted, study_of
+from mechdesign.questions.optimize.variables import Design, from_cube, grid, in_words, study_of
 from mechdesign.questions.poses import Shown, solve_shown
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.questions.workspace.answer import answer
@@ -43,8 +44,6 @@ from mechdesign.region.rays import SINGLE
 from mechdesign.region.shapes import Shape
 from mechdesign.results import Drawn, Result
 from mechdesign.study import Study
-from mechdesign.study import designs as study_designs
-from mechdesign.study.designs import variant
 from mechdesign.work.chunks import workers
 from mechdesign.work.journal import Journal
 from mechdesign.work.threads import one_thread
@@ -204,10 +203,8 @@ def _none_feasible(designs: DesignSet) -> str:
     message = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     for condition in designs.conditions:
         index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
-        values = (
-            designs.results[condition][np.isfinite(designs.results[condition])] if statistic == "min" else np.empty(0)
-        )
-        if values.size and (np.abs(values) <= 0).all():
+        values = designs.results[condition]
+        if statistic == "min" and np.isfinite(values).any() and not np.any(values[np.isfinite(values)]):
             message += (
                 f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
                 f"bound {index}_mean, or keep the region off singularities by mechanism.limits"
@@ -242,10 +239,8 @@ def _warnings(question: DesignsQuestion, designs: DesignSet) -> Iterator[Caution
     for goal in filter(lambda goal: goal.unassembled, designs.goals):
         optimum = ask(study_of(question.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
-            words = (
-                f"{goal.name} of the optimum is that of a part of the motion, as 'unassembled: allowed' lets it: {part}"
-            )
-            yield Caution("unassembled", words, "optimum")
+            of = f"{goal.name} of the optimum is that of a part of the motion"
+            yield Caution("unassembled", f"{of}, as 'unassembled: allowed' lets it: {part}", "optimum")
     if not question.regions or question.regions[0].rule != "gauss":
         return
     for goal, error in designs.errors.items():
@@ -269,26 +264,20 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
 
 def _places(designs: DesignSet, question: DesignsQuestion) -> dict[str, Complexes]:
     """Places of shapes without a given centre in the workspaces of the optima; none where there are several regions."""
-    free = [
-        condition
-        for condition in designs.conditions
-        if condition.outline is not None and condition.outline.center is None
-    ]
+    outlines = [condition.outline for condition in designs.conditions if condition.outline is not None]
+    free = [outline for outline in outlines if outline.center is None]
     if not free or len(question.regions) > 1:
         return {}
-    rows = []
-    for k in designs.winners.tolist():
-        study, numbers = parted(designs.study, designs.design(k))
-        rows.append(_centres(variant(study, numbers), _shapes(free, study, numbers)))
-    names = (goal.column.removeprefix("scale of ") for goal in free)
-    return dict(zip(names, np.array(rows, dtype=complex).T, strict=True))
+    moved = designs.study.parameters.moved(designs.variables)
+    made = (study_of(designs.study, designs.design(k)) for k in designs.winners.tolist())
+    rows = [_centres(study, [shape for shape in _shapes(study) if shape.centre is None]) for study in made]
+    return dict(zip((outline.named(moved) for outline in free), np.array(rows, dtype=complex).T, strict=True))
 
 
-def _shapes(judged: Iterable[Goal], study: Study, changed: Mapping[str, float]) -> list[Shape]:
+def _shapes(study: Study) -> list[Shape]:
     """The shapes that a design's workspace has to contain."""
-    numbers = study_designs.Designs(study, {name: np.array([value]) for name, value in changed.items()}).numbers
-    outlines = [goal.outline for goal in judged if goal.outline is not None]
-    return [shape_of(outline, lambda number: float(numbers.of(number)[0])) for outline in outlines]
+    conditions = study.optimize.subject_to if study.optimize is not None else ()
+    return [shape_of(condition.contains) for condition in conditions if isinstance(condition, Containment)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,15 +317,14 @@ class DrawnDesigns(Drawn):
 
 def drawn_design(designs: DesignSet, design: Design) -> DrawnDesign:
     """Compute what pictures of one design show: its workspace if that was judged, or else its motion."""
-    study, numbers = parted(designs.study, design)
-    made = variant(study, numbers)
+    made = study_of(designs.study, design)
     judged = (*designs.goals, *designs.conditions)
     if made.workspace is not None and any(goal.command == "workspace" for goal in judged):
         # Only the region is drawn.
         plain = made.with_sections(workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
-            shapes = _shapes(designs.conditions, study, numbers)
+            shapes = _shapes(made)
             return DrawnDesign(plain, result, list(zip(shapes, _centres(plain, shapes), strict=True)))
     with suppress(MechdesignError):
         if any(goal.command == "kinematics" for goal in designs.goals):

@@ -231,10 +231,9 @@ def choice_problems(study: Study) -> Iterator[Problem]:
         if variable.choices is not None and name not in study.parameters.names():
             # Choices are tried as they are written: the units must fit the entry.
             choices = study.resolved["optimize"]["variables"][name]["choices"]
-            for k, message in (
-                (k, message) for k, own in enumerate(choices) for message in faults(study, [(name, own)], name)
-            ):
-                yield study.problem(message, "optimize", "variables", name, "choices", k)
+            for k, own in enumerate(choices):
+                for message in faults(study, [(name, own)], name):
+                    yield study.problem(message, "optimize", "variables", name, "choices", k)
 
 
 def in_words(row: Design) -> str:
