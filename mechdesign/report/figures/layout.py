@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis as Drawn
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.transforms import Bbox
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import highest, window_of
@@ -325,8 +326,12 @@ def _measure(cell: _Cell, renderer: Any) -> None:
     axes = cell.axes
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_visible(False)
-    tight = axes.get_tightbbox(renderer)
-    assert tight is not None
+    tight = axes.get_tightbbox(renderer) if cell.panel.shows is None else None
+    if tight is None:
+        # In a plane nothing else reaches beyond its axes; numbers that are not shown would cost as much as the others.
+        parts = [axis.get_tightbbox(renderer) for axis, _, outer in cell.drawn_axes if outer]
+        parts += [child.get_tightbbox(renderer) for child in axes.child_axes]
+        tight = Bbox.union([axes.bbox, *filter(None, parts)])
     box, dots = axes.bbox, style.dots()
     cell.left, cell.right = (max(0.0, side) / dots for side in (box.x0 - tight.x0, tight.x1 - box.x1))
     cell.below, cell.above = (max(0.0, side) / dots for side in (box.y0 - tight.y0, tight.y1 - box.y1))
