@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -175,6 +176,19 @@ class MovedQuestion(PoseQuestion):
     def clearances(self) -> list[str]:
         """Columns of clearances."""
         return []
+
+    @cached_property
+    def columns(self) -> dict[str, tuple[float, str]]:
+        """Columns that have extremes: the size by which rounding is judged, and the unit."""
+        sizes, label, rates = self.sizes, self.study.units.label, self.rates
+        kinds = {output.name: output.quantity for output in self.outputs}
+        kinds |= {targets.error(output): kind for output, kind in targets.judged(self.study).items()}
+        columns = {name: (sizes.get(kind, 0.0), label(kind)) for name, kind in kinds.items()}
+        columns |= {static.name: (static.size, static.unit) for static in self.statics}
+        columns |= {name: (sizes["length"], label("length")) for name in self.clearances}
+        for name, (kind, order) in self.orders.items():
+            columns[name] = sizes.get(kind, 0.0) * self.tempo**order, rates[name]
+        return columns
 
     @property
     def poled(self) -> list[str]:
