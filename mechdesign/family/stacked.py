@@ -63,8 +63,6 @@ class Stack(NamedTuple):
         See `mechdesign.mechanism.Reason`.
     whole : bool array, shape (designs,)
         Whether the motion has no gap between the poses; True where poses are no motion.
-    along : KinematicAlong, optional
-        The motions of the designs between their poses.
     solved : list of SolvedPoses
         The solved poses.
     """
@@ -72,7 +70,6 @@ class Stack(NamedTuple):
     result: Result
     reason: NDArray[np.int8]
     whole: Flags
-    along: KinematicAlong | None
     solved: list[SolvedPoses]
 
 
@@ -158,7 +155,7 @@ def tables(
         result = Result(command, _followed(built, along), absent=question.absent)
         reason = values.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
-    return Stack(result, reason.reshape(poses.designs, -1), whole, along, solved)
+    return Stack(result, reason.reshape(poses.designs, -1), whole, solved)
 
 
 def _followed(tables: Mapping[str, Table], along: AlongMotion | None) -> dict[str, Table]:

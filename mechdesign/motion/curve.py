@@ -340,9 +340,9 @@ def from_sketch(motion: Motion) -> dict[str, Floats]:
         return {}
     coordinates = mechanism.plan(names := poses.groups[0].names).structure.given
     begin = [float(sketch.value(c)) / unit for c, unit in zip(coordinates, units_of(units, coordinates), strict=True)]
-    ways = {name: np.stack([np.full(count, drawn), poses.named[name]], axis=1)
+    ways = {name: np.stack([np.full(count, drawn), poses.named[name]], axis=1).ravel()
             for name, drawn in zip(names, begin, strict=True)}  # fmt: skip
-    straight = Poses(GivenRows(ways), DesignNumbers(count, places=poses.places))
+    straight = Poses(GivenRows(ways, shape=(2,)), DesignNumbers(count, places=poses.places))
     curve = Curve(motion.at(straight), [*mechanism.windings.values()], drawn=True)
     turned = curve.turned(np.arange(count), np.ones(count))
     return {name: np.where(curve.spent, drawn, angles)

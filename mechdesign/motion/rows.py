@@ -133,21 +133,12 @@ class Poses(PoseNumbers):
         return self.named.get(TIME)
 
     @cached_property
-    def _rates(self) -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
-        return self.rule.rates(*self.places_along)
-
-    @property
-    def slopes(self) -> Mapping[str, Floats]:
-        """First derivatives of what is given, by the length of a point's path or by time, shape (count,).
+    def rates(self) -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
+        """First and second derivatives of what is given, by the length of a point's path or by time, shape (count,).
 
         In the study's units; nan where the path has no direction.
         """
-        return self._rates[0]
-
-    @property
-    def bends(self) -> Mapping[str, Floats]:
-        """Second derivatives."""
-        return self._rates[1]
+        return self.rule.rates(*self.places_along)
 
     @property
     def count(self) -> int:
@@ -278,7 +269,7 @@ class Poses(PoseNumbers):
 
 def instants(times: Floats) -> Poses:
     """Poses of which nothing but the time is known."""
-    return Poses(GivenRows.single({TIME: times}, listed=True))
+    return Poses(GivenRows({TIME: times}, listed=True))
 
 
 #: No poses, for what is asked of none.

@@ -17,7 +17,6 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints, distinct
 
 # What is swept along a motion over time.
 TIME = "time"
-NOTHING: Mapping[str, Floats] = {}
 
 
 class Sector(NamedTuple):
@@ -46,7 +45,8 @@ class Rows(ABC):
     listed: bool = False
     #: Whether they are those of a motion over time.
     timed: ClassVar[bool] = False
-    #: Of listed poses that give different coordinates, the number of the kind of each row.
+    #: The different sets of coordinates that listed poses give, and the number of that of each row.
+    kinds: Sequence[tuple[str, ...]] = ()
     number: Ints | None = None
     #: The patches of a workspace over which they lie, one a value of its held coordinates.
     regions: Sequence[Sectors] = ()
@@ -78,11 +78,6 @@ class Rows(ABC):
         """The poses of some designs."""
 
     @property
-    def kinds(self) -> Sequence[tuple[str, ...]]:
-        """The different sets of coordinates that poses give; one, unless listed poses give different ones."""
-        return [self.names]
-
-    @property
     def path(self) -> str | None:
         """The point along the length of whose path means are; None where there is no one such point."""
         return None
@@ -102,61 +97,47 @@ class Rows(ABC):
 
 @dataclass(frozen=True, eq=False)
 class GivenRows(Rows):
-    """Poses one by one, those of each line in an array.
+    """Poses one by one.
 
     Parameters
     ----------
-    values : mapping of str to ndarray, shape (lines, rows)
+    values : mapping of str to ndarray, shape (poses,)
         nan where a pose does not give it. The time may be among them.
-    slopes, bends : mapping of str to ndarray, shape (lines, rows)
+    shape : tuple of int, optional
+        Those of a grid, or how many each design has; left out: they are one line.
+    derivatives : pair of mapping of str to ndarray, shape (poses,)
         First and second derivatives.
-    sets : sequence of sequence of str, optional
-        The different sets of coordinates that poses give; `number` has that of each row.
     """
 
     values: Mapping[str, Floats]
     listed: bool = False
-    lines: tuple[int, ...] = ()
-    slopes: Mapping[str, Floats] = field(default_factory=dict)
-    bends: Mapping[str, Floats] = field(default_factory=dict)
-    sets: Sequence[tuple[str, ...]] = ()
+    shape: tuple[int, ...] = ()
+    derivatives: tuple[Mapping[str, Floats], Mapping[str, Floats]] = ({}, {})
+    kinds: Sequence[tuple[str, ...]] = ()
     number: Ints | None = None
     regions: Sequence[Sectors] = ()
 
-    @classmethod
-    def single(
-        cls, values: Mapping[str, Floats], *, listed: bool = False, slopes: Mapping[str, Floats] = NOTHING,
-        bends: Mapping[str, Floats] = NOTHING,
-    ) -> GivenRows:  # fmt: skip
-        """Poses of one line, values of shape (rows,)."""
-        values, slopes, bends = ({name: column[None] for name, column in part.items()}
-                                 for part in (values, slopes, bends))  # fmt: skip
-        return cls(values, listed, slopes=slopes, bends=bends)
-
     @property
     def grid(self) -> tuple[int, ...]:
-        # Listed poses of a structure give nothing.
-        columns = iter(self.values.values())
-        return (*self.lines, next(columns, np.zeros((1, 0 if self.number is None else len(self.number)))).shape[1])
+        return self.shape or (len(next(iter(self.values.values()), ())),)
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(name for name in self.values if name != TIME)
 
     def at(self, line: Ints, s: Ints | Floats) -> dict[str, Floats]:
-        return {name: between(values, line, s) for name, values in self.values.items()}
+        return self._between(self.values, line, s)
 
     def rates(self, line: Ints, s: Ints | Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        slopes, bends = ({name: between(values, line, s) for name, values in part.items()}
-                         for part in (self.slopes, self.bends))  # fmt: skip
-        return slopes, bends
+        first, second = self.derivatives
+        return self._between(first, line, s), self._between(second, line, s)
 
-    @property
-    def kinds(self) -> Sequence[tuple[str, ...]]:
-        return self.sets or [self.names]
+    def _between(self, columns: Mapping[str, Floats], line: Ints, s: Ints | Floats) -> dict[str, Floats]:
+        return {name: between(values.reshape(-1, max(self.grid[-1], 1)), line, s) for name, values in columns.items()}
 
     def take(self, designs: Ints) -> GivenRows:
-        return replace(self, values={name: values[designs] for name, values in self.values.items()})
+        count = math.prod(self.grid)
+        return replace(self, values={name: v.reshape(-1, count)[designs].ravel() for name, v in self.values.items()})
 
 
 @dataclass(frozen=True, eq=False)

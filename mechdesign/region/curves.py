@@ -67,5 +67,4 @@ def workspace_nodes(study: Study) -> Poses:
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
     values |= {name: np.concatenate(parts) for name, parts in held.items()}
-    lines = {name: column.reshape(-1, GRID) for name, column in values.items()}
-    return Poses(GivenRows(lines, lines=(len(z) // GRID,), regions=all_sectors))
+    return Poses(GivenRows(values, shape=(len(z) // GRID, GRID), regions=all_sectors))

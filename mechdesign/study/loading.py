@@ -292,7 +292,7 @@ def _check_poses(study: Study, reporter: Reporter) -> None:
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
-            for k, names in enumerate(poses.rule.kinds):
+            for k, names in enumerate(poses.rule.kinds or [poses.names]):
                 try:
                     study.mechanism.plan(names)
                 except MechanismError as error:

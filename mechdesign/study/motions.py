@@ -120,7 +120,8 @@ def _listed(poses: Sequence[Mapping[str, float]], numbers: DesignNumbers) -> Giv
         number[rows] = k
         for name in kinds[k]:
             values[name][:, rows] = table_of([[poses[row][name]] for row in rows], numbers.of)[..., 0]
-    return GivenRows(values, listed=True, sets=kinds, number=number)
+    columns = {name: column.ravel() for name, column in values.items()}
+    return GivenRows(columns, listed=True, shape=(len(poses),), kinds=kinds, number=number)
 
 
 def _grid(axes: Mapping[str, EvenValues]) -> GridRows:

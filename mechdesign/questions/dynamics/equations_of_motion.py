@@ -108,7 +108,7 @@ class EquationsOfMotion:
             begin = {
                 drive.name: np.atleast_1d(in_study_units(self.study.units, drive, at.value(drive))) for drive in drives
             }
-            wound = from_sketch(self.study.motion(Poses(GivenRows.single(begin))))
+            wound = from_sketch(self.study.motion(Poses(GivenRows(begin))))
             at = replace(at, near={**at.near, **{name: angle[0] for name, angle in wound.items()}})
         self.drives, friction = drives, question.friction
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []

@@ -142,5 +142,5 @@ def _twice(question: MovedQuestion) -> MovedQuestion:
     """The question for a sweep that goes on as far again."""
     (name,), poses = question.poses.names, question.poses
     values = poses.values[name]
-    longer = GivenRows.single({name: np.append(values, values[1:] + (values[-1] - values[0]))})
+    longer = GivenRows({name: np.append(values, values[1:] + (values[-1] - values[0]))})
     return question.at(Poses(longer, poses.own))

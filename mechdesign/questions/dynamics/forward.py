@@ -149,11 +149,11 @@ def _forces(integration: Integration, course: IntegratedPoses) -> tuple[PoseValu
 
     rows = np.arange(count)
     values = {drive.name: of(drive, course.configuration.value(drive)) for drive in drives}
-    slopes, bends = (
+    first, second = (
         {drive.name: of(drive, positions.rate(drive, part)) for drive in drives}
         for part in (course.rates.velocity, course.rates.acceleration)
     )
-    poses = Poses(GivenRows.single({TIME: course.times, **values}, slopes=slopes, bends=bends))
+    poses = Poses(GivenRows({TIME: course.times, **values}, derivatives=(first, second)))
     question = DynamicQuestion.of(study, poses)
     if len(course.rates.friction):
         question = replace(question, forces=replace(question.acting, rubbing=course.rates.friction))
@@ -177,7 +177,7 @@ def _forward_table(motion: PoseValues, course: IntegratedPoses, outputs: list[Co
         units = [label(kind) for kind in ORDERS[drive.quantity]]
         columns.append(DRIVE.column(poses.values[drive.name], units[0], drive=drive.name))
         for word, values, unit in (
-            ("velocity", poses.slopes[drive.name], units[1]), ("acceleration", poses.bends[drive.name], units[2]),
+            ("velocity", poses.rates[0][drive.name], units[1]), ("acceleration", poses.rates[1][drive.name], units[2]),
             ("effort", course.rates.efforts[k], label("moment" if drive.quantity == "angle" else "force")),
         ):  # fmt: skip
             columns.append(FORWARD[f"<drive>_{word}"].column(values, unit, drive=drive.name))

@@ -60,25 +60,18 @@ class KinematicAlong(AlongMotion):
     ) -> None:  # fmt: skip
         self.question = question
         self._loops, self._toggles = loops, toggles
-        mechanism, sizes = question.study.mechanism, question.sizes
-        columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
-        columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
-        # Efficiencies lose all digits where no power flows: they are those of the poses.
-        columns |= {s.name: s.size for s in question.statics if s.name not in EFFICIENCIES}
-        columns |= dict.fromkeys(question.clearances, sizes["length"])
+        mechanism = question.study.mechanism
+        # Not followed: efficiencies, which lose all digits where no power flows, and errors of targets given at poses.
+        errors = {targets.error(output) for output in targets.judged(question.study)} - question.errors.keys()
+        columns = {name: size for name, (size, _) in question.columns.items() if name not in (*EFFICIENCIES, *errors)}
         super().__init__(requests)
         whole = [request for request in requests if not request.part]
-        shown = {*((*columns, *question.rates) if names is None else names), *also}
+        shown = {*(columns if names is None else names), *also}
         judged = dict.fromkeys([*also, *(request.column for request in whole)])
-        followed = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
-        columns |= {name: size for name, size in question.parts.items() if name in followed}
-        self._others = [name for name in followed if name not in columns]
-        columns = {name: size for name, size in columns.items() if name in followed}
-        columns |= dict.fromkeys(self._others, 0.0) | {
-            name: sizes.get(quantity, 0.0) * question.tempo**order
-            for name, (quantity, order) in question.orders.items()
-            if name in followed
-        }
+        followed = dict.fromkeys([*(columns if names is None else names), *judged])
+        columns |= question.parts
+        self._others = [name for name in followed if name in question.orders or name not in columns]
+        columns = {name: columns.get(name, 0.0) for name in followed}
         self.columns = tuple(columns)
         drives = set(mechanism.drives)
         self._groups = []

@@ -87,14 +87,22 @@ class Kinematics(KinematicQuestion, MotionQuestion):
         mechanism = self.motion.mechanism
         loops = four_bars(mechanism) if "loops" in names else ()
         along = along_of(self, outputs, loops, also=self.errors if "targets" in names else (), requests=requests)
+        shapes = measured(mechanism, loops, self.poses, solved)
+        return self._tables(values, names, along, loops, shapes, outputs), along
+
+    def _tables(
+        self, values: PoseValues, names: Collection[str], along: KinematicAlong | None, loops: Sequence[FourBar],
+        shapes: Sequence[Sequence[FourBar]], outputs: Collection[str] | None = None,
+    ) -> dict[str, Table]:  # fmt: skip
+        """Tables with as many rows for each design; `shapes` are the loops of each."""
         tables = pose_tables(values, names)
         if "extremes" in names:
             tables["extremes"] = extremes(values, along, outputs)
         if loops:
-            tables["loops"] = loops_table(self, measured(mechanism, loops, self.poses, solved), loops, along)
+            tables["loops"] = loops_table(self, shapes, loops, along)
         if self.study.targets and "targets" in names:
             tables["targets"] = targets_table(values, along)
-        return tables, along
+        return tables
 
     def between(self, passage: Passage) -> tuple[KinematicAlong | None, Events]:
         shapes = _shapes(passage)
@@ -115,16 +123,12 @@ class Kinematics(KinematicQuestion, MotionQuestion):
 
     def tables(self, passage: Passage) -> dict[str, Table]:
         between: Events = passage.between
-        values, along, loops = passage.values, passage.along, between.loops
-        tables = {**pose_tables(values), "extremes": extremes(values, along)}
+        along, loops = passage.along, between.loops
+        tables = self._tables(passage.values, ORDER, along, loops, between.shapes)
         if along is not None:
             tables["limits"] = limits_table(between.limits, along)
-        if loops:
-            tables["loops"] = loops_table(self, between.shapes, loops, along)
         if loops and along is not None:
             tables["toggles"] = toggles_table(between.toggles, along)
-        if self.study.targets:
-            tables["targets"] = targets_table(values, along)
         if between.cams:
             tables["cam"] = cam_table(self.study, between.cams)
         return {name: tables[name] for name in ORDER if name in tables}

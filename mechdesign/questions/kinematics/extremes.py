@@ -48,19 +48,9 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
     They are those of the columns `names`, or of all.
     """
     question = motion.question
-    study, poses, mechanism = question.study, question.poses, question.study.mechanism
-    sizes, label = question.sizes, study.units.label
-    turn = sizes["angle"]
-    # Of each column, the size that rounding is compared with, and the unit.
-    curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
-    targeted = {error(output): output for output in judged(study)}
-    curves |= {error(output): (sizes.get(kind, 0.0), label(kind)) for output, kind in judged(study).items()}
-    curves |= {static.name: (static.size, static.unit) for static in question.statics}
-    curves |= {name: (sizes["length"], label("length")) for name in question.clearances}
-    for name, (quantity, order) in question.orders.items():
-        curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]
-    if names is not None:
-        curves = {name: curve for name, curve in curves.items() if name in names}
+    poses, mechanism, turn = question.poses, question.study.mechanism, question.sizes["angle"]
+    curves = {name: curve for name, curve in question.columns.items() if names is None or name in names}
+    targeted = {error(output): output for output in judged(question.study)}
     arrays = motion.arrays
     units = [unit for _, unit in curves.values()]
     swept = poses.swept

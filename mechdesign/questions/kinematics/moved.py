@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -176,6 +177,19 @@ class MovedQuestion(PoseQuestion):
         """Columns of clearances."""
         return []
 
+    @cached_property
+    def columns(self) -> dict[str, tuple[float, str]]:
+        """Columns that have extremes: the size by which rounding is judged, and the unit."""
+        sizes, label, rates = self.sizes, self.study.units.label, self.rates
+        kinds = {output.name: output.quantity for output in self.outputs}
+        kinds |= {targets.error(output): kind for output, kind in targets.judged(self.study).items()}
+        columns = {name: (sizes.get(kind, 0.0), label(kind)) for name, kind in kinds.items()}
+        columns |= {static.name: (static.size, static.unit) for static in self.statics}
+        columns |= {name: (sizes["length"], label("length")) for name in self.clearances}
+        for name, (kind, order) in self.orders.items():
+            columns[name] = sizes.get(kind, 0.0) * self.tempo**order, rates[name]
+        return columns
+
     @property
     def poled(self) -> list[str]:
         """Columns that go to infinity where nothing is singular."""
@@ -208,8 +222,7 @@ class MovedQuestion(PoseQuestion):
             tempos += [
                 abs(rate * units.get(mechanism.quantity(name), 1.0)) ** (1 / order) for name, rate in rates.items()
             ]
-        timed = ((self.poses.slopes, 1), (self.poses.bends, 2)) if section.motion is not None else ()
-        for columns, order in timed:
+        for order, columns in enumerate(self.poses.rates if section.motion is not None else (), 1):
             tempos += [
                 float(np.abs(column).max() * units.get(mechanism.quantity(name), 1.0)) ** (1 / order)
                 for name, column in columns.items()
@@ -233,10 +246,9 @@ def _through_change_points(question: MovedQuestion, solved: SolvedPoses, arrays:
     lanes, (name,), coordinate = np.flatnonzero(near), solved.names, plan.structure.given[0]
     lane = np.repeat(lanes, len(STENCIL))
     steps = in_study_units(units, coordinate, STENCIL * (1.0 if coordinate.quantity == "angle" else mechanism.size))
-    values = (poses.named[name][lanes][:, None] + steps).reshape(1, -1)
-    slopes, bends = ({key: column[None, lane] for key, column in part.items()} for part in (poses.slopes, poses.bends))
-    beside = GivenRows({name: values}, listed=True, slopes=slopes, bends=bends)
-    around = unfilled(question.at(Poses(beside)))
+    values = (poses.named[name][lanes][:, None] + steps).ravel()
+    first, second = ({key: column[lane] for key, column in part.items()} for part in poses.rates)
+    around = unfilled(question.at(Poses(GivenRows({name: values}, listed=True, derivatives=(first, second)))))
     angles = [(angle, c) for angle, c in angles_of(question.watched).items() if angle != name]
     for part in solve_poses(around.question.motion):
         turns = {angle: radians(units, c, arrays[angle][lane[part.rows]]) for angle, c in angles}

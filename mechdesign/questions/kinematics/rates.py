@@ -57,7 +57,7 @@ def drive_rates(
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
             [radians(units, c, derivatives.get(c.name, nowhere) * pace**order) for c in coordinates]
-            for order, derivatives in ((1, poses.slopes), (2, poses.bends))
+            for order, derivatives in enumerate(poses.rates, 1)
         ))  # fmt: skip
     return inverse_rates(mechanism, linear, coordinates, rates) if inverse else rates
 

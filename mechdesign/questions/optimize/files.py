@@ -78,7 +78,7 @@ def _parted(study: Study, designs: DesignSet) -> Iterator[str]:
     (name,), listed = poses.names, poses.named[poses.names[0]]
     values = np.linspace(listed[:-1], listed[1:], BETWEEN + 2, axis=1)[:, 1:-1].ravel()
     failed = np.zeros(len(values), dtype=bool)
-    for solved in solve_poses(study.motion(Poses(GivenRows.single({name: values})))):
+    for solved in solve_poses(study.motion(Poses(GivenRows({name: values})))):
         failed[solved.rows] = ~solved.configuration.valid
     missed = np.flatnonzero(failed.reshape(-1, BETWEEN).any(axis=1)).tolist()
     unit = study.units.label(study.mechanism.quantity(name))

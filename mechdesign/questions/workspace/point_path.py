@@ -69,7 +69,7 @@ _SPEED = "speed"
 def _curve(study: Study, drive: str, low: float, high: float) -> Curve:
     """The motion of a drive between two values; the whole path is wanted, however many turns its limits leave it."""
     ends = np.array([low, high]) / (study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 1.0)
-    return curve_of(study.motion(Poses(GivenRows.single({drive: ends}))), turning=False)
+    return curve_of(study.motion(Poses(GivenRows({drive: ends}))), turning=False)
 
 
 def point_path(study: Study) -> Result:
