@@ -55,23 +55,21 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
-    "Answer": "mechdesign.api.shown",
-    "Caution": "mechdesign.cautions",
-    **dict.fromkeys(
-        ("AssemblyError", "MechanismError", "MechdesignError", "OutputError", "StudyError"),
-        "mechdesign.errors",
-    ),
-    "convert": "mechdesign.importing.conversion",
-    **dict.fromkeys(("Verdict", "requirements"), "mechdesign.report.requirements"),
-    "Column": "mechdesign.columns",
-    "Table": "mechdesign.results",
-    "Study": "mechdesign.study",
-    "load": "mechdesign.api.loading",
-    **dict.fromkeys(
-        ("kinematics", "workspace", "optimize", "reliability", "stiffness", "dynamics"),
-        "mechdesign.api.questions",
-    ),
-    **dict.fromkeys(("sweep", "sensitivities", "evaluate"), "mechdesign.api.cases"),
+    name: f"mechdesign.{home}"
+    for home, names in (
+        ("api.cases", "sweep sensitivities evaluate"),
+        ("api.loading", "load"),
+        ("api.questions", "kinematics workspace optimize reliability stiffness dynamics"),
+        ("api.shown", "Answer"),
+        ("cautions", "Caution"),
+        ("columns", "Column"),
+        ("errors", "AssemblyError MechanismError MechdesignError OutputError StudyError"),
+        ("importing.conversion", "convert"),
+        ("report.requirements", "Verdict requirements"),
+        ("results", "Table"),
+        ("study", "Study"),
+    )
+    for name in names.split()
 }
 __all__ = sorted((*_HOMES, "__version__"))
 

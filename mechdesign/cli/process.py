@@ -51,6 +51,9 @@ def run(command: Callable[[], Any]) -> None:
         stream.flush()
     if output.lost and (code is None or isinstance(code, int)):
         code = max(code or 0, _NOT_WRITTEN)
+    # Of an interrupt in a text that it evaluates, such as those of dataclasses, Python ends by the signal whatever the
+    # exit code says, unless it evaluates another one.
+    exec("")
     sys.exit(code)
 
 

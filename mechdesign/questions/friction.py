@@ -17,7 +17,7 @@ from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.statics import Balance, Reaction
 from mechdesign.motion.question import Remark
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.dynamics.schema import EFFICIENCIES
+from mechdesign.study.schema.loads import EFFICIENCIES
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
 _JAMS, _HOLDS = "jams in", "is held by"

@@ -137,6 +137,11 @@ INTERRUPTED = {
     "evaluated": """
         eval("signal.raise_signal(signal.SIGINT) or print('whole')")
     """,
+    "long evaluation": """
+        signal.raise_signal(signal.SIGINT)
+        print("whole")
+        eval("time.sleep(60)")
+    """,
     "finaliser": """
         class Thing:
             def __del__(self):
@@ -177,7 +182,8 @@ INTERRUPTED = {
 def test_an_interrupt_at_a_bad_place_comes_a_little_later(here, where):
     words = "import os, pathlib, queue, signal, sys, threading, time, weakref\nfrom mechdesign.cli import process"
     text = f"{words}\ndef command():\n{INTERRUPTED[where]}\n        time.sleep(60)\nprocess.run(command)"
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, timeout=30)
+    (here / "command.py").write_text(text)
+    done = subprocess.run([sys.executable, "-m", "command"], capture_output=True, text=True, check=False, timeout=30)
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
     assert done.stdout == ("" if where == "call back" else "whole\n")
 

@@ -27,7 +27,6 @@ from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestion
-from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import outside
@@ -37,6 +36,7 @@ from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.statistics import Request
 from mechdesign.study import Study
+from mechdesign.study.schema.loads import EFFICIENCIES
 from mechdesign.work.threads import one_thread
 
 # Tables with a row a pose, or several.

@@ -13,6 +13,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.study.schema.checker import ORDERS, Checker
 from mechdesign.study.schema.loads import (
+    EFFICIENCIES,
     VELOCITY,
     Load,
     Quantity,
@@ -27,9 +28,6 @@ from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount
-
-# Columns of a mechanism with friction, without units.
-EFFICIENCIES = ("efficiency", "back_efficiency")
 
 ROWS = 201  # of the table, where none are asked for
 MAX_ROWS = 100_000

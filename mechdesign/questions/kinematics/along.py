@@ -20,7 +20,6 @@ from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.series import Evaluate
 from mechdesign.motion.through import Through
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import APART
 from mechdesign.questions.kinematics import corners, targets
 from mechdesign.questions.kinematics.columns import OVER
@@ -28,6 +27,7 @@ from mechdesign.questions.kinematics.moved import MovedQuestion, full
 from mechdesign.questions.kinematics.rates import moving_at, unitless
 from mechdesign.results import POSES_ONLY
 from mechdesign.statistics import Request
+from mechdesign.study.schema.loads import EFFICIENCIES
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction.

@@ -14,7 +14,6 @@ from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.jacobians import mixes
 from mechdesign.mechanism.plates import CLEARANCE, Pair, pairs_of, plate_of
 from mechdesign.motion.rows import Poses
-from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.friction import JointFriction
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.instant_centres import Centre
@@ -23,7 +22,7 @@ from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import coordinates_in
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.study import Study
-from mechdesign.study.schema.loads import joints_of
+from mechdesign.study.schema.loads import EFFICIENCIES, joints_of
 
 # Columns of a cam behind the name of its coupling, and their kinds of quantity.
 CAM_COLUMNS: Mapping[str, Quantity] = {"pressure_angle": "angle", "curvature_radius": "length"}

@@ -21,6 +21,8 @@ from mechdesign.study.text.units import Amount
 
 # Ending of a coordinate's name that stands for its velocity in an expression.
 VELOCITY = "_velocity"
+# Columns of a mechanism with friction, without units.
+EFFICIENCIES = ("efficiency", "back_efficiency")
 
 Quantity = Amount | Expression
 
