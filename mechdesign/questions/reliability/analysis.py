@@ -85,7 +85,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files,
         f"interrupted: {samples} samples, {named}" if stopped else "",
-        tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,
+        tables.drawn_errors(task, sampled), reached=bool(failed) or not allocated.failed,
     )  # fmt: skip
     if stopped:
         raise Interrupted(result)

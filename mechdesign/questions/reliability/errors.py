@@ -81,7 +81,8 @@ class Errors(PoseQuestion):
         return {name: np.zeros((0, *shape)) for name, shape in parts.items()}
 
     def values(self, part: SolvedPoses) -> Mapping[str, Any]:
-        nominal, linear, closing, elastic = self.linearized(part.configuration, self.rates(part), part.rows)
+        nominal, linear, elastic = self.linearized(part.configuration, self.rates(part), part.rows)
+        closing = self.closing(part.configuration, part.rows)
         arrays = {
             "nominal": nominal, "components": linear.components, "closing": closing.components,
             "margins": closing.offset,
@@ -90,11 +91,10 @@ class Errors(PoseQuestion):
 
     def linearized(
         self, configuration: Configuration, rates: DriveRates, rows: Ints | None = None
-    ) -> tuple[Floats, FirstOrder, FirstOrder, Elastic | None]:
-        """Values of all that is judged, shape (channels, n), the linear models of its errors and of the margins.
+    ) -> tuple[Floats, FirstOrder, Elastic | None]:
+        """Values of all that is judged, shape (channels, n), the linear model of its errors, and the deflections.
 
-        With them the deflections. A made mechanism with a negative margin cannot be assembled. The drives are held.
-        `rows` are those of a flat batch of configurations among the poses, where designs differ.
+        The drives are held. `rows` are those of a flat batch of configurations among the poses, where designs differ.
         """
         mechanism, channels, sources, forces = self.study.mechanism, self.question.whole, self.sources, self.forces
         if rows is not None:
@@ -104,13 +104,16 @@ class Errors(PoseQuestion):
         by_name = derivatives(mechanism, configuration, channels, names, rates, elastic, forces)
         offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
         nominal = nominal_values(mechanism, configuration, channels, rates, forces)
+        values = np.stack(np.broadcast_arrays(*nominal, offset[0])[:-1])
+        return values, FirstOrder(sources, _chained(slopes, by_name), offset), elastic
+
+    def closing(self, configuration: Configuration, rows: Ints | None = None) -> FirstOrder:
+        """Linear model of the margins of assembly; a made mechanism with a negative one cannot be assembled."""
+        sources = self.sources if rows is None else self.sources.take(rows)
+        names, slopes = sources.directions
         moved = [k for k, name in enumerate(names) if name not in LOADS]
-        margins, margins_by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
-        return (
-            np.stack(np.broadcast_arrays(*nominal, offset[0])[:-1]),
-            FirstOrder(sources, _chained(slopes, by_name), offset),
-            FirstOrder(sources, _chained(slopes[:, moved], margins_by_name), margins), elastic,
-        )  # fmt: skip
+        margins, by_name = closures(self.study.mechanism.linearize(configuration), [names[k] for k in moved])
+        return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
 
 
 def _chained(slopes: Floats, by_name: Floats) -> Floats:

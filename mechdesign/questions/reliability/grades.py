@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from heapq import heappop, heappush
 from itertools import islice
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,13 +25,6 @@ _TOGETHER = 64
 _ROUNDING = 1e-9
 # Sum of the costs of all grades in the programme, of which differences above 1e-6 count.
 _COSTS = 1e6
-
-
-class Graded(NamedTuple):
-    """Factors of all tolerances, and a lower bound of the cost of any choice that reaches the target levels."""
-
-    scales: Floats
-    bound: float
 
 
 class _Choices:
@@ -63,15 +55,18 @@ class _Choices:
         return np.asarray(~short.any(axis=(0, 2)))
 
 
-def graded(model: ToleranceModel, targets: Floats) -> Graded:
-    """The cheapest choice that reaches the levels `targets`, shape (limits, poses); the finest where none does."""
+def graded(model: ToleranceModel, targets: Floats) -> tuple[Floats, float]:
+    """Factors of all tolerances in the cheapest choice that reaches the levels `targets`, shape (limits, poses).
+
+    With them a lower bound of the cost of any such choice. They are those of the finest grades where none reaches them.
+    """
     choices = _Choices(model, targets)
     best = np.zeros((1, len(model.free)), dtype=np.intp)
     bound = float(choices.cost(best)[0])
     if choices.reach(best)[0]:
         conditions = _conditions(choices)
         best, bound = _compared(choices, best) if conditions is None else _programmed(choices, best, *conditions)
-    return Graded(choices.scales(best)[:, 0], bound)
+    return choices.scales(best)[:, 0], bound
 
 
 def _programmed(choices: _Choices, finest: Ints, variances: list[Floats], most: Floats) -> tuple[Ints, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechdesign.columns import Column
 from mechdesign.motion.rows import Poses
@@ -277,10 +278,25 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class DrawnErrors(Drawn):
-    """The poses at which errors were asked, and samples at one of them; None where no method samples errors."""
+    """The poses at which errors were asked, and samples at one of them; None where no method samples errors.
+
+    `limits` are the lowest and highest error of each limited output and order, of a circle for both coordinates of its
+    point, in the study's units; numbers or arrays of poses.
+    """
 
     poses: Poses
     samples: Samples | None
+    limits: Mapping[tuple[str, str], tuple[ArrayLike, ArrayLike]]
+
+
+def drawn_errors(task: Task, sums: Mapping[int, Sums]) -> DrawnErrors:
+    """What pictures show of a task and its samples, by pose."""
+    output, order, _ = task.labels
+    limits = {
+        (str(output[k]), str(order[k])): ((-limit.high if limit.round else limit.low) * scale, limit.high * scale)
+        for limit in task.question.at(task.nominal).limits for k in limit.channels for scale in (task.scale[k],)
+    }  # fmt: skip
+    return DrawnErrors(task.poses, drawn_samples(task, sums), limits)
 
 
 def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:

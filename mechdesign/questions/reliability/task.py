@@ -45,7 +45,7 @@ class Task:
     linear : FirstOrder
         The linear error model of the channels.
     closing : FirstOrder
-        The linear model of the margins of assembly, see `first_order.linear_margins`.
+        The linear model of the margins of assembly, negative where a made mechanism cannot be assembled.
     settings : sequence of Setting
         A `Setting` for each pose that can be assembled, in the order of the poses: what a made mechanism is solved
         with there, and how its error is judged. ``setting.pose`` is the pose's place in the arrays above. It is empty

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.question import OF_DYNAMICS, ORDERS
-from mechdesign.questions.reliability.schema.limits import SUFFIXES as ORDER_SUFFIXES
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
-
-SUFFIXES = dict(zip(ORDERS, (*ORDER_SUFFIXES, ""), strict=True))
 
 
 def look(name: str) -> Method:
@@ -58,31 +52,12 @@ def channels(table: Table) -> list[tuple[str, str, str]]:
     quantities = dict.fromkeys(
         zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True)
     )
-    return sorted(quantities, key=lambda channel: list(SUFFIXES).index(channel[1]))
+    return sorted(quantities, key=lambda channel: ORDERS.index(channel[1]))
 
 
 def heading(output: str, order: str) -> str:
     """An output by its name, its velocity as such."""
     return output if order in ("position", OF_DYNAMICS) else f"{output} {order}"
-
-
-def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: str) -> Floats:
-    """Lowest and highest error allowed (study units) of a coordinate, or by the circle about its point; inf if none.
-
-    Shape (2, poses), or (2, 1) where they are those of all poses.
-    """
-    section = ReliabilitySection.of(study)
-    band = section.limits.get(f"{output}{SUFFIXES[order]}")
-    if band is not None and band.absolute:
-        table = tables["capability"]
-        own = table.take(table.where(output=output, order=order, method=table["method"][0]))
-        ends = np.stack([own["lsl"], own["usl"]]) - own["nominal"]
-        return np.where(np.isnan(ends), [[-np.inf], [np.inf]], ends)
-    if band is not None:
-        return np.array([[-np.inf if band.min is None else band.min], [np.inf if band.max is None else band.max]])
-    circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
-    radius = np.inf if circle is None or circle.radius is None else circle.radius
-    return np.array([[-radius], [radius]])
 
 
 def apart(limits: tuple[float, float], low: float, high: float) -> tuple[list[float], list[float]]:

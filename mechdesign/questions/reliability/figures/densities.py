@@ -49,9 +49,7 @@ def density_picture(view: ErrorsView) -> Picture | None:
     near = np.where(np.abs(outline) < _FAR_FROM_ERRORS * reach, outline, 0.0)
     ends, marks = _ends([*ellipses, errors[:, failed][:, :MAX_MARKS], near]), list[PanelMark]()
     if near.any():
-        marks.append(Own(partial(_tinted, outline)))
-        edge = {"color": style.VERMILION, "linewidth": 1.8, "zorder": 2.6}
-        marks.append(Trace(*outline, label=limits, look=edge))
+        marks.append(Own(partial(_outlined, outline), label=limits))
     region, method = smoothed(errors), look(view.method).words
     if region is not None:
         colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
@@ -158,10 +156,12 @@ def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
     return outline, "limits" * bool(limits), f"limits outside: {', '.join(far)}" if far else ""
 
 
-def _tinted(outline: Floats, axes: Axes) -> None:
-    """Tint what lies beyond the limits."""
+def _outlined(outline: Floats, axes: Axes) -> Patch:
+    """Draw the limits as a line, and tint what lies beyond them; returns the line."""
     axes.set_facecolor(_BEYOND)
     axes.fill(*outline, color="white", zorder=0.4)
+    (line,) = axes.fill(*outline, fill=False, edgecolor=style.VERMILION, linewidth=1.8, zorder=2.6)
+    return line
 
 
 def _ends(parts: Sequence[Floats]) -> tuple[Ends, Ends]:

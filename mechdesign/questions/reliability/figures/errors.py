@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.poses import pose_in_words
@@ -16,7 +17,6 @@ from mechdesign.report.figures.looks import (
     best_moments,
     best_probability,
     channels,
-    error_limits,
     heading,
     look,
     methods,
@@ -25,7 +25,6 @@ from mechdesign.report.figures.marks import Area, Axis, Dots, Lines, Panel, Pane
 from mechdesign.report.figures.panels import MAX_PANELS, Along, maps, number
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
-from mechdesign.study import Study
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
 MAX_MAPS = 4
@@ -43,21 +42,23 @@ _LIMIT = {"color": style.VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.4}
 @picture(ErrorsView, "bands", "deviations", order=10)
 def sweep_pictures(view: ErrorsView) -> dict[str, Picture] | None:
     """Bands of the errors and standard deviations over the sweep, with the difference of the methods [S3]."""
-    study, tables, swept = view.study, view.result.tables, view.swept
+    moments, swept = view.result.tables["moments"], view.swept
     if swept is None:
         return None
-    shown = channels(tables["moments"])[:MAX_PANELS]
-    bands = [_band(study, tables, swept, *channel) for channel in shown]
+    ends = view.drawn.limits
+    bands = [_band(moments, swept, ends.get((output, order), (-np.inf, np.inf)), output, order, unit)
+             for output, order, unit in channels(moments)[:MAX_PANELS]]  # fmt: skip
     return {
         "bands": Picture("Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations", bands, share="x"),
-        "deviations": _deviations(tables["moments"], swept),
+        "deviations": _deviations(moments, swept),
     }
 
 
-def _band(study: Study, tables: Mapping[str, Table], swept: Along, output: str, order: str, unit: str) -> Panel:
+def _band(
+    moments: Table, swept: Along, ends: tuple[ArrayLike, ArrayLike], output: str, order: str, unit: str
+) -> Panel:  # fmt: skip
     """Mean error and three standard deviations to both sides: computed ones as a band, simulated ones as dots."""
-    moments, x = tables["moments"], swept.values
-    shown = methods(moments)
+    x, shown = swept.values, methods(moments)
     filled = next((method for method in shown if not look(method).sampled), None)
     marks: list[PanelMark] = [Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})]
     largest = 0.0
@@ -73,8 +74,8 @@ def _band(study: Study, tables: Mapping[str, Table], swept: Along, output: str, 
             continue
         own = _line(drawn) | {"linewidth": 1.2, "markersize": 2.8, "markevery": max(1, len(x) // _most_dots())}
         marks += [Trace(x, value, label=drawn.words, look=own) for value in (mean - reach, mean, mean + reach)]
-    limits, far = np.broadcast_to(error_limits(study, tables, output, order), (2, len(x))), []
-    for limit in limits:
+    far = []
+    for limit in (np.broadcast_to(end, len(x)) for end in ends):
         near = np.where(np.abs(limit) < _FAR_FROM_ERRORS * largest, limit, np.nan)
         if np.isfinite(near).any():
             marks.append(Trace(x, near, label="limit of the error", look=_LIMIT))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +26,8 @@ def _numbers(text: str) -> Floats:
     return np.array([math.nan if word == "-" else float(word) for word in text.split()])
 
 
-# Rows of the tables of ISO 286-1 by their names; the file says what they are.
-_LINES = Path(__file__).with_name("iso_286.txt").read_text(encoding="utf-8").splitlines()
+# Rows of the tables of both standards by their names; the file says what they are.
+_LINES = Path(__file__).with_name("iso_tables.txt").read_text(encoding="utf-8").splitlines()
 _TABLES = {name: _numbers(row) for name, _, row in (line.partition(" ") for line in _LINES) if name != "#"}
 _ENDS, _FINE_ENDS = _TABLES["SIZES"], _TABLES["FINE_SIZES"]
 # Largest size with fundamental deviations other than 0 here, mm.
@@ -41,23 +40,8 @@ LETTERS = (*(letter for letter in _DEVIATIONS if letter < "h"), "h", "js", "j", 
 _COARSE = 14
 _CLEARANCE = LETTERS[: LETTERS.index("h") + 1]
 
-# Upper ends of the ranges of ISO 2768-1, mm, and half the tolerances of each class there: lengths, mm (table 1), and
-# angles by the length of the shorter leg, degrees (table 3).
-_LENGTH_ENDS = _numbers("3 6 30 120 400 1000 2000 4000")
+# Smallest length of ISO 2768-1, mm.
 _SMALLEST_LENGTH = 0.5
-_LENGTHS = {
-    "f": _numbers("0.05 0.05 0.1 0.15 0.2 0.3 0.5 -"),
-    "m": _numbers("0.1 0.1 0.2 0.3 0.5 0.8 1.2 2"),
-    "c": _numbers("0.2 0.3 0.5 0.8 1.2 2 3 4"),
-    "v": _numbers("- 0.5 1 1.5 2.5 4 6 8"),
-}
-_LEG_ENDS = _numbers("10 50 120 400 inf")
-_ANGLES = {
-    "f": np.array([1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12]),
-    "m": np.array([1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12]),
-    "c": np.array([1.5, 1.0, 1 / 2, 1 / 4, 1 / 6]),
-    "v": np.array([3.0, 2.0, 1.0, 1 / 2, 1 / 3]),
-}
 
 _CLASS = re.compile(r"([A-Za-z]{1,2})([1-9]\d?)")
 _GENERAL = re.compile(r"ISO\s*2768(?:-1)?\s*[- ]\s*(\w+)", re.IGNORECASE)
@@ -89,11 +73,11 @@ def deviations(text: str, size: ArrayLike) -> tuple[Number, Number]:
     general, size = _GENERAL.fullmatch(text.strip()), np.asarray(size, dtype=float)
     if general is None:
         return _by_class(text.strip(), size)
-    table = _of_general(general[1], _LENGTHS)
-    half = table[np.minimum(np.searchsorted(_LENGTH_ENDS, size), len(table) - 1)]
+    table = _of_general("length", general[1])
+    half = table[np.minimum(np.searchsorted(_TABLES["LENGTHS"], size), len(table) - 1)]
     least = 3.0 if general[1] == "v" else _SMALLEST_LENGTH
-    most = _LENGTH_ENDS[-2] if general[1] == "f" else _LENGTH_ENDS[-1]
-    wrong = (size < _SMALLEST_LENGTH) | (size > _LENGTH_ENDS[-1]) | np.isnan(half)
+    most = _TABLES["LENGTHS"][-2] if general[1] == "f" else _TABLES["LENGTHS"][-1]
+    wrong = (size < _SMALLEST_LENGTH) | (size > _TABLES["LENGTHS"][-1]) | np.isnan(half)
     if wrong.any():
         first = size[wrong][0]
         raise ToleranceClassError(
@@ -107,7 +91,7 @@ def angle_deviations(text: str, leg: ArrayLike) -> tuple[Number, Number]:
     general = _GENERAL.fullmatch(text.strip())
     if general is None:
         raise ToleranceClassError(f"{text!r} is of lengths; of angles give a number, or ISO 2768-m with the 'leg'")
-    half = _of_general(general[1], _ANGLES)[np.searchsorted(_LEG_ENDS, leg)]
+    half = _of_general("angle", general[1])[np.searchsorted(_TABLES["LEGS"], leg)] / 60.0
     return -half, half
 
 
@@ -136,10 +120,10 @@ def _width(grade: int, size: Floats) -> Floats:
     return np.asarray(_GRADES[grade - 1][np.searchsorted(_ENDS, size)])
 
 
-def _of_general(letter: str, table: Mapping[str, Floats]) -> Floats:
-    if letter not in table:
+def _of_general(kind: str, letter: str) -> Floats:
+    if f"{kind}-{letter}" not in _TABLES:
         raise ToleranceClassError(f"ISO 2768-1 has the classes ISO 2768-f, -m, -c and -v, not {letter!r}")
-    return table[letter]
+    return _TABLES[f"{kind}-{letter}"]
 
 
 def _by_class(text: str, size: Floats) -> tuple[Number, Number]:

@@ -41,8 +41,9 @@ def prepare(study: Study) -> Evaluate:
     rates = constant_rates(study.mechanism, study.units, section, study.mechanism.drives)
 
     def evaluate(configuration: Configuration) -> Floats:
-        nominal, linear, margins, _ = errors.linearized(configuration, rates)
-        return 1.0 - made_failure(model_of(question, linear, nominal), margins, question.at(nominal).limits)[0]
+        nominal, linear, _ = errors.linearized(configuration, rates)
+        limits, margins = question.at(nominal).limits, errors.closing(configuration)
+        return 1.0 - made_failure(model_of(question, linear, nominal), margins, limits)[0]
 
     return of_configurations(evaluate)
 
