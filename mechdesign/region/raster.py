@@ -278,11 +278,15 @@ def _open(margins: Floats, away: Floats, row: Ints, column: Ints, lane: Ints) ->
         largest = margin[row, column, lane]
         below = np.flatnonzero(~(largest > 0))
         largest[below] = _most(margin, from_middle, row[below], column[below], lane[below])
-        unknown = np.flatnonzero(np.isnan(largest))
-        if unknown.size:
-            # A margin that is unknown beside a stretched leg is judged by the neighbouring cells.
-            beside = _beside(margin, row[unknown], column[unknown])
-            largest[unknown] = np.fmax.reduce([_most(margin, from_middle, *place, lane[unknown]) for place in beside])
+        excluded = np.flatnonzero(~(largest > 0))
+        beside = _beside(margin, row[excluded], column[excluded])
+        unknown = np.isnan([largest[excluded], *(margin[*place, lane[excluded]] for place in beside)]).any(axis=0)
+        if unknown.any():
+            # A margin that is unknown there or beside, at a stretched leg, is judged by the neighbouring cells as well.
+            some, of = excluded[unknown], lane[excluded[unknown]]
+            places = ((rows[unknown], columns[unknown]) for rows, columns in beside)
+            around = [_most(margin, from_middle, *place, of) for place in places]
+            largest[some] = np.fmax.reduce([largest[some], *around])
         keep = largest > 0
         row, column, lane = row[keep], column[keep], lane[keep]
     return row, column, lane
