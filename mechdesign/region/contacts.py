@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.roots import parabola
+from mechdesign.numerics.roots import AROUND, lowest_near, parabola
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import BATCH, Designs, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape
@@ -39,11 +39,10 @@ MORE_LOOKS = 5
 EVENLY = np.array([-0.7, -0.35, 0.35, 0.7])[:, None]
 NEARER = np.array([0, 1e-4, -1e-4, 0.01, -0.01])[:, None]
 # A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
-# parabolas lead from the place where a margin is lowest to the hole: their sampling distances, the samples around the
-# place, and the longest step, in sampling distances.
+# parabolas lead from the place where a margin is lowest to the hole: their sampling distances, and the longest step, in
+# sampling distances.
 LATTICE = (np.linspace(-1.2, 1.2, 11) + 1j * np.linspace(-1.2, 1.2, 11)[:, None]).ravel()
 PARABOLAS = (0.12, 0.006)
-AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 FARTHEST = 5.0
 # Gaps of a ray shorter than this part of its reach are points where a leg has no length: squares of lengths are exact
 # to rounding only.
@@ -120,13 +119,10 @@ class Contacts:
             # A parabola through the places around leads to the lowest: for squares of distances it is exact.
             around = part + step * AROUND[:, None, None]
             around_values = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
-            here, right, left, up, down, across = around_values[margin, :, margin, lanes].transpose(2, 0, 1)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-                xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
-                det = xx * yy - xy * xy
-                way = (gy * xy - gx * yy) / det + 1j * (gx * xy - gy * xx) / det
-                good = (xx > 0) & (det > 0) & (np.abs(way) < FARTHEST)
+            (dx, dy), good, _ = lowest_near(around_values[margin, :, margin, lanes].transpose(2, 0, 1))
+            way = dx + 1j * dy
+            with np.errstate(invalid="ignore"):
+                good &= np.abs(way) < FARTHEST
             part = part + step * np.where(good, way, 0.0)
         way = shape.width * part.real + 1j * shape.height * part.imag
         there = margins(part)[margin, margin, lanes] < -rounding

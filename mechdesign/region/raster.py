@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.roots import AROUND, lowest_near
 from mechdesign.region.crossings import passed
 from mechdesign.region.intervals import Intervals
 from mechdesign.region.rays import Designs, ray_through
@@ -25,8 +26,6 @@ BLOCK = 1 << 17
 EDGE = 0.5
 # Sampling distances of the successive parabolas that lead to the minimum of a margin (cells).
 PARABOLAS = (1.0, 0.1)
-# Samples of one parabola: the place itself, right, left, up, down and across (sampling distances).
-AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 # Longest step of a parabola in x and y (cells).
 FARTHEST = 1.0
 # How often a cell that may hold a sliver is divided.
@@ -161,15 +160,12 @@ class Raster:
         for step in PARABOLAS:
             x, y = step * cell.real, step * cell.imag
             around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
-            centre, right, left, up, down, across = mode.field.margins(around, places)[margin, :, every].T
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-                xx, yy, xy = right + left - 2 * centre, up + down - 2 * centre, across + centre - right - up
-                det = xx * yy - xy * xy
-                dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
-                converges &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
+            values = mode.field.margins(around, places)[margin, :, every].T
+            (dx, dy), low, fall = lowest_near(values)
+            with np.errstate(invalid="ignore"):
+                converges &= low & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
                 # Twice the depth of the parabola, which only approximates the margin.
-                converges &= centre + gx * dx + gy * dy < 0
+                converges &= values[0] + fall < 0
             place = place + np.where(converges, x * dx, 0.0) + 1j * np.where(converges, y * dy, 0.0)
         return designs[lane[converges]], place[converges]
 
