@@ -53,9 +53,7 @@ class Raster:
     inside : ndarray of bool, shape (designs, rows, columns)
         Whether the centre of each cell lies in the region.
     holes, slivers : (ndarray of int, complex ndarray)
-        Designs and places in holes, and in slivers of the region, that hold no centre.
-    undecided : list of (ndarray of int, complex ndarray, complex ndarray)
-        Designs, centres and sizes of cells that may hold slivers thinner still.
+        Designs and places in holes, and where slivers of the region are or may be, that hold no centre.
     cut : ndarray of bool, shape (designs,)
         Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
     """
@@ -66,7 +64,6 @@ class Raster:
     inside: Flags
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
-    undecided: list[tuple[Ints, Complexes, Complexes]]
     cut: Flags
 
     @staticmethod
@@ -79,7 +76,7 @@ class Raster:
             empty = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank, cut = np.zeros((designs.count, cells, cells), dtype=bool), np.zeros(designs.count, dtype=bool)
             raster, holes = (
-                Raster(designs, low, (high - low) / cells, blank, empty, empty, [], cut),
+                Raster(designs, low, (high - low) / cells, blank, empty, empty, cut),
                 [empty],
             )
             slivers = [empty]
@@ -114,12 +111,11 @@ class Raster:
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
         Cells that no margin excludes are divided once, and again while that takes no more points than the raster has.
-        Cells left then count as undecided if no part of them lies inside and each margin is positive at some part.
+        In cells left then slivers may be that are thinner still.
         """
         row, column, lane = _open(margins, away, *np.nonzero(scanned & ~_spread(inside)))
         design, place, cell = designs[lane], place[row, column, lane], self.cell[designs[lane]]
         cell_design, witness, cell_of_part = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
-        rises = np.zeros(len(lane), dtype=bool)
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
         for division in range(DIVISIONS):
@@ -135,11 +131,9 @@ class Raster:
             row, column, lane = _open(margins.reshape(shape), away.reshape(shape), *misses)
             at = row * PARTS + column
             design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
-            rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         hit = ~np.isnan(witness)
-        open_ = rises & ~hit[cell_of_part]
-        self.undecided.append((design[open_], place[open_], cell[open_]))
-        return cell_design[hit], witness[hit]
+        left = ~hit[cell_of_part]
+        return np.concatenate([cell_design[hit], design[left]]), np.concatenate([witness[hit], place[left]])
 
     def _between_centres(
         self, mode: Designs, designs: Ints, z: Complexes, margins: Floats, inside: Flags
