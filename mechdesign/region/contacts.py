@@ -16,13 +16,8 @@ from mechdesign.region.panels import Panels
 from mechdesign.region.rays import BATCH, Designs, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape
 
-# The final check of an outline: its places, and the places between the centre and one of them.
+# Places of an outline in its final check.
 CHECKED = 720
-CHECKED_ALONG = 101
-# The checked outline is smaller by this part, so that one that just touches the boundary passes.
-TOUCHING = 1e-7
-# Rounds of the check: an outline that lies outside shrinks and is checked again.
-ROUNDS = 4
 # Contacts of a shape: so many of the lowest local minima of the scale over the rays, and one at a hole between rays.
 MINIMA = 6
 CONTACTS = MINIMA + 1
@@ -154,26 +149,12 @@ class Contacts:
 
     def checked(self) -> Floats:
         """The scale, or less where the outline lies outside between the rays that were traced so far."""
-        scale, lanes = self.scale.copy(), np.arange(len(self._centre))
-        theta, scales = self._spread(CHECKED)
-        around, beside = _valleys(theta, scales)
+        scale = self.scale.copy()
+        around, beside = _valleys(*self._spread(CHECKED))
         contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
         np.minimum.at(
             scale, lane, self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, MORE_LOOKS)[1]
         )
-        for _ in range(ROUNDS):
-            outline = (1 - TOUCHING) * scale * self._shape.radius(theta) * np.exp(1j * theta)
-            place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
-            if not lane.size:
-                break
-            lowest_scale = self.at(lane, theta[place, lane], scale[lane])
-            # Where a ray leaves the region and comes back between two of its samples, places along it tell.
-            passed = np.flatnonzero(lowest_scale >= scale[lane])
-            along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
-            first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
-            lowest_scale[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
-            # A smaller outline may pass through what the larger one had left behind.
-            np.minimum.at(scale, lane, lowest_scale)
         return scale
 
     def at(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:

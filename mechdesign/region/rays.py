@@ -129,10 +129,6 @@ class Designs:
         """Where the rays of each of `design` start."""
         return np.full(design.shape, self.about) if self.centres is None else self.centres[design]
 
-    def inside(self, z: Complexes, design: Ints) -> Flags:
-        """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
-        return np.asarray(np.logical_or.reduce([mode.look(z, design)[0] for mode in self.members]))
-
     def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats, Floats]:
         """Whether places lie in the region of one mode, and margins there, shape (margins, places, designs).
 
