@@ -44,11 +44,6 @@ FARTHEST = 5.0
 POINT = 1e-7
 # Margins below this part of the largest one are rounding.
 ROUNDING = 1e-12
-# Where rays meet many intervals, one that begins inside is traced over so many of them, and farther by this factor as
-# long as it does not end.
-FIRST = 2.0
-MANY = 8
-FARTHER = 4.0
 # Angle between the rays on either side of a hole (radians).
 ABOUT_HOLE = 1e-3
 # A contact is at a corner of the shape if its direction is this near to the corner's (radians).
@@ -73,9 +68,6 @@ class Contacts:
             every, places=every.of(design), count=len(design), centres=centre, effort=BATCH
         )  # fmt: skip
         self._reach = np.abs(centre - every.about) + panels.reach[design]
-        intervals = np.zeros(len(panels.closes), dtype=np.intp)
-        np.maximum.at(intervals, panels.design, panels.intervals)
-        self._near = np.where(intervals > MANY, FIRST / np.maximum(intervals, 1), 1.0)[design] * self._reach
         _, traced, inside = panels.through(design, centre)
         self._inside = np.bincount(traced.ray[inside], minlength=len(design)) > 0
         around, beside = _valleys(*self._spread(RAYS))
@@ -166,6 +158,7 @@ class Contacts:
         return self._radii(lane, theta, most * radius) / radius
 
     def _radii(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
+        """Where rays leave or enter the region for the first time."""
         if not lane.size:
             return np.zeros(0)
         inside, reach, begin = self._inside[lane], self._reach[lane], np.zeros(len(lane))
@@ -174,25 +167,15 @@ class Contacts:
             reach = np.minimum(reach, end)
         # Nothing counts that lies beyond the scan, or farther away than asked for.
         reach = np.where(inside, np.minimum(reach, most), reach)
-        ends, left, far = np.zeros(len(lane)), np.arange(len(lane)), np.where(inside, self._near[lane], reach)
-        while left.size:
-            far = np.minimum(far, reach)
-            ends[left] = self._ends(lane[left], theta[left], far[left], begin[left], POINT * reach[left])
-            left = left[inside[left] & (far[left] <= ends[left]) & (far[left] < reach[left])]
-            far = FARTHER * far
-        return ends
-
-    def _ends(self, lane: Ints, theta: Floats, reach: Floats, begin: Floats, near: Floats) -> Floats:
-        """Where rays of a given reach leave or enter the region for the first time; gaps up to `near` do not count."""
         traced = trace(self._designs, lane, theta, reach)
-        ray, inner, outer, _, _ = traced.whole(near[traced.ray[1:]])
+        ray, inner, outer, _, _ = traced.whole(POINT * reach[traced.ray[1:]])
         first = np.searchsorted(ray, np.arange(len(lane)))
         meets = np.append(ray, -1)[first] == np.arange(len(lane))
         inner, outer = (np.append(ends, np.inf)[np.where(meets, first, -1)] for ends in (inner, outer))
         inner = np.maximum(inner, begin)
         # A ray that begins in a piece that does not count has to leave that piece.
         enters = np.where(inner > 0, np.where(inner < outer, inner, np.inf), outer)
-        return np.where(self._inside[lane], np.where(inner > 0, 0.0, outer), enters)
+        return np.where(inside, np.where(inner > 0, 0.0, outer), enters)
 
     def slopes(self) -> Floats:
         """How the contacts' scales change with the shape, as `Shape.slopes`, shape (3, contacts, lanes)."""
