@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Values of the functions `which` (indices of brackets) at `x`.
 Evaluate = Callable[[Ints, Floats], Floats]
@@ -24,6 +24,8 @@ MAX_PARABOLAS = 24
 LOWEST_ACCURACY = 1e-9
 # A function counts as too high if it would have to fall this many times as far as convexity allows.
 STEEP = 2.0
+# Samples of a parabola in the plane: the place itself, right, left, up, down and across (sampling distances).
+AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 
 
 def bracketed_roots(
@@ -143,3 +145,24 @@ def parabola(x: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
         return fall, rise, b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)
+
+
+def lowest_near(values: Floats) -> tuple[Floats, Flags, Floats]:
+    """Of the parabola in the plane through samples `AROUND` a place: the way to its vertex, in sampling distances.
+
+    Parameters
+    ----------
+    values : ndarray, shape (6, ...)
+
+    Returns
+    -------
+    (way, low, fall)
+        The way in x and in y, shape (2, ...); whether the parabola is lowest there; twice its change as far as there.
+    """
+    here, right, left, up, down, across = values
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gx, gy = 0.5 * (right - left), 0.5 * (up - down)
+        xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
+        det = xx * yy - xy * xy
+        dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
+        return np.array([dx, dy]), np.asarray((xx > 0) & (det > 0)), gx * dx + gy * dy

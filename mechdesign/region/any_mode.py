@@ -1,7 +1,7 @@
 """Regions in any assembly: where the point can be with some way of putting the legs together, both elbows of an arm.
 
 Each assembly mode has a region of its own, and a place belongs to the first mode, the sketch's before others, that
-reaches it. Along a ray an interval ends, too, where the mode changes, so that indices are smooth within each.
+reaches it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.field import Field, Places
-from mechdesign.region.intervals import SAME_ROOT, Intervals, intervals_between
-from mechdesign.region.rays import NARROWEST, Designs
 
 
 def in_any_assembly(field: Field) -> Field:
@@ -109,63 +107,3 @@ class AnyMode(Field):
         every = range(len(nears))
         near = {name: np.select([chosen == k for k in every], [nears[k][name] for k in every]) for name in nears[0]}
         return replace(pose, near=near)
-
-
-@dataclass(frozen=True, eq=False)
-class AnyModeDesigns(Designs):
-    """Rays through a region of `AnyMode`."""
-
-    @cached_property
-    def members(self) -> tuple[Designs, ...]:
-        """The designs in each mode."""
-        common = self.places, self.count, self.about, self.scan, self.effort, self.centres
-        return tuple(Designs(field, *common) for field in self.field.members)
-
-    @property
-    def in_any_assembly(self) -> Designs:
-        """The same designs: no margin of the assembly is among theirs."""
-        return self
-
-    def inside(self, z: Complexes, design: Ints) -> Flags:
-        """As `Designs.inside`, in any of the modes."""
-        return np.asarray(np.logical_or.reduce([mode.inside(z, design) for mode in self.members]))
-
-    def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
-        """As `Designs.traced`: the intervals of each mode, less those of the modes before it."""
-        first, *others = (mode.traced(design, theta, reach, slack) for mode in self.members)
-        labels = len(self.members[0].field.labels)
-        for number, other in enumerate(others, start=1):
-            first = _with(first, _renamed(other, number * labels), reach, slack)
-        return first
-
-
-def _renamed(intervals: Intervals, shift: int) -> Intervals:
-    """Intervals whose labels are counted from `shift`."""
-    enters, leaves = (np.where(ends >= 0, ends + shift, ends) for ends in (intervals.enters, intervals.leaves))
-    return replace(intervals, enters=enters, leaves=leaves)
-
-
-def _with(before: Intervals, other: Intervals, reach: Floats, slack: float) -> Intervals:
-    """Intervals of both on the same rays, the other ones less those `before`; ends at which both meet are the same."""
-    # Of the other ones an end is a root of their own margin, and the gaps between those before are where another is
-    # positive: its roots keep the names of the margins that bound the gap.
-    rising = [(other.enters, other.inner, other.ray), (before.leaves, before.outer, before.ray)]
-    falling = [(other.leaves, other.outer, other.ray), (before.enters, before.inner, before.ray)]
-    roots = [tuple(values[ends[0] >= 0] for values in ends) for ends in (*rising, *falling)]
-    margin, radius, ray = (np.concatenate(column) for column in zip(*roots, strict=True))
-    turn = np.repeat([1, 1, -1, -1], [len(root[0]) for root in roots])
-    rays = len(reach)
-    start = 1 - np.bincount(other.ray[other.enters < 0], minlength=rays)
-    start = start + np.bincount(before.ray[before.enters < 0], minlength=rays)
-    rest = intervals_between(margin, ray, turn, radius, start, reach, slack)
-    # What rounding leaves beside an interval is none; by itself it may be the tip of a cusp.
-    tie = SAME_ROOT * reach[rest.ray]
-    beside = np.zeros(len(rest.ray), dtype=bool)
-    for inner, outer in zip(*before.by_ray(before.inner, before.outer), strict=True):
-        beside |= (inner[rest.ray] <= rest.outer + tie) & (rest.inner - tie <= outer[rest.ray])
-    rest = rest.kept((rest.outer - rest.inner > NARROWEST * reach[rest.ray]) | (~beside & (slack > 0)))
-    order = np.lexsort((np.concatenate([before.inner, rest.inner]), np.concatenate([before.ray, rest.ray])))
-    columns = {name: np.concatenate([getattr(before, name), getattr(rest, name)])[order]
-               for name in ("ray", "inner", "outer", "enters", "leaves")}  # fmt: skip
-    return Intervals(**columns, beyond=before.beyond | other.beyond, cut=before.cut | other.cut,
-                     doubt=before.doubt + other.doubt)  # fmt: skip

@@ -11,18 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.roots import parabola
+from mechdesign.numerics.roots import AROUND, lowest_near, parabola
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import BATCH, Designs, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape
 
-# The final check of an outline: its places, and the places between the centre and one of them.
+# Places of an outline in its final check.
 CHECKED = 720
-CHECKED_ALONG = 101
-# The checked outline is smaller by this part, so that one that just touches the boundary passes.
-TOUCHING = 1e-7
-# Rounds of the check: an outline that lies outside shrinks and is checked again.
-ROUNDS = 4
 # Contacts of a shape: so many of the lowest local minima of the scale over the rays, and one at a hole between rays.
 MINIMA = 6
 CONTACTS = MINIMA + 1
@@ -39,22 +34,16 @@ MORE_LOOKS = 5
 EVENLY = np.array([-0.7, -0.35, 0.35, 0.7])[:, None]
 NEARER = np.array([0, 1e-4, -1e-4, 0.01, -0.01])[:, None]
 # A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
-# parabolas lead from the place where a margin is lowest to the hole: their sampling distances, the samples around the
-# place, and the longest step, in sampling distances.
+# parabolas lead from the place where a margin is lowest to the hole: their sampling distances, and the longest step, in
+# sampling distances.
 LATTICE = (np.linspace(-1.2, 1.2, 11) + 1j * np.linspace(-1.2, 1.2, 11)[:, None]).ravel()
 PARABOLAS = (0.12, 0.006)
-AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 FARTHEST = 5.0
 # Gaps of a ray shorter than this part of its reach are points where a leg has no length: squares of lengths are exact
 # to rounding only.
 POINT = 1e-7
 # Margins below this part of the largest one are rounding.
 ROUNDING = 1e-12
-# Where rays meet many intervals, one that begins inside is traced over so many of them, and farther by this factor as
-# long as it does not end.
-FIRST = 2.0
-MANY = 8
-FARTHER = 4.0
 # Angle between the rays on either side of a hole (radians).
 ABOUT_HOLE = 1e-3
 # A contact is at a corner of the shape if its direction is this near to the corner's (radians).
@@ -79,9 +68,6 @@ class Contacts:
             every, places=every.of(design), count=len(design), centres=centre, effort=BATCH
         )  # fmt: skip
         self._reach = np.abs(centre - every.about) + panels.reach[design]
-        intervals = np.zeros(len(panels.closes), dtype=np.intp)
-        np.maximum.at(intervals, panels.design, panels.intervals)
-        self._near = np.where(intervals > MANY, FIRST / np.maximum(intervals, 1), 1.0)[design] * self._reach
         _, traced, inside = panels.through(design, centre)
         self._inside = np.bincount(traced.ray[inside], minlength=len(design)) > 0
         around, beside = _valleys(*self._spread(RAYS))
@@ -120,13 +106,10 @@ class Contacts:
             # A parabola through the places around leads to the lowest: for squares of distances it is exact.
             around = part + step * AROUND[:, None, None]
             around_values = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
-            here, right, left, up, down, across = around_values[margin, :, margin, lanes].transpose(2, 0, 1)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-                xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
-                det = xx * yy - xy * xy
-                way = (gy * xy - gx * yy) / det + 1j * (gx * xy - gy * xx) / det
-                good = (xx > 0) & (det > 0) & (np.abs(way) < FARTHEST)
+            (dx, dy), good, _ = lowest_near(around_values[margin, :, margin, lanes].transpose(2, 0, 1))
+            way = dx + 1j * dy
+            with np.errstate(invalid="ignore"):
+                good &= np.abs(way) < FARTHEST
             part = part + step * np.where(good, way, 0.0)
         way = shape.width * part.real + 1j * shape.height * part.imag
         there = margins(part)[margin, margin, lanes] < -rounding
@@ -158,26 +141,12 @@ class Contacts:
 
     def checked(self) -> Floats:
         """The scale, or less where the outline lies outside between the rays that were traced so far."""
-        scale, lanes = self.scale.copy(), np.arange(len(self._centre))
-        theta, scales = self._spread(CHECKED)
-        around, beside = _valleys(theta, scales)
+        scale = self.scale.copy()
+        around, beside = _valleys(*self._spread(CHECKED))
         contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
         np.minimum.at(
             scale, lane, self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, MORE_LOOKS)[1]
         )
-        for _ in range(ROUNDS):
-            outline = (1 - TOUCHING) * scale * self._shape.radius(theta) * np.exp(1j * theta)
-            place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
-            if not lane.size:
-                break
-            lowest_scale = self.at(lane, theta[place, lane], scale[lane])
-            # Where a ray leaves the region and comes back between two of its samples, places along it tell.
-            passed = np.flatnonzero(lowest_scale >= scale[lane])
-            along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
-            first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
-            lowest_scale[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
-            # A smaller outline may pass through what the larger one had left behind.
-            np.minimum.at(scale, lane, lowest_scale)
         return scale
 
     def at(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
@@ -189,6 +158,7 @@ class Contacts:
         return self._radii(lane, theta, most * radius) / radius
 
     def _radii(self, lane: Ints, theta: Floats, most: Floats | float = np.inf) -> Floats:
+        """Where rays leave or enter the region for the first time."""
         if not lane.size:
             return np.zeros(0)
         inside, reach, begin = self._inside[lane], self._reach[lane], np.zeros(len(lane))
@@ -197,25 +167,15 @@ class Contacts:
             reach = np.minimum(reach, end)
         # Nothing counts that lies beyond the scan, or farther away than asked for.
         reach = np.where(inside, np.minimum(reach, most), reach)
-        ends, left, far = np.zeros(len(lane)), np.arange(len(lane)), np.where(inside, self._near[lane], reach)
-        while left.size:
-            far = np.minimum(far, reach)
-            ends[left] = self._ends(lane[left], theta[left], far[left], begin[left], POINT * reach[left])
-            left = left[inside[left] & (far[left] <= ends[left]) & (far[left] < reach[left])]
-            far = FARTHER * far
-        return ends
-
-    def _ends(self, lane: Ints, theta: Floats, reach: Floats, begin: Floats, near: Floats) -> Floats:
-        """Where rays of a given reach leave or enter the region for the first time; gaps up to `near` do not count."""
         traced = trace(self._designs, lane, theta, reach)
-        ray, inner, outer, _, _ = traced.whole(near[traced.ray[1:]])
+        ray, inner, outer, _, _ = traced.whole(POINT * reach[traced.ray[1:]])
         first = np.searchsorted(ray, np.arange(len(lane)))
         meets = np.append(ray, -1)[first] == np.arange(len(lane))
         inner, outer = (np.append(ends, np.inf)[np.where(meets, first, -1)] for ends in (inner, outer))
         inner = np.maximum(inner, begin)
         # A ray that begins in a piece that does not count has to leave that piece.
         enters = np.where(inner > 0, np.where(inner < outer, inner, np.inf), outer)
-        return np.where(self._inside[lane], np.where(inner > 0, 0.0, outer), enters)
+        return np.where(inside, np.where(inner > 0, 0.0, outer), enters)
 
     def slopes(self) -> Floats:
         """How the contacts' scales change with the shape, as `Shape.slopes`, shape (3, contacts, lanes)."""

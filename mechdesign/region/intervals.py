@@ -13,6 +13,8 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Roots nearer to each other than this fraction of the reach are one boundary, named by the first of its margins.
 SAME_ROOT = 1e-9
+# Intervals no wider than this fraction of the reach are due to rounding.
+NARROWEST = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +179,45 @@ def intervals_between(
     leaves = _first_named(owner, outer, leaves, margin[falling], ray[falling], radius[falling], tie)
     return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, np.ones(rays, dtype=bool),
                      np.zeros(rays))  # fmt: skip
+
+
+def of_modes(modes: Sequence[Intervals], labels: int, reach: Floats, slack: float) -> Intervals:
+    """Intervals of several assembly modes on the same rays, each less those of the modes before it.
+
+    Margins are counted on from mode to mode, each of which has as many `labels`. Where the mode changes an interval
+    ends, too.
+    """
+    first, *others = modes
+    for shift, other in enumerate(others, start=1):
+        enters, leaves = (np.where(ends >= 0, ends + shift * labels, ends) for ends in (other.enters, other.leaves))
+        first = _with(first, replace(other, enters=enters, leaves=leaves), reach, slack)
+    return first
+
+
+def _with(before: Intervals, other: Intervals, reach: Floats, slack: float) -> Intervals:
+    """Intervals of both on the same rays, the other ones less those `before`; ends at which both meet are the same."""
+    # Of the other ones an end is a root of their own margin, and the gaps between those before are where another is
+    # positive: its roots keep the names of the margins that bound the gap.
+    rising = [(other.enters, other.inner, other.ray), (before.leaves, before.outer, before.ray)]
+    falling = [(other.leaves, other.outer, other.ray), (before.enters, before.inner, before.ray)]
+    roots = [tuple(values[ends[0] >= 0] for values in ends) for ends in (*rising, *falling)]
+    margin, radius, ray = (np.concatenate(column) for column in zip(*roots, strict=True))
+    turn = np.repeat([1, 1, -1, -1], [len(root[0]) for root in roots])
+    rays = len(reach)
+    start = 1 - np.bincount(other.ray[other.enters < 0], minlength=rays)
+    start = start + np.bincount(before.ray[before.enters < 0], minlength=rays)
+    rest = intervals_between(margin, ray, turn, radius, start, reach, slack)
+    # What rounding leaves beside an interval is none; by itself it may be the tip of a cusp.
+    tie = SAME_ROOT * reach[rest.ray]
+    beside = np.zeros(len(rest.ray), dtype=bool)
+    for inner, outer in zip(*before.by_ray(before.inner, before.outer), strict=True):
+        beside |= (inner[rest.ray] <= rest.outer + tie) & (rest.inner - tie <= outer[rest.ray])
+    rest = rest.kept((rest.outer - rest.inner > NARROWEST * reach[rest.ray]) | (~beside & (slack > 0)))
+    order = np.lexsort((np.concatenate([before.inner, rest.inner]), np.concatenate([before.ray, rest.ray])))
+    columns = {name: np.concatenate([getattr(before, name), getattr(rest, name)])[order]
+               for name in ("ray", "inner", "outer", "enters", "leaves")}  # fmt: skip
+    return Intervals(**columns, beyond=before.beyond | other.beyond, cut=before.cut | other.cut,
+                     doubt=before.doubt + other.doubt)  # fmt: skip
 
 
 def _ascending(values: Ints) -> Ints:

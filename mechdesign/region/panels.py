@@ -52,8 +52,7 @@ class Panels:
     raster_area : ndarray, shape (designs,)
         Lower bound of the area by the raster: its inside cells, less the error of that sum.
     undecided : ndarray, shape (designs,)
-        Area of the cells of which the raster neither found a point inside nor excludes one, and of the cells between
-        rays that were given up.
+        Area between rays of which it stays undecided whether their intervals go on between them.
     """
 
     designs: Designs
@@ -148,24 +147,8 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     counts = trace(designs, owner, middle, reach[owner]).counts
     full = (counts > 0) | (high - low < NARROW)
     area, error = raster.area
-    undecided += _undecided(designs, raster, reach, owner[full], low[full], high[full], counts[full])
     return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
                   undecided)  # fmt: skip
-
-
-def _undecided(
-    designs: Designs, raster: Raster, reach: Floats, owner: Ints, low: Floats, high: Floats, counts: Ints
-) -> Floats:
-    """Area of the cells that the raster leaves open and whose ray, through the centre, is unlike those of its panel."""
-    design, place, cell = (np.concatenate(part) for part in zip(*raster.undecided, strict=True))
-    if not design.size:
-        return np.zeros(designs.count)
-    theta = ray_through(place - designs.about, designs.scan[0])
-    met = trace(designs, design, theta, reach[design]).counts
-    panel = np.searchsorted(owner + 1j * low, design + 1j * theta, side="right") - 1
-    within = (panel >= 0) & (np.append(owner, -1)[panel] == design) & (theta <= np.append(high, 0.0)[panel])
-    unlike = met != np.where(within, np.append(counts, 0)[panel], 0)
-    return np.bincount(design[unlike], (cell.real * cell.imag)[unlike], designs.count).astype(float)
 
 
 def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.roots import AROUND, lowest_near
 from mechdesign.region.crossings import passed
 from mechdesign.region.intervals import Intervals
 from mechdesign.region.rays import Designs, ray_through
@@ -25,8 +26,6 @@ BLOCK = 1 << 17
 EDGE = 0.5
 # Sampling distances of the successive parabolas that lead to the minimum of a margin (cells).
 PARABOLAS = (1.0, 0.1)
-# Samples of one parabola: the place itself, right, left, up, down and across (sampling distances).
-AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 # Longest step of a parabola in x and y (cells).
 FARTHEST = 1.0
 # How often a cell that may hold a sliver is divided.
@@ -54,9 +53,7 @@ class Raster:
     inside : ndarray of bool, shape (designs, rows, columns)
         Whether the centre of each cell lies in the region.
     holes, slivers : (ndarray of int, complex ndarray)
-        Designs and places in holes, and in slivers of the region, that hold no centre.
-    undecided : list of (ndarray of int, complex ndarray, complex ndarray)
-        Designs, centres and sizes of cells that may hold slivers thinner still.
+        Designs and places in holes, and where slivers of the region are or may be, that hold no centre.
     cut : ndarray of bool, shape (designs,)
         Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
     """
@@ -67,7 +64,6 @@ class Raster:
     inside: Flags
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
-    undecided: list[tuple[Ints, Complexes, Complexes]]
     cut: Flags
 
     @staticmethod
@@ -80,7 +76,7 @@ class Raster:
             empty = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank, cut = np.zeros((designs.count, cells, cells), dtype=bool), np.zeros(designs.count, dtype=bool)
             raster, holes = (
-                Raster(designs, low, (high - low) / cells, blank, empty, empty, [], cut),
+                Raster(designs, low, (high - low) / cells, blank, empty, empty, cut),
                 [empty],
             )
             slivers = [empty]
@@ -115,12 +111,11 @@ class Raster:
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
         Cells that no margin excludes are divided once, and again while that takes no more points than the raster has.
-        Cells left then count as undecided if no part of them lies inside and each margin is positive at some part.
+        In cells left then slivers may be that are thinner still.
         """
         row, column, lane = _open(margins, away, *np.nonzero(scanned & ~_spread(inside)))
         design, place, cell = designs[lane], place[row, column, lane], self.cell[designs[lane]]
         cell_design, witness, cell_of_part = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
-        rises = np.zeros(len(lane), dtype=bool)
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
         for division in range(DIVISIONS):
@@ -136,11 +131,9 @@ class Raster:
             row, column, lane = _open(margins.reshape(shape), away.reshape(shape), *misses)
             at = row * PARTS + column
             design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
-            rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         hit = ~np.isnan(witness)
-        open_ = rises & ~hit[cell_of_part]
-        self.undecided.append((design[open_], place[open_], cell[open_]))
-        return cell_design[hit], witness[hit]
+        left = ~hit[cell_of_part]
+        return np.concatenate([cell_design[hit], design[left]]), np.concatenate([witness[hit], place[left]])
 
     def _between_centres(
         self, mode: Designs, designs: Ints, z: Complexes, margins: Floats, inside: Flags
@@ -161,15 +154,12 @@ class Raster:
         for step in PARABOLAS:
             x, y = step * cell.real, step * cell.imag
             around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
-            centre, right, left, up, down, across = mode.field.margins(around, places)[margin, :, every].T
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-                xx, yy, xy = right + left - 2 * centre, up + down - 2 * centre, across + centre - right - up
-                det = xx * yy - xy * xy
-                dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
-                converges &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
+            values = mode.field.margins(around, places)[margin, :, every].T
+            (dx, dy), low, fall = lowest_near(values)
+            with np.errstate(invalid="ignore"):
+                converges &= low & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
                 # Twice the depth of the parabola, which only approximates the margin.
-                converges &= centre + gx * dx + gy * dy < 0
+                converges &= values[0] + fall < 0
             place = place + np.where(converges, x * dx, 0.0) + 1j * np.where(converges, y * dy, 0.0)
         return designs[lane[converges]], place[converges]
 
@@ -278,11 +268,15 @@ def _open(margins: Floats, away: Floats, row: Ints, column: Ints, lane: Ints) ->
         largest = margin[row, column, lane]
         below = np.flatnonzero(~(largest > 0))
         largest[below] = _most(margin, from_middle, row[below], column[below], lane[below])
-        unknown = np.flatnonzero(np.isnan(largest))
-        if unknown.size:
-            # A margin that is unknown beside a stretched leg is judged by the neighbouring cells.
-            beside = _beside(margin, row[unknown], column[unknown])
-            largest[unknown] = np.fmax.reduce([_most(margin, from_middle, *place, lane[unknown]) for place in beside])
+        excluded = np.flatnonzero(~(largest > 0))
+        beside = _beside(margin, row[excluded], column[excluded])
+        unknown = np.isnan([largest[excluded], *(margin[*place, lane[excluded]] for place in beside)]).any(axis=0)
+        if unknown.any():
+            # A margin that is unknown there or beside, at a stretched leg, is judged by the neighbouring cells as well.
+            some, of = excluded[unknown], lane[excluded[unknown]]
+            places = ((rows[unknown], columns[unknown]) for rows, columns in beside)
+            around = [_most(margin, from_middle, *place, of) for place in places]
+            largest[some] = np.fmax.reduce([largest[some], *around])
         keep = largest > 0
         row, column, lane = row[keep], column[keep], lane[keep]
     return row, column, lane

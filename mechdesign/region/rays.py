@@ -17,7 +17,15 @@ from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.crossings import sign_changes
 from mechdesign.region.field import Field, Places
-from mechdesign.region.intervals import SAME_ROOT, Intervals, intervals_between, joined, shortened
+from mechdesign.region.intervals import (
+    NARROWEST,
+    SAME_ROOT,
+    Intervals,
+    intervals_between,
+    joined,
+    of_modes,
+    shortened,
+)
 from mechdesign.region.rules import cosine, spread
 
 # Rays traced at once (measured: smaller blocks cost more in calls than they save in cache).
@@ -26,8 +34,6 @@ BLOCK = 8192
 ROUNDING = 1e-14
 # A margin is quadratic if a parabola through three samples meets two more to this fraction of the largest.
 QUADRATIC = 1e-13
-# Intervals no wider than this fraction of the reach are due to rounding.
-NARROWEST = 1e-10
 # A leg shorter than this fraction of the mechanism's size, as the root of a margin, is rounding.
 SHORTEST = 1e-7
 # Least number of samples of an interval where expressions are limited, which may oscillate along a ray.
@@ -104,15 +110,16 @@ class Designs:
     effort: Effort
     centres: Complexes | None = None
 
-    @property
+    @cached_property
     def members(self) -> tuple[Designs, ...]:
         """The same designs in each mode of the field."""
-        return (self,)
+        several = self.field.members if len(self.field.members) > 1 else ()
+        return tuple(replace(self, field=member) for member in several) or (self,)
 
     @cached_property
     def in_any_assembly(self) -> Designs:
         """The same designs without the margins of the assembly."""
-        return replace(self, field=replace(self.field, same_assembly=False))
+        return replace(self, field=replace(self.field, same_assembly=False)) if self.field.same_assembly else self
 
     def of(self, index: Ints) -> Places:
         """Values of the designs `index`, in the shape of `index`."""
@@ -122,12 +129,8 @@ class Designs:
         """Where the rays of each of `design` start."""
         return np.full(design.shape, self.about) if self.centres is None else self.centres[design]
 
-    def inside(self, z: Complexes, design: Ints) -> Flags:
-        """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
-        return self.look(z, design)[0]
-
     def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats, Floats]:
-        """Whether places lie in the region, as `inside`, and margins there, shape (margins, places, designs).
+        """Whether places lie in the region of one mode, and margins there, shape (margins, places, designs).
 
         With `Field.away` of them. Without `assembly`, margins of the assembly are inf where other margins exclude a
         place.
@@ -153,6 +156,9 @@ class Designs:
         possible in the order in which links are placed. The intervals of a ray do not depend on the other rays of the
         block.
         """
+        if len(self.members) > 1:
+            modes = [mode.traced(design, theta, reach, slack) for mode in self.members]
+            return of_modes(modes, len(self.members[0].field.labels), reach, slack)
         places, centre, direction = self.of(design), self.starts(design), np.exp(1j * theta)
         values = self.field.margins(centre + FIVE[:, None] * reach * direction, places, assembly=False)
         quadratic, (a, b, c) = _parabolas(values)

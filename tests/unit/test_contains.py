@@ -130,9 +130,9 @@ def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
     for shape in (RECTANGLE, Shape(50, 90, False, 10 + 5j)):
         scale, placed = fitted(shape, given.panels)
         centre, outline = placed.centre, scale * shape.radius(theta) * np.exp(1j * theta)
-        inside = given.panels.designs.inside(centre + (1 - 1e-6) * outline, np.arange(3))
+        inside, *_ = given.panels.designs.look(centre + (1 - 1e-6) * outline, np.arange(3))
         assert inside.all()
-        assert not given.panels.designs.inside(centre + (1 + 1e-2) * outline, np.arange(3)).all(axis=0).any()
+        assert not given.panels.designs.look(centre + (1 + 1e-2) * outline, np.arange(3))[0].all(axis=0).any()
 
 
 @pytest.mark.slow

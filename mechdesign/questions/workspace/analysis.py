@@ -29,14 +29,12 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     for question in all_questions:
         regions.append(reach(question))
         progress.update(1)
-    full = [region for region in regions if region.boundary is not None]
+    full = [region for region in regions if region.patches]
     if not full:
         raise unreachable(study, all_questions)
     warnings = [caution for row, region in enumerate(regions) for caution in remarks(study, region, row)]
     counts = {"regions": len(regions), "empty": len(regions) - len(full)}
     named = {table.name: table for table in tables(study, regions)}
-    first = full[0]
-    assert first.boundary is not None
-    along = poses_along(first.question.field, first.boundary)
-    drawn = DrawnRegion(along, ellipses(first.question.field, first.patches))
+    field, patches = full[0].question.field, full[0].patches
+    drawn = DrawnRegion(poses_along(field, patches), ellipses(field, patches))
     return Result("workspace", named, tuple(warnings), counts, drawn=drawn)

@@ -13,7 +13,6 @@ from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.workspace.index import Prepared, prepare
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.strips import Integrand
-from mechdesign.region.any_mode import AnyMode, AnyModeDesigns
 from mechdesign.region.field import Places
 from mechdesign.region.rays import Designs, Effort
 from mechdesign.region.regions import Region, problem, regions
@@ -53,8 +52,7 @@ class Question(Region):
 
     def designs(self, places: Places, count: int, effort: Effort) -> Designs:
         """`count` designs, whose changed places are arrays of shape (count,), and how rays meet their regions."""
-        kind = AnyModeDesigns if isinstance(self.field, AnyMode) else Designs
-        return kind(self.field, places, count, self.about, self.scan, effort)
+        return Designs(self.field, places, count, self.about, self.scan, effort)
 
     @cached_property
     def statistics(self) -> dict[str, tuple[str, str]]:

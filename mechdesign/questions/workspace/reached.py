@@ -9,11 +9,9 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.answer import Evaluation, answer, area_in_any_assembly, areas
-from mechdesign.questions.workspace.boundary import Boundary, boundary_of
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
-from mechdesign.questions.workspace.nodes import Nodes, nodes_of
 from mechdesign.questions.workspace.question import Question
-from mechdesign.questions.workspace.singularities import Locus, causes, loci
+from mechdesign.questions.workspace.singularities import Locus, loci
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.patches import Patch, patches_of_pieces
 from mechdesign.region.rays import SINGLE
@@ -49,8 +47,6 @@ class Reached:
     everywhere: float = 0.0
     shapes: Floats = field(default_factory=lambda: np.full(len(INSCRIBED), np.nan))
     loci: Sequence[Locus] = ()
-    boundary: Boundary | None = None
-    nodes: Nodes | None = None
 
     @property
     def beyond(self) -> float:
@@ -80,11 +76,8 @@ def reach(question: Question) -> Reached:
     field, parts = question.field, list(evaluation.pieces.all())
     pieces = areas(question, evaluation, parts)
     patches = patches_of_pieces(evaluation.pieces.panels, parts, question.rays or RAYS)
-    reasons = causes(field)
     return Reached(
         question, evaluation, singular, patches, pieces, everywhere,
         shapes=np.concatenate(list(inscribed(evaluation.panels).values())),
-        loci=loci(field, reasons, patches, singular=singular),
-        boundary=boundary_of(field, patches, reasons),
-        nodes=nodes_of(field, question.shown, patches),
+        loci=loci(field, patches, singular=singular),
     )  # fmt: skip

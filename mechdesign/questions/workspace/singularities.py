@@ -93,13 +93,9 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
     return f"{named} {FORMS.get(group.form, 'not held')}"
 
 
-def loci(
-    field: Field, reasons: Sequence[tuple[str, str]], patches: Sequence[Patch], *, singular: bool
-) -> list[Locus]:  # fmt: skip
-    """Singularities inside a region, unless it is `singular` everywhere, then those that bound it, as curves.
-
-    `reasons` are the `causes` of its field.
-    """
+def loci(field: Field, patches: Sequence[Patch], *, singular: bool) -> list[Locus]:
+    """Singularities inside a region, unless it is `singular` everywhere, then those that bound it, as curves."""
+    reasons = causes(field)
     edges = [(*reasons[edge.margin], edge.places) for patch in patches for edge in patch.edges]
     edges = sorted((edge for edge in edges if edge[0] != "limit"), key=lambda edge: edge[:2])
     groups = [(*key, [places for *_, places in group]) for key, group in groupby(edges, key=lambda edge: edge[:2])]

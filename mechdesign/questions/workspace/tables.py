@@ -13,7 +13,7 @@ from mechdesign.indices import index
 from mechdesign.motion.motion import in_study_units
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.columns import power_of_length
-from mechdesign.questions.workspace.boundary import Boundary
+from mechdesign.questions.workspace.boundary import drives_on
 from mechdesign.questions.workspace.columns import (
     BOUNDARY,
     HELD,
@@ -25,9 +25,10 @@ from mechdesign.questions.workspace.columns import (
 )
 from mechdesign.questions.workspace.index import determinant_power
 from mechdesign.questions.workspace.inscribed import INSCRIBED
-from mechdesign.questions.workspace.nodes import Nodes
+from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import COLUMNS, Question, split
 from mechdesign.questions.workspace.reached import Reached
+from mechdesign.questions.workspace.singularities import causes
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -40,10 +41,8 @@ def tables(study: Study, regions: Sequence[Reached]) -> Iterator[Table]:
     if held:
         yield _totals(indices, [column.name for column in held])
     full = [region for region in regions if region.patches]
-    yield LOCAL.table(_stacked([_local(study, r.question, r.nodes) for r in full if r.nodes is not None]))
-    boundaries = [_boundary(study, r.question, r.boundary) for r in full if r.boundary is not None]
-    yield BOUNDARY.table(_stacked(boundaries))
-    yield SINGULARITIES.table(_stacked([_singularities(study, region) for region in full]))
+    for kind, columns in ((LOCAL, _local), (BOUNDARY, _boundary), (SINGULARITIES, _singularities)):
+        yield kind.table(_stacked([columns(study, region) for region in full]))
     pieces = PIECES.table(_stacked([_pieces(study, region) for region in regions]))
     if (pieces["piece"] > 1).any():
         yield pieces
@@ -132,36 +131,55 @@ def _totals(indices: Table, held: Sequence[str]) -> Table:
     ])  # fmt: skip
 
 
-def _local(study: Study, question: Question, nodes: Nodes) -> list[Column]:
-    """Local indices at the nodes of a region."""
+def _local(study: Study, region: Reached) -> list[Column]:
+    """Local indices at the nodes of a region's patches."""
+    question, field, grids = region.question, region.question.field, [patch.grid for patch in region.patches]
+    z, shapes = np.concatenate([grid.ravel() for grid in grids]), [grid.shape for grid in grids]
+    patch = np.repeat(np.arange(len(grids)), [rays * nodes for rays, nodes in shapes])
+    ray, node = np.concatenate([np.indices(shape).reshape(2, -1) for shape in shapes], axis=1)
+    local = Local.at(field, z, {})
+    determinant = np.broadcast_to(local.determinant, z.shape)
+    if field.same_assembly:
+        # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.
+        middle = Local.at(field, np.array([patch.middle for patch in region.patches]), {}).determinant
+        determinant = np.copysign(determinant, np.broadcast_to(middle, len(grids))[patch])
     columns = [
-        LOCAL["<index>"].column(values, index.index.unit(study, question.field),
+        LOCAL["<index>"].column(np.broadcast_to(index.values(local), z.shape), index.index.unit(study, field),
                                 **{"index": index.name, "meaning of the index": index.index.meaning})
-        for index, values in nodes.values
+        for index in question.shown
     ]  # fmt: skip
-    per_area = power_of_length(study.units, determinant_power(question.field))
+    per_area = power_of_length(study.units, determinant_power(field))
     words = study.units.labels | {"as its outputs over the drives, multiplied": per_area}
+    piece = np.array([patch.piece for patch in region.patches])[patch]
     return [
-        *_held(study, question, len(nodes.z)),
-        *LOCAL.columns(words, x=nodes.z.real, y=nodes.z.imag),
+        *_held(study, question, len(z)),
+        *LOCAL.columns(words, x=z.real, y=z.imag),
         *columns[:2],
-        *LOCAL.columns(words, det_J=nodes.determinant),
+        *LOCAL.columns(words, det_J=determinant),
         *columns[2:],
-        *LOCAL.columns(words, patch=nodes.patch, ray=nodes.ray, node=nodes.node, piece=nodes.piece),
+        *LOCAL.columns(words, patch=patch, ray=ray, node=node, piece=piece),
     ]
 
 
-def _boundary(study: Study, question: Question, boundary: Boundary) -> list[Column]:
-    """Points of the boundary curve by curve, the drives, and what ends the region there."""
-    labels, label = study.units.labels, study.units.label
+def _boundary(study: Study, region: Reached) -> list[Column]:
+    """Points of the boundary curve by curve, first those where rays enter the region, the drives, and what ends it."""
+    question, field, labels, label = region.question, region.question.field, study.units.labels, study.units.label
+    edges = [(patch, edge) for patch in region.patches for edge in patch.edges]
+    edges.sort(key=lambda both: both[1].side)
+    theta, radius, z = (np.concatenate(parts) for parts in zip(
+        *((p.theta, e.radius, e.places) for p, e in edges), strict=True))  # fmt: skip
+    curve = np.repeat(np.arange(len(edges)), [len(patch.theta) for patch, _ in edges])
+    margin, side, piece = (np.array(column)[curve] for column in zip(
+        *((e.margin, e.side, p.piece) for p, e in edges), strict=True))  # fmt: skip
+    kinds, words = [kind for kind, _ in field.labels], [at for _, at in causes(field)]
     return [
-        *_held(study, question, len(boundary.z)),
-        *BOUNDARY.columns(labels, x=boundary.z.real, y=boundary.z.imag, kind=boundary.kind),
+        *_held(study, question, len(z)),
+        *BOUNDARY.columns(labels, x=z.real, y=z.imag, kind=np.array(kinds)[margin]),
         *(BOUNDARY["<drive>"].column(
             np.asarray(in_study_units(study.units, c, values)), label(c.quantity), drive=c.name
-          ) for c, values in boundary.drives),
-        *BOUNDARY.columns(labels, at=boundary.at, theta=boundary.theta / study.units.angle_factor, side=boundary.side,
-                          curve=boundary.curve, piece=boundary.piece),
+          ) for c, values in drives_on(field, margin, question.about, theta, radius, side)),
+        *BOUNDARY.columns(labels, at=np.array(words)[margin], theta=theta / study.units.angle_factor, side=side,
+                          curve=curve, piece=piece),
     ]  # fmt: skip
 
 
