@@ -97,16 +97,16 @@ def test_a_motion_that_takes_too_long_is_not_met(
 @pytest.mark.slow
 def test_energies_that_do_not_follow_from_the_work_are_unconverged(monkeypatch: pytest.MonkeyPatch) -> None:
     # As if a pulse of work was taken from the motion's account alone.
-    monkeypatch.setattr(motion_in_time.Integration, "course", _robbed(motion_in_time.Integration.course))
+    monkeypatch.setattr(motion_in_time.Integration, "at", _robbed(motion_in_time.Integration.at))
     result, _ = judged(", efforts: {door: '20*sin(9*time)'}")
     (warning,) = result.warnings
     assert (warning.kind, warning.table, warning.row) == ("unconverged", "forward", 5)
     assert "energies do not change by the work of what acts: from 0.5 s on" in str(warning)
 
 
-def _robbed(course):  # type: ignore[no-untyped-def]
+def _robbed(at):  # type: ignore[no-untyped-def]
     def robbed(self, times):  # type: ignore[no-untyped-def]
-        whole = course(self, times)
+        whole = at(self, times)
         whole.work[0] += np.where(whole.times >= 0.5 - 1e-9, 0.01, 0.0)
         return whole
 

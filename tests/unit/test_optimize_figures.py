@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.pictures import figure_of
 from helpers.studies import study_of
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import QuadMesh
 
 import mechdesign
 from mechdesign.family.goals import Goal
@@ -222,10 +222,14 @@ def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
 @pytest.mark.slow
 def test_few_designs_of_a_grid_are_cells() -> None:
     found, result = drawn("a", "b", goals="minimize: [kinematics.P.x]")
-    (cells,) = [each for each in found["objective"].axes[0].collections if isinstance(each, PolyCollection)]
-    assert np.asarray(cells.get_array()) == pytest.approx(result.tables["designs"]["kinematics.P.x"])
-    corners = np.array([path.vertices[:4].mean(axis=0) for path in cells.get_paths()])
-    assert corners[:, 0] == pytest.approx(result.tables["designs"]["a"])
+    (cells,) = [each for each in found["objective"].axes[0].collections if isinstance(each, QuadMesh)]
+    table, values = result.tables["designs"], np.asarray(cells.get_array())
+    corners = np.asarray(cells.get_coordinates())
+    middles = (corners[:-1, :-1] + corners[1:, 1:]) / 2
+    for design in range(len(table)):
+        distance = np.hypot(*(middles - [table["a"][design], table["b"][design]]).transpose(2, 0, 1))
+        assert distance.min() == pytest.approx(0, abs=1e-9)
+        assert values.reshape(distance.shape)[distance == distance.min()] == pytest.approx(table["kinematics.P.x"][design])
 
 
 FOUR_BAR = """
