@@ -34,7 +34,7 @@ from forking import PICTURES, forked
 from steps import step
 
 import mechdesign
-from mechdesign.errors import MechdesignError
+from mechdesign.ground.errors import MechdesignError
 
 ROOT = Path(__file__).parent
 FOLDERS = ("tutorials", "howto", "theory", "reference", "contributing")

@@ -23,13 +23,13 @@ from pathlib import Path
 
 from mechdesign.__main__ import main
 from mechdesign.commands import QUESTIONS
-from mechdesign.report.figures import pictures
-from mechdesign.report.figures.pictures import NamedPicture, View
+from mechdesign.drawing import pictures
+from mechdesign.drawing.pictures import NamedPicture, View
 
 PICTURES = "PICTURES_OF_PAGE"
 _IMPORTED = (
-    "mechdesign.cli.batch",
-    "mechdesign.report.page.section",
+    "mechdesign.door.cli.batch",
+    "mechdesign.door.report.page.section",
     *(command.module for command in QUESTIONS.values()),
     *(command.figures for command in QUESTIONS.values()),
 )

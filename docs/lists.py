@@ -1,4 +1,4 @@
-"""Pages of the reference: keys of the study, tables, indices, words, exit codes, warnings, from `mechdesign.reference`.
+"""Pages of the reference, from `mechdesign.door.reference`: keys, tables, indices, words, exit codes, warnings.
 
 What `mechdesign docs WORD` prints in a terminal stands here, a page a subject.
 """
@@ -14,10 +14,10 @@ from pathlib import Path
 
 import yaml
 
-from mechdesign.cautions import KINDS
+from mechdesign.door.reference import Entry, entries, tables
+from mechdesign.ground.cautions import KINDS
+from mechdesign.ground.results import TableKind
 from mechdesign.mechanism.configuration import REASONS
-from mechdesign.reference import Entry, entries, tables
-from mechdesign.results import TableKind
 
 # Sections of the study with a page each, in the order of the format; keys that stand alone share one.
 ALONE = "study_file"

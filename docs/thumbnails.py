@@ -14,10 +14,10 @@ from xml.etree.ElementTree import Element, fromstring, tostring
 import numpy as np
 
 import mechdesign
-from mechdesign.errors import MechdesignError
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import PLACES, TIMES, TURNS, steps
+from mechdesign.door.report.page.moving import moving
+from mechdesign.door.report.page.tracks import PLACES, TIMES, TURNS, steps
+from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.numerics.arrays import Floats, Ints
 
 # A moving part lies this far beside its pose at most: units of a drawing that is shown half as large, degrees, lengths.
 _NEAR = {"translate": 1.0, "rotate": 0.5, "scale": 0.01}

@@ -28,45 +28,45 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from mechdesign.api.cases import evaluate as evaluate
-    from mechdesign.api.cases import sensitivities as sensitivities
-    from mechdesign.api.cases import sweep as sweep
-    from mechdesign.api.loading import load as load
-    from mechdesign.api.questions import dynamics as dynamics
-    from mechdesign.api.questions import kinematics as kinematics
-    from mechdesign.api.questions import optimize as optimize
-    from mechdesign.api.questions import reliability as reliability
-    from mechdesign.api.questions import stiffness as stiffness
-    from mechdesign.api.questions import workspace as workspace
-    from mechdesign.api.shown import Answer as Answer
-    from mechdesign.cautions import Caution as Caution
-    from mechdesign.columns import Column as Column
-    from mechdesign.errors import AssemblyError as AssemblyError
-    from mechdesign.errors import MechanismError as MechanismError
-    from mechdesign.errors import MechdesignError as MechdesignError
-    from mechdesign.errors import OutputError as OutputError
-    from mechdesign.errors import StudyError as StudyError
-    from mechdesign.importing.conversion import convert as convert
-    from mechdesign.report.requirements import Verdict as Verdict
-    from mechdesign.report.requirements import requirements as requirements
-    from mechdesign.results import Table as Table
+    from mechdesign.door.api.cases import evaluate as evaluate
+    from mechdesign.door.api.cases import sensitivities as sensitivities
+    from mechdesign.door.api.cases import sweep as sweep
+    from mechdesign.door.api.loading import load as load
+    from mechdesign.door.api.questions import dynamics as dynamics
+    from mechdesign.door.api.questions import kinematics as kinematics
+    from mechdesign.door.api.questions import optimize as optimize
+    from mechdesign.door.api.questions import reliability as reliability
+    from mechdesign.door.api.questions import stiffness as stiffness
+    from mechdesign.door.api.questions import workspace as workspace
+    from mechdesign.door.api.shown import Answer as Answer
+    from mechdesign.door.report.requirements import Verdict as Verdict
+    from mechdesign.door.report.requirements import requirements as requirements
+    from mechdesign.ground.cautions import Caution as Caution
+    from mechdesign.ground.columns import Column as Column
+    from mechdesign.ground.errors import AssemblyError as AssemblyError
+    from mechdesign.ground.errors import MechanismError as MechanismError
+    from mechdesign.ground.errors import MechdesignError as MechdesignError
+    from mechdesign.ground.errors import OutputError as OutputError
+    from mechdesign.ground.errors import StudyError as StudyError
+    from mechdesign.ground.results import Table as Table
     from mechdesign.study import Study as Study
+    from mechdesign.study.importing.conversion import convert as convert
 
     __version__: str
 
 _HOMES = {
     name: f"mechdesign.{home}"
     for home, names in (
-        ("api.cases", "sweep sensitivities evaluate"),
-        ("api.loading", "load"),
-        ("api.questions", "kinematics workspace optimize reliability stiffness dynamics"),
-        ("api.shown", "Answer"),
-        ("cautions", "Caution"),
-        ("columns", "Column"),
-        ("errors", "AssemblyError MechanismError MechdesignError OutputError StudyError"),
-        ("importing.conversion", "convert"),
-        ("report.requirements", "Verdict requirements"),
-        ("results", "Table"),
+        ("door.api.cases", "sweep sensitivities evaluate"),
+        ("door.api.loading", "load"),
+        ("door.api.questions", "kinematics workspace optimize reliability stiffness dynamics"),
+        ("door.api.shown", "Answer"),
+        ("ground.cautions", "Caution"),
+        ("ground.columns", "Column"),
+        ("ground.errors", "AssemblyError MechanismError MechdesignError OutputError StudyError"),
+        ("study.importing.conversion", "convert"),
+        ("door.report.requirements", "Verdict requirements"),
+        ("ground.results", "Table"),
         ("study", "Study"),
     )
     for name in names.split()
@@ -76,7 +76,7 @@ __all__ = sorted((*_HOMES, "__version__"))
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from mechdesign.versions import installed
+        from mechdesign.ground.versions import installed
 
         return installed("mechdesign")
     if name in _HOMES:
@@ -86,7 +86,7 @@ def __getattr__(name: str) -> Any:
     from mechdesign.commands import QUESTIONS
 
     if name in QUESTIONS:
-        from mechdesign.api.questions import question
+        from mechdesign.door.api.questions import question
 
         return question(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

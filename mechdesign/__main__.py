@@ -11,13 +11,13 @@ def main() -> None:
     if hasattr(signal, "pthread_sigmask"):
         numbers = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
         signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
-    from mechdesign.cli import process
+    from mechdesign.door.cli import process
 
     process.run(_command)
 
 
 def _command() -> None:
-    from mechdesign.cli.app import answer
+    from mechdesign.door.cli.app import answer
 
     answer()
 

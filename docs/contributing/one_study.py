@@ -3,11 +3,11 @@
 import math
 
 import mechdesign
+from mechdesign.ground.statistics import Request
 from mechdesign.motion.answer import alone
 from mechdesign.motion.question import solved
 from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.poses import study_poses
-from mechdesign.statistics import Request
 
 # Study: what a person wrote, read, checked, and with its mechanism.
 study = mechdesign.load(

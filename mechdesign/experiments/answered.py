@@ -8,16 +8,16 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from mechdesign.cautions import fails
-from mechdesign.errors import explain
+from mechdesign.door.report import requirements
+from mechdesign.door.report.requirements import Verdict, command_of
 from mechdesign.experiments.case_numbers import judged, number_of
 from mechdesign.family.goals import Goal
+from mechdesign.ground.cautions import fails
+from mechdesign.ground.errors import explain
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Result
+from mechdesign.ground.rows import UnknownColumnError
 from mechdesign.motion.group import DesignGroup
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.report import requirements
-from mechdesign.report.requirements import Verdict, command_of
-from mechdesign.results import Result
-from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.variants import Judging
 

@@ -10,13 +10,13 @@ import numpy as np
 from mechdesign.experiments.schema.matrix import Named
 from mechdesign.family.goals import Goal, goal
 from mechdesign.family.judge import Judgement, judge
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.rows import Chosen, UnknownColumnError
+from mechdesign.ground.terms import Sum, path_of, terms_of
 from mechdesign.motion.group import DesignGroup
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.rows import Chosen, UnknownColumnError
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
-from mechdesign.terms import Sum, path_of, terms_of
 
 
 def goals_in(

@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechdesignError, Problem, StudyError
+from mechdesign.door.report import requirements
+from mechdesign.door.report.requirements import command_of
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.case_numbers import number_of
 from mechdesign.family import stacked
 from mechdesign.family.goals import Goal
 from mechdesign.family.structures import Form, Structures, Values
+from mechdesign.ground.errors import MechdesignError, Problem, StudyError
+from mechdesign.ground.numerics.arrays import Ints
+from mechdesign.ground.results import Result
+from mechdesign.ground.rows import UnknownColumnError
+from mechdesign.ground.work.chunks import map_chunks
+from mechdesign.ground.work.shards import WHOLE, Shard
 from mechdesign.motion.group import DesignGroup
-from mechdesign.numerics.arrays import Ints
-from mechdesign.report import requirements
-from mechdesign.report.requirements import command_of
-from mechdesign.results import Result
-from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, Judging, judging, split, with_entries
-from mechdesign.work.chunks import map_chunks
-from mechdesign.work.shards import WHOLE, Shard
 
 # Cases in one batch where a case costs far less among many, the largest batch, and the batches that are wanted at
 # least so that every worker has some.

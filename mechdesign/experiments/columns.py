@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mechdesign.columns import CHOSEN, VARIED
-from mechdesign.results import KeyNumber, TableKind
+from mechdesign.ground.columns import CHOSEN, VARIED
+from mechdesign.ground.results import KeyNumber, TableKind
 
 SUMMARY = TableKind.of("summary", "what became of each question",
     ("study", "the study"), ("command", "the question"), ("outcome", "what became of it"),

@@ -13,10 +13,10 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import StudyError
+from mechdesign.door.report.cases import changes_in_words
 from mechdesign.experiments.schema.matrix import GRID
-from mechdesign.numerics.arrays import Floats
-from mechdesign.report.cases import changes_in_words
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY

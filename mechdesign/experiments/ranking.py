@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.fronts import front
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.fronts import front
 
 # Differences up to this part of the largest number count as none, the precision of tables.
 _RESOLUTION = 1e-12

@@ -10,25 +10,25 @@ from itertools import product
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
-from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
 from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import goals_in
 from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.schema.sensitivities import Changed
 from mechdesign.family.goals import Goal
-from mechdesign.numerics.differences import STEPS, slope
-from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result, Table
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import Problem, StudyError, counted
+from mechdesign.ground.numerics.differences import STEPS, slope
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result, Table
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.study import Study
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted, value_at
 from mechdesign.study.text.reading import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
 from mechdesign.study.variants import Changes, entry_unit
-from mechdesign.work.threads import one_thread
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01

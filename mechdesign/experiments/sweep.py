@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.cautions import Caution
-from mechdesign.columns import Column
-from mechdesign.errors import Interrupted, StudyError, counted
+from mechdesign.door.report.cases import FRONT, RANK, text_of
+from mechdesign.door.report.requirements import DrawnCases, in_words, over_cases
 from mechdesign.experiments.answered import IMPOSSIBLE, NOT_MET, Answered
 from mechdesign.experiments.case_numbers import goals_in
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
@@ -21,19 +20,20 @@ from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.design import Design, cases_of, tried
 from mechdesign.experiments.ranking import ranked
 from mechdesign.family.goals import Goal
-from mechdesign.numerics.arrays import Flags
-from mechdesign.progress import NULL, Progress
-from mechdesign.report.cases import FRONT, RANK, text_of
-from mechdesign.report.requirements import DrawnCases, in_words, over_cases
-from mechdesign.results import Result
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import Interrupted, StudyError, counted
+from mechdesign.ground.numerics.arrays import Flags
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result
+from mechdesign.ground.work.journal import Journal, digest
+from mechdesign.ground.work.shards import Block, Shard
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.study import Study
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit, is_judged, with_entries
-from mechdesign.work.journal import Journal, digest
-from mechdesign.work.shards import Block, Shard
-from mechdesign.work.threads import one_thread
 
 _SECTION = "matrix"
 

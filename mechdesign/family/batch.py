@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.family.goals import Goal
+from mechdesign.ground.errors import MechdesignError, StudyError
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Result
 from mechdesign.mechanism import Reason
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.results import Result
 from mechdesign.study.designs import Designs
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")

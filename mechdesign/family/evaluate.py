@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import Problem, StudyError
 from mechdesign.family.columns import EVALUATED
 from mechdesign.family.family import DESIGNS_AT_ONCE, Family
 from mechdesign.family.goals import Goal, goal
 from mechdesign.family.question import DesignsQuestion
-from mechdesign.results import Table
+from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.results import Table
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.study import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import Document, dotted, plain
 from mechdesign.study.text.reading import shown
-from mechdesign.work.threads import one_thread
 
 # Most families that are kept.
 MOST_FAMILIES = 16

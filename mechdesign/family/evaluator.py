@@ -8,26 +8,26 @@ from itertools import chain
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.errors import AssemblyError, MechdesignError
 from mechdesign.family import stacked
 from mechdesign.family.batch import FAILED, Batch, Evaluated, first_reason, without_numbers
 from mechdesign.family.goals import Goal, shape_of
 from mechdesign.family.question import DesignsQuestion, regions_of
 from mechdesign.family.stacked import grouped
+from mechdesign.ground.errors import AssemblyError, MechdesignError
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Result
+from mechdesign.ground.rows import UnknownColumnError
+from mechdesign.ground.terms import terms_of
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_poses
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.look import ask
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import Question, split
 from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
-from mechdesign.results import Result
-from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.terms import terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import MechdesignError
 from mechdesign.family.batch import Evaluated, without_numbers
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.question import DesignsQuestion
 from mechdesign.family.structures import MAX_KEPT, Form, Structures, Values
+from mechdesign.ground.errors import MechdesignError
 
 # Designs evaluated together: enough for long arrays, few enough that all workers finish at about the same time.
 DESIGNS_AT_ONCE = 384

@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.expressions import Expression
 from mechdesign.family.judge import judge
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.results import Result
+from mechdesign.ground.rows import Chosen
+from mechdesign.ground.statistics import STATISTICS, Request
+from mechdesign.ground.terms import Sum, command_of, path_of, terms_of
 from mechdesign.questions.optimize.schema import Containment, Outline
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.region.shapes import Shape
-from mechdesign.results import Result
-from mechdesign.rows import Chosen
-from mechdesign.statistics import STATISTICS, Request
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Condition
 from mechdesign.study.text.units import text_of
-from mechdesign.terms import Sum, command_of, path_of, terms_of
 
 # A shape counts as contained if it fits up to this part of its size.
 ROUNDING = 1e-9
@@ -38,7 +38,7 @@ class Goal:
     name : str
         As the study gives it; of a condition with its bound.
     column : str
-        As `mechdesign.rows.terms_of` understands it; of an expression over parameters its text.
+        As `mechdesign.ground.rows.terms_of` understands it; of an expression over parameters its text.
     smallest : bool
         Whether the largest row is the worst one; of a condition, whether its bound is an upper one.
     absolute : bool

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.rounding import cleared
-from mechdesign.rows import Chosen
-from mechdesign.terms import Sum
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.rounding import cleared
+from mechdesign.ground.rows import Chosen
+from mechdesign.ground.terms import Sum
 
 Bound = Floats | float | None
 Bounds = tuple[Bound, Bound]

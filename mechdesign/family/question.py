@@ -8,23 +8,23 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from mechdesign.columns import Column
-from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.family import stacked
 from mechdesign.family.batch import Layout
 from mechdesign.family.goals import Goal, unit_of
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import AssemblyError, Problem, StudyError
+from mechdesign.ground.results import Result
+from mechdesign.ground.rows import Chosen, UnknownColumnError
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.terms import Sum, terms_of
 from mechdesign.questions.look import look
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared
 from mechdesign.questions.workspace.tables import index_columns
-from mechdesign.results import Result
-from mechdesign.rows import Chosen, UnknownColumnError
-from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount, QuantityError
 from mechdesign.study.variants import remeasured
-from mechdesign.terms import Sum, terms_of
 
 
 class DesignsQuestion:

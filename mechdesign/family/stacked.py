@@ -11,7 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import MechdesignError
+from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Result, Scope, Table
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.along import AlongMotion
@@ -21,7 +25,6 @@ from mechdesign.motion.group import DesignGroup
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import MotionQuestion, evaluate
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.dynamics.analysis import Dynamics
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.answers import Kinematics
@@ -29,13 +32,10 @@ from mechdesign.questions.look import ask
 from mechdesign.questions.poses import alike, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness.analysis import ORDER, Stiffness
-from mechdesign.results import Result, Scope, Table
-from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.text.units import Amount
 from mechdesign.study.variants import remeasured
-from mechdesign.work.threads import one_thread
 
 # Tables with a row a pose, or several, that are followed between the poses.
 A_ROW_A_POSE = {*Kinematics.a_row_a_pose, *Dynamics.a_row_a_pose, *Stiffness.a_row_a_pose}

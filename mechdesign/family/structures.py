@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import MechdesignError, StudyError
-from mechdesign.numerics.arrays import Ints
+from mechdesign.ground.errors import MechdesignError, StudyError
+from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.schema.study_file import entry

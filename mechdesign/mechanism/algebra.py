@@ -10,7 +10,7 @@ from typing import TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 
 # A number or an array that broadcasts against the batch; numbers stay numbers, which keeps constants cheap.
 Value = float | NDArray[np.floating]

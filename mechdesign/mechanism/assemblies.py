@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, largest, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.mechanism import Mechanism

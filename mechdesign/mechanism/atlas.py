@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import State
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.mechanism.algebra import TURN, Value, Vector, cross, dot, norm2, quiet, rotation, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
@@ -31,7 +32,6 @@ from mechdesign.mechanism.graph import Turn
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.wheels import Mesh, Pressed
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # A cam's follower moves by less than this part of the mechanism's size where another drive does not move it.
 UNMOVED = 1e-9

@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.roots import dips
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.roots import dips
 
 # A closure, a difference of squared lengths, touches zero where it is below this part of its largest value.
 TOUCHING = 1e-10

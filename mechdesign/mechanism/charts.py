@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import qr
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.notation import Step
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.algebra import TURN, Value, cross, quiet, rotation
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, angles_of, corners_of
@@ -24,8 +26,6 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import WITHOUT_MODE, side
 from mechdesign.mechanism.structure import Structure
-from mechdesign.notation import Step
-from mechdesign.numerics.arrays import Floats, Ints
 
 Sides = tuple[tuple[tuple[Step, ...], float], ...]
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.mechanism.algebra import cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
@@ -20,7 +21,6 @@ from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import SKETCH
 from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # Number of drive values in the search for the range in which a mechanism closes.
 SWEEP_POSES = 721

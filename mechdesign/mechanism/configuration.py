@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Ints
 from mechdesign.mechanism.algebra import Either, Value, Vector, angle_of, nearest, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
-from mechdesign.numerics.arrays import Complexes, Flags, Ints
 
 
 class Reason(IntEnum):

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism.algebra import TURN, Value, picked, wrap
 from mechdesign.mechanism.solve import NEWTON_STEPS, State
 from mechdesign.mechanism.structure import Structure
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Largest change of an unknown in one step: radians, or parts of the mechanism's size.
 MAX_CHANGE = 0.35

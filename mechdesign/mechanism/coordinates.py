@@ -8,8 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.errors import MechanismError, suggestion
-from mechdesign.expressions import Corner, Expression
+from mechdesign.ground.errors import MechanismError, suggestion
+from mechdesign.ground.expressions import Corner, Expression
+from mechdesign.ground.notation import Step
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.elements.couplings import MEASURED, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
@@ -18,7 +19,6 @@ from mechdesign.mechanism.elements.measures import Measure
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import WOUND, Description
-from mechdesign.notation import Step
 
 # The law of a cam closes after a turn where it misses its begin by less than this part of its lift.
 CLOSED = 1e-6

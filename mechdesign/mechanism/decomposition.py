@@ -12,7 +12,8 @@ from collections import defaultdict
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.numerics.graphs import components, perfect_matching
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import Edge, Graph
 from mechdesign.mechanism.structure import (
@@ -26,7 +27,6 @@ from mechdesign.mechanism.structure import (
     turning_with,
     variables_of,
 )
-from mechdesign.numerics.graphs import components, perfect_matching
 
 TWICE_AND_FREE = "the given coordinates fix one part of the mechanism twice and leave another free"
 

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, dot, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
@@ -33,7 +34,6 @@ from mechdesign.mechanism.loops import Loops, base_columns, gap_of, nothing, row
 from mechdesign.mechanism.outputs import Rates, acceleration_sensitivity, first, second
 from mechdesign.mechanism.solve import solve_linear
 from mechdesign.mechanism.structure import Group, Structure
-from mechdesign.numerics.arrays import Floats
 
 # Below this regularity a pose is singular: at a dead centre the angle between links is accurate to the root of rounding
 # only, so that rates are mostly rounding.

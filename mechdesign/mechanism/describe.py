@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import MechanismError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import MechanismError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import winding
 from mechdesign.mechanism.derivatives import regularity

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import MechanismError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.graphs import pieces
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
@@ -16,8 +18,6 @@ from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.rigidity import LoopEquations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.graphs import pieces
 
 DRIVES = "mechanism.drives"
 # Largest number of joints or links that a message names.

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
 from mechdesign.mechanism.algebra import dot
 from mechdesign.mechanism.cams import UNMOVED, CamFollower
 from mechdesign.mechanism.coordinates import Coordinate, Coupled

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
 from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.derivatives import Linearization
@@ -23,7 +24,6 @@ from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.joint_contacts import PIN, Joints
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Members whose relative rate is below this part of the fastest in the mechanism do not move against each other.
 AT_REST = 1e-9

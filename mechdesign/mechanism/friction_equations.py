@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.numerics.linear import solved
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.linear import solved
 
 # Residual of a solution, as a part of the sum of its terms.
 SOLVED = 1e-12

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.mechanism.algebra import Value, Vector, cross, norm2, picked, plus, rotation, vector
 from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import Place
-from mechdesign.numerics.arrays import Ints
 
 
 def offset_names(body: str, point: str) -> tuple[str, str]:

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.outputs import first
-from mechdesign.numerics.arrays import Floats
 
 Entries = Sequence[Sequence[Value]]
 

@@ -20,6 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, nearest, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -27,7 +28,6 @@ from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Edge, Graph
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.structure import Group, Loop, Structure, Tie
-from mechdesign.numerics.arrays import Floats
 
 # Unknowns of groups: of each its angles, its slides, then x and y of its bases (see `Structure.unknowns`).
 Unknowns = Sequence[Value] | Floats

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.derivatives import Linearization, inner
@@ -15,7 +16,6 @@ from mechdesign.mechanism.loops import Unknowns, rows_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import State, run, solve_linear
-from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
 NO_VALUE = Reason.NO_VALUE.text

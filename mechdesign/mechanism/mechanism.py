@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.errors import AssemblyError, MechanismError
+from mechdesign.ground.errors import AssemblyError, MechanismError
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
@@ -24,7 +25,6 @@ from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH
-from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps around a closed chain may differ by this (radians): they are written with ten digits.
 TIE_ROUNDING = 1e-9

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.functions import Dual
+from mechdesign.ground.functions import Dual
 from mechdesign.mechanism.algebra import Value, Vector, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate

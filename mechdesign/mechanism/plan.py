@@ -9,6 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.work.chunks import map_chunks, worker_count
+from mechdesign.ground.work.threads import keep_freed_memory
 from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
@@ -20,9 +23,6 @@ from mechdesign.mechanism.loops import Unknowns, unknowns_of
 from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
 from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.mechanism.way import Way, flat
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.work.chunks import map_chunks, worker_count
-from mechdesign.work.threads import keep_freed_memory
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14

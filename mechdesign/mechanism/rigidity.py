@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism.algebra import Value, Vector, vector, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.decomposition import TWICE_AND_FREE, Undetermined
@@ -23,7 +24,6 @@ from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.loops import Loops, gap_of, unknowns_of
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.mechanism.structure import Structure, whole
-from mechdesign.numerics.arrays import Complexes, Floats
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, Vector, cross, fit
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry

@@ -23,12 +23,12 @@ from itertools import combinations
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags
+from mechdesign.ground.numerics.linear import solved
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, largest, norm2, plus, times, vector
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Flags
-from mechdesign.numerics.linear import solved
 
 # In products of complex arrays a temporary stands first, or `np.multiply` is called: with a temporary as second factor
 # NumPy exchanges the factors of long arrays, and their last bits would differ from those of short ones.

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.linear import solved
 from mechdesign.mechanism.friction import ROUNDS, Rubs
 from mechdesign.mechanism.friction_equations import FrictionSystem
 from mechdesign.mechanism.statics import balance
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.linear import solved
 
 # Most rounds in which limits are found, and the change of friction, as a part of the largest, that ends them.
 LIMIT_ROUNDS, CONVERGED = 400, 1e-13

@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import Edge, Graph
-from mechdesign.numerics.arrays import Floats
 
 Form = Literal[
     "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides",

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism.algebra import TURN, Value, nearest, picked
 from mechdesign.mechanism.continuation import Start, follow
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Structure
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Between the start and a pose, corrections this small are enough (radians, or parts of the mechanism's size).
 PATH_PRECISION = 1e-3

@@ -7,7 +7,11 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from mechdesign.columns import Column
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.rounding import STILL, cleared, larger
+from mechdesign.ground.results import TableKind
+from mechdesign.ground.statistics import Part, Request
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.motion.curve import Curve
@@ -16,10 +20,6 @@ from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import GIVEN, Motion, SolvedPoses
 from mechdesign.motion.parts import within
 from mechdesign.motion.series import Evaluate
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.rounding import STILL, cleared, larger
-from mechdesign.results import TableKind
-from mechdesign.statistics import Part, Request
 
 # Prefix of the quotient of a function with poles, from which its mean is taken; how fast a motion passes its places.
 MEAN_OF, PACE = "mean of ", "pace"

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints, distinct, evenly
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import joined
@@ -16,7 +17,6 @@ from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats, Ints, distinct, evenly
 from mechdesign.study.text.units import Units
 
 # Largest change of a given angle, and of a given length as a part of the mechanism's size, from step to step.

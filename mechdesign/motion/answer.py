@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result, Scope
 from mechdesign.motion.followed import Courses
 from mechdesign.motion.group import DesignEnd, DesignGroup
 from mechdesign.motion.passage import pass_over
 from mechdesign.motion.question import MotionQuestion, Passage
-from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result, Scope
 
 
 def answer(question: MotionQuestion, progress: Progress = NULL, jobs: int | None = 1) -> list[DesignGroup]:

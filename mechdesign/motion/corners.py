@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.expressions import Corner
+from mechdesign.ground.expressions import Corner
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import Motion
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Floats, Ints
 
 # Halvings of the distance between two places, after which only rounding is left.
 BISECTIONS = 60

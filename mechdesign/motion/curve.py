@@ -13,7 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.expressions import Corner
+from mechdesign.ground.expressions import Corner
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, firsts
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
 from mechdesign.mechanism.coordinates import Coordinate
@@ -26,8 +28,6 @@ from mechdesign.motion.pieces import CurvePieces, Search
 from mechdesign.motion.rows import DesignNumbers, Poses
 from mechdesign.motion.rules import GivenRows
 from mechdesign.motion.turns import drive_turns
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
 
 # Largest number of nodes at which a motion is evaluated.
 BUDGET = 1 << 18

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.margins import ZERO_LENGTH, Cause
 from mechdesign.motion.curve import BEYOND, Curve
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Distance from the end of a piece at which margins are evaluated, as a part of the piece.
 BESIDE = 1e-6

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.rounding import STILL
+from mechdesign.ground.statistics import Request
 from mechdesign.motion.along import AlongMotion
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.rounding import STILL
-from mechdesign.statistics import Request
 
 
 def courses_of(along: AlongMotion, requests: Sequence[Request]) -> list[Followed | None]:

@@ -12,12 +12,12 @@ from typing import Literal
 
 import numpy as np
 
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Floats, Ints, Lanes, firsts
 from mechdesign.motion.curve import INSET
 from mechdesign.motion.means import Means, rises
 from mechdesign.motion.pieces import MOST_HALVINGS, largest
 from mechdesign.motion.series import EXACT
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Floats, Ints, Lanes, firsts
 
 # A quotient is infinite where its divisor is zero and its numerator is more than this part of its largest value.
 POLE = 1e-9

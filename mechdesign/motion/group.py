@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags, Ints
+from mechdesign.ground.results import Result, Scope, Table
+from mechdesign.ground.statistics import Request
 from mechdesign.motion.followed import Followed
-from mechdesign.numerics.arrays import Flags, Ints
-from mechdesign.results import Result, Scope, Table
-from mechdesign.statistics import Request
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, distinct
 from mechdesign.motion.pieces import MOST_HALVINGS, between_marks
 from mechdesign.motion.series import Series
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, distinct
 
 # A function without a divisor is infinite if it still rises by more than this part of itself from node to node of a
 # piece that cannot be halved.

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.cautions import Caution
-from mechdesign.columns import Column, ColumnKind
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column, ColumnKind
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerics.arrays import Ints
+from mechdesign.ground.results import Scope, Table
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import TIME
-from mechdesign.numerics.arrays import Ints
-from mechdesign.results import Scope, Table
 from mechdesign.study.text.units import Units
 
 TIMED = ColumnKind("time", "time from the begin of the motion", "time")

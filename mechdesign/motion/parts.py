@@ -7,11 +7,11 @@ from copy import copy
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.statistics import Interval
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.series import Evaluate
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.statistics import Interval
 
 
 def within(curve: Curve, intervals: Sequence[Interval], evaluate: Evaluate) -> Curve:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Ints, evenly
+from mechdesign.ground.progress import Progress
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.configuration import joined
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.question import Mark, MotionQuestion, Passage, PoseValues, Remark, evaluate, pieces
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import POSES_AT_ONCE
-from mechdesign.numerics.arrays import Flags, Ints, evenly
-from mechdesign.progress import Progress
 
 # Poses of a motion that a picture can show.
 MAX_SHOWN_POSES = 2001

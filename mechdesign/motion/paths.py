@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.text.reading import MIN_NUMBER
 
 # Pieces of a spline between two of its points whose lengths are added up.

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, Lanes, distinct
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.margins import Cause
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes, distinct
 
 # Largest number of halvings of a piece; a function that still has a corner or a jump in it stays as it is.
 MOST_HALVINGS = 40

@@ -11,8 +11,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import counted
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Drawn, LongTable, Scope, Table
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.along import AlongMotion
@@ -20,10 +24,6 @@ from mechdesign.motion.curve import Curve
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import curve_with, solve_poses
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.results import Drawn, LongTable, Scope, Table
-from mechdesign.statistics import Request
-from mechdesign.work.chunks import map_chunks
 
 
 class PoseQuestion(ABC):

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from mechdesign.expressions import Number
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.motion.rules import TIME, GivenRows, Rows
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.text.fields import Model
 from mechdesign.study.text.units import Amount
 

@@ -12,8 +12,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints, distinct
 from mechdesign.motion.paths import EvenValues, PointPath, bends, between
-from mechdesign.numerics.arrays import Complexes, Floats, Ints, distinct
 
 # What is swept along a motion over time.
 TIME = "time"

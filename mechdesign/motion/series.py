@@ -11,10 +11,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.motion.curve import AT_ONCE, BUDGET, Curve
 from mechdesign.motion.pieces import BESIDE, MOST_HALVINGS, RESOLVED, CurvePieces, largest
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # A series is exact if its truncation error is less than this part of the function's size; near a singularity, where
 # functions have fewer digits, less than this part over the conditioning.

@@ -10,6 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.work.chunks import map_chunks, worker_count
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -21,8 +23,6 @@ from mechdesign.motion.curve import Curve, from_sketch
 from mechdesign.motion.motion import Motion, SolvedPoses, radians
 from mechdesign.motion.rows import PoseGroup, Poses
 from mechdesign.motion.turns import drive_turns
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.work.chunks import map_chunks, worker_count
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 POSES_AT_ONCE = 65536

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.functions import Functions
 from mechdesign.motion.series import Evaluate
-from mechdesign.numerics.arrays import Floats, Ints
 
 # Distance of the poses from the change point and from each other (radians, or sizes of the mechanism). Nearer than the
 # first of them accelerations have lost more digits than the polynomial leaves out.

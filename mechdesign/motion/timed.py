@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.motion.paths import bends, between
 from mechdesign.motion.rules import TIME, Rows
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Times that differ by less than this part of the whole time are the same.
 SAME_TIME = 1e-9

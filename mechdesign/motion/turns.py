@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN, Value
-from mechdesign.numerics.arrays import Floats
 
 
 def drive_turns(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from mechdesign.columns import ColumnKind
 from mechdesign.commands import QUESTIONS
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.motion.motion import GIVEN as GIVEN
 from mechdesign.motion.motion import TIMED as TIMED
-from mechdesign.results import KeyNumber, TableKind
 from mechdesign.study import Units
 
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
@@ -16,7 +17,6 @@ from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.statics import Balance, Reaction
 from mechdesign.motion.question import Remark
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study.schema.loads import EFFICIENCIES
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechdesign.expressions import Corner, Expression, Number
+from mechdesign.ground.expressions import Corner, Expression, Number
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate

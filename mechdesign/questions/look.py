@@ -6,9 +6,9 @@ from collections.abc import Collection
 from importlib import import_module
 
 from mechdesign.commands import COMMANDS
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
+from mechdesign.ground.work.chunks import here
 from mechdesign.study import Study
-from mechdesign.work.chunks import here
 
 # Enough designs that one of them may well be feasible.
 DESIGNS = 10

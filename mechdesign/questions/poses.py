@@ -8,13 +8,13 @@ from typing import Self
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.passage import MAX_SHOWN_POSES, shown_rows
 from mechdesign.motion.question import Passage
 from mechdesign.motion.rows import OWN, DesignNumbers, Poses
 from mechdesign.motion.solving import POSES_AT_ONCE, solve_rows
-from mechdesign.numerics.arrays import Ints
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 

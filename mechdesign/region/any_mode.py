@@ -12,11 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.field import Field, Places
 
 

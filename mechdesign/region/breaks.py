@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.roots import bracketed_roots
 from mechdesign.mechanism.algebra import picked
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.region.field import Places
 from mechdesign.region.intervals import Intervals
 from mechdesign.region.rays import Designs, trace

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.roots import AROUND, lowest_near, parabola
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.roots import AROUND, lowest_near, parabola
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import BATCH, Designs, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.roots import bracketed_roots
 from mechdesign.mechanism.algebra import norm2
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.numerics.roots import bracketed_roots
 
 # Margins, shape (margins, ...), how far angles are from the middle of their limits, of that shape too, and rotations of
 # links, shape (links, ...), on some lanes at places between 0 and 1.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import GivenRows, Sector, Sectors
-from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.region.patches import GRID, patches
 from mechdesign.region.pieces import counted
 from mechdesign.region.rays import SINGLE, Designs

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.atlas import Atlas
@@ -19,7 +20,6 @@ from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.mechanism import Variant, drawn
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 Places = Mapping[str, Value]
 # Names, beside those of dimensions, of numbers that may differ between designs: the values of the held coordinates

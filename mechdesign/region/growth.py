@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.contacts import CONTACTS, Contacts, within_scan
 from mechdesign.region.intervals import SAME_ROOT
 from mechdesign.region.panels import Panels

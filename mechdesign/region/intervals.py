@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 
 # Roots nearer to each other than this fraction of the reach are one boundary, named by the first of its margins.
 SAME_ROOT = 1e-9

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.breaks import TOGETHER, all_breaks, signatures
 from mechdesign.region.crossings import resolved
 from mechdesign.region.field import ROUNDING

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.intervals import SAME_ROOT
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import ray_through

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import MIDDLE, Panels, find_panels
 from mechdesign.region.rays import Designs, is_turn

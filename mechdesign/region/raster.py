@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.numerics.roots import AROUND, lowest_near
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.roots import AROUND, lowest_near
 from mechdesign.region.crossings import passed
 from mechdesign.region.intervals import Intervals
 from mechdesign.region.rays import Designs, ray_through

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import picked
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.crossings import sign_changes
 from mechdesign.region.field import Field, Places
 from mechdesign.region.intervals import (

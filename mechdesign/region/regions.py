@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.ground.errors import MechanismError, StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.jacobians import mixes
 from mechdesign.motion.rows import DesignNumbers
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.any_mode import in_any_assembly
 from mechdesign.region.field import HELD, LENGTH, Field

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 
 # Change of variable on [0, 1/2]: the fraction of the interval at a value of the new variable, and its derivative.
 Map = Callable[[Floats], tuple[Floats, Floats]]

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 
 # Rays from a shape's centre to places spread along its outline; a side of a rectangle has `SIDE_RAYS` or more.
 RAYS = 120

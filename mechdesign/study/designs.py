@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Problem, StudyError
-from mechdesign.expressions import Number
+from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.motion.rows import DesignNumbers
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.loaded import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.targets import Target

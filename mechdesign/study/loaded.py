@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from mechdesign.cautions import ALL, Caution
 from mechdesign.commands import COMMANDS, SECTIONS
-from mechdesign.errors import Problem, printable
+from mechdesign.ground.cautions import ALL, Caution
+from mechdesign.ground.errors import Problem, printable
 from mechdesign.mechanism import Mechanism
 from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses

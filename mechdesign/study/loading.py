@@ -15,9 +15,10 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS, SECTIONS
-from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
-from mechdesign.expressions import Expression
-from mechdesign.functions import RESERVED
+from mechdesign.ground.errors import MechanismError, Problem, StudyError, few_comparisons
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.functions import RESERVED
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
@@ -39,7 +40,6 @@ from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reading import LOST, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
-from mechdesign.work.threads import one_thread
 
 
 def read_file(file: pathlib.Path) -> bytes:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.elements.declared import Term
 from mechdesign.mechanism.model import Description
 from mechdesign.motion.paths import EvenValues, PointPath, Polyline, Round, Spline
 from mechdesign.motion.rows import MAX_POSES, OWN, DesignNumbers, Poses
 from mechdesign.motion.rules import GivenRows, GridRows, PathRows, Rows
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
 from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, SweepText
 from mechdesign.study.text.csv_files import read_table

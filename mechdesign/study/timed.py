@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.motion.timed import SAME_TIME, TimedCourse, TimedRows
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.text.csv_files import read_table

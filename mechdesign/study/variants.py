@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import yaml
 from pydantic import ValidationError
 
-from mechdesign.errors import StudyError, printable
+from mechdesign.ground.errors import StudyError, printable
 from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.building.notations import LINK_KEYS

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
+from mechdesign.door.report.tables import csv_blocks
+from mechdesign.ground.work.threads import keep_freed_memory
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.forces import Forces, Moving, inertia
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.mechanism.statics import balance, reactions
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.report.tables import csv_blocks
-from mechdesign.work.threads import keep_freed_memory
 
 POSES, BLOCK = 1_000_000, 16_384
 SWEEP = 100_000

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import mechdesign
-from mechdesign.report.tables import to_csv
-from mechdesign.work.chunks import on
-from mechdesign.work.executors import named
-from mechdesign.work.pool import ChunkMap
+from mechdesign.door.report.tables import to_csv
+from mechdesign.ground.work.chunks import on
+from mechdesign.ground.work.executors import named
+from mechdesign.ground.work.pool import ChunkMap
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SAMPLES = int(float(os.environ.get("MECHDESIGN_SAMPLES", "2e7")))

@@ -21,17 +21,17 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.door.report.tables import csv_blocks
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.stacked import at_poses
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
-from mechdesign.report.tables import csv_blocks
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.work.chunks import map_chunks
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSES = 2_000_000

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign.report.figures import style
-from mechdesign.report.figures.pictures import pictures
+from mechdesign.drawing import style
+from mechdesign.drawing.pictures import pictures
 
 ROOT = Path(__file__).parents[2]
 # A study and a question of each kind of picture: curves, maps, samples, fronts, sweeps.

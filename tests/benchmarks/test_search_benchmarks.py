@@ -15,7 +15,7 @@ from scipy.optimize import differential_evolution
 import mechdesign
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
-from mechdesign.numerics.fronts import hypervolume
+from mechdesign.ground.numerics.fronts import hypervolume
 from mechdesign.questions.optimize.question import designs_question
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
@@ -24,7 +24,7 @@ INDICES = ("GII", "GRI", "SUI")
 SEEDS, MORE = 10, 10
 
 
-def best_of_a_line(bounds: mechdesign.results.Table) -> float:
+def best_of_a_line(bounds: mechdesign.ground.results.Table) -> float:
     """The best score of symmetrical designs with lower links of length R, l_min in steps of 0.0005, by these bounds."""
     study = mechdesign.load(STUDY, ["workspace.integrate.tolerance=1e-6"])
     l_min = np.arange(1.05, 1.15, 0.0005)

@@ -40,7 +40,7 @@ def test_cases_of_a_four_bar(benchmark: Any) -> None:
     study = mechdesign.load(text=FOUR_BAR, overrides={"matrix": {"vary": varied(CASES), "results": [RANGE, RATIO]}})
     spent = []
 
-    def sweep() -> mechdesign.results.Result:
+    def sweep() -> mechdesign.ground.results.Result:
         begun = time.process_time()
         result = mechdesign.sweep(study)
         spent.append(time.process_time() - begun)

@@ -15,12 +15,12 @@ import pytest
 from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Result
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH, Designs
-from mechdesign.results import Result
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"
 DESIGNS = 4556

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mechdesign.cautions import Caution
-from mechdesign.cli.app import app
-from mechdesign.columns import Column
-from mechdesign.report.figures import pictures
-from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Result, Table
+from mechdesign.door.cli.app import app
+from mechdesign.drawing import pictures
+from mechdesign.drawing.rendering import Gallery
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Result, Table
 
 SLIDER = """\
 name: Offset slider-crank
@@ -60,7 +60,7 @@ def analysis(monkeypatch):
     """Put a function in place of a command's analysis; it gets (study, **options)."""
 
     # What imports the analysis itself must do so before another stands in its place.
-    import_module("mechdesign.cli.check")
+    import_module("mechdesign.door.cli.check")
 
     def install(function, command="kinematics"):
         module = ModuleType(f"mechdesign.questions.{command}.analysis")

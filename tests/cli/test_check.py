@@ -121,7 +121,7 @@ sensitivities: {results: [kinematics.B.x.max], parameters: [q]}
 @pytest.mark.parametrize("arguments", [["--no-plots"], []])
 def test_checking_imports_no_solver_of_scipy(folder, arguments):
     code = (
-        "import sys\nfrom mechdesign.cli.app import main\n"
+        "import sys\nfrom mechdesign.door.cli.app import main\n"
         f"sys.argv = ['mechdesign', 'check', 'slider.yaml', *{arguments!r}]\n"
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
         "import json\njson.dump([name for name in sys.modules if '.' not in name], open('modules.json', 'w'))\n"

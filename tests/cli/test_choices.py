@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from mechdesign.cli.app import app
+from mechdesign.door.cli.app import app
 
 STUDY = """\
 mechanism:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from junitparser import JUnitXml
 
-from mechdesign.columns import Column
-from mechdesign.report import manifest
-from mechdesign.results import Table
+from mechdesign.door.report import manifest
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Table
 
 from .conftest import SLIDER, answer
 

@@ -15,10 +15,10 @@ from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
 from mechdesign import load
-from mechdesign.cli.batch import questions
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechdesignError
-from mechdesign.report.figures import style
+from mechdesign.door.cli.batch import questions
+from mechdesign.drawing import style
+from mechdesign.ground.errors import MechdesignError
 from mechdesign.study import template_path
 from mechdesign.study.templates import templates
 

@@ -3,9 +3,9 @@
 import pytest
 import typer.main
 
-from mechdesign.cli.app import app
-from mechdesign.cli.docs import commands
-from mechdesign.reference import entries, find
+from mechdesign.door.cli.app import app
+from mechdesign.door.cli.docs import commands
+from mechdesign.door.reference import entries, find
 
 
 @pytest.mark.nightly

@@ -9,7 +9,7 @@ import shutil
 import pytest
 from junitparser import JUnitXml
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
 
 from .conftest import SLIDER, answer
 

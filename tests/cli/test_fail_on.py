@@ -7,7 +7,7 @@ import json
 import pytest
 from junitparser import JUnitXml
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
 
 from .conftest import GAP, SLIDER, answer
 
@@ -62,7 +62,7 @@ def test_strict_fails_by_every_warning_and_what_is_kept_is_judged_anew(warned, i
 
 
 def test_a_picture_that_cannot_be_drawn_is_a_warning_too(folder, analysis, invoke, monkeypatch):
-    from mechdesign.report.figures import mechanism
+    from mechdesign.drawing import mechanism
 
     def fails(*_):
         raise RuntimeError("no ink")

@@ -22,13 +22,13 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.cautions import Caution
-from mechdesign.columns import Column
-from mechdesign.errors import OutputError, StudyError, explain
-from mechdesign.files import Transaction, owned
-from mechdesign.records import remove_recorded
-from mechdesign.report.writer import write_file
-from mechdesign.results import Result, Table
+from mechdesign.door.report.writer import write_file
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import OutputError, StudyError, explain
+from mechdesign.ground.files import Transaction, owned
+from mechdesign.ground.records import remove_recorded
+from mechdesign.ground.results import Result, Table
 
 from .conftest import SLIDER, answer
 from .test_optimize_resume import METHODS, STUDY
@@ -180,7 +180,7 @@ INTERRUPTED = {
 
 @pytest.mark.parametrize("where", INTERRUPTED)
 def test_an_interrupt_at_a_bad_place_comes_a_little_later(here, where):
-    words = "import os, pathlib, queue, signal, sys, threading, time, weakref\nfrom mechdesign.cli import process"
+    words = "import os, pathlib, queue, signal, sys, threading, time, weakref\nfrom mechdesign.door.cli import process"
     text = f"{words}\ndef command():\n{INTERRUPTED[where]}\n        time.sleep(60)\nprocess.run(command)"
     (here / "command.py").write_text(text)
     done = subprocess.run([sys.executable, "-m", "command"], capture_output=True, text=True, check=False, timeout=30)

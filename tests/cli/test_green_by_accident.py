@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 import mechdesign
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 
 # A crank-rocker, B.x from 50 to 104 mm. The measure `half` has no value in four of seven poses, `narrow` has none near
 # the left end alone, between two poses.

@@ -6,8 +6,8 @@ import sys
 import pytest
 import typer.main
 
-from mechdesign.cli.app import app
 from mechdesign.commands import QUESTIONS
+from mechdesign.door.cli.app import app
 
 GROUP = typer.main.get_command(app)
 EVERY = ("--out", "--set", "--seed", "--jobs", "--json", "--quiet", "--no-plots")
@@ -45,7 +45,7 @@ def test_options_of_check():
 @pytest.mark.parametrize("arguments", [["--help"], ["reliability", "--help"], ["docs", "--help"], ["--version"]])
 def test_help_imports_nothing_heavy(arguments):
     code = (
-        "import sys\nfrom mechdesign.cli.app import main\n"
+        "import sys\nfrom mechdesign.door.cli.app import main\n"
         f"sys.argv = ['mechdesign', *{arguments!r}]\n"
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
         "heavy = {'numpy', 'scipy', 'matplotlib', 'yaml', 'rich'} & set(sys.modules)\n"

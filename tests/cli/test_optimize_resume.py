@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.ground.work.journal import NAME, Journal, digest
 from mechdesign.questions.optimize.question import VariableFamily
-from mechdesign.work.journal import NAME, Journal, digest
 
 STUDY = """\
 mechanism:
@@ -256,6 +256,6 @@ def test_a_journal_of_other_batches_is_void(tmp_path):
 
 def test_api_gives_the_finished_part_with_the_interrupt(study, interrupt):
     interrupt(1)
-    with pytest.raises(mechdesign.errors.Interrupted) as stopped:
+    with pytest.raises(mechdesign.ground.errors.Interrupted) as stopped:
         mechdesign.optimize(mechdesign.load(study()))
     assert len(stopped.value.result.tables["designs"]) == 384

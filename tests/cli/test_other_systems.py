@@ -41,7 +41,7 @@ ctypes.CDLL = Library
 multiprocessing.set_start_method("spawn")
 
 # Workers begin with the first work, however short it is.
-from mechdesign.work import pool
+from mechdesign.ground.work import pool
 
 pool._FRESH = 1e-9
 """

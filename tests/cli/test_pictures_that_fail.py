@@ -59,7 +59,7 @@ def test_what_pictures_share_fails(folder, invoke, monkeypatch):
 
 @pytest.mark.nightly
 def test_every_picture_fails(folder, invoke, monkeypatch):
-    from mechdesign.report.figures import style
+    from mechdesign.drawing import style
 
     invoke("kinematics", STUDY)
     monkeypatch.setattr(style, "encoded", failing)
@@ -72,7 +72,7 @@ def test_every_picture_fails(folder, invoke, monkeypatch):
 
 
 def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
-    from mechdesign.report.figures import mechanism
+    from mechdesign.drawing import mechanism
 
     monkeypatch.setattr(mechanism, "sketch_picture", failing)
     done = invoke("check", STUDY)

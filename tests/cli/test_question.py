@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from mechdesign.cli.app import app
-from mechdesign.errors import AssemblyError, MechdesignError
+from mechdesign.door.cli.app import app
+from mechdesign.ground.errors import AssemblyError, MechdesignError
 from mechdesign.study import template_path
 
 from .conftest import GAP, SLIDER, answer

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.errors import AssemblyError, Interrupted
+from mechdesign.door.report.page import printing
+from mechdesign.ground.errors import AssemblyError, Interrupted
 from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.report.page import printing
 
 from .conftest import SLIDER, answer
 

@@ -11,20 +11,20 @@ import pytest
 from helpers.pictures import figure_of
 
 from mechdesign import load
+from mechdesign.door.report.page.frames import frames
+from mechdesign.door.report.page.headlines import headlines
+from mechdesign.door.report.page.page import AnsweredQuestion, report
+from mechdesign.door.report.page.printing import pdf
+from mechdesign.door.report.page.section import section
+from mechdesign.door.report.page.vector import picture
+from mechdesign.door.report.requirements import requirements
+from mechdesign.drawing import style
 from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
-from mechdesign.report.figures import style
-from mechdesign.report.page.frames import frames
-from mechdesign.report.page.headlines import headlines
-from mechdesign.report.page.page import AnsweredQuestion, report
-from mechdesign.report.page.printing import pdf
-from mechdesign.report.page.section import section
-from mechdesign.report.page.vector import picture
-from mechdesign.report.requirements import requirements
 
 try:
     from playwright.sync_api import expect

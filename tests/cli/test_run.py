@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import pytest
 from junitparser import JUnitXml
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import AssemblyError
 
 from .conftest import GAP, SLIDER, answer
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.work import shards
-from mechdesign.work.shards import FILE, Shard
+from mechdesign.ground.work import shards
+from mechdesign.ground.work.shards import FILE, Shard
 
 from .conftest import SLIDER
 

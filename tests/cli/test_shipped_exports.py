@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.exporting.exports import exports
+from mechdesign.door.exporting.exports import exports
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))

@@ -117,10 +117,10 @@ import sys, time
 from dataclasses import replace
 from types import ModuleType
 import numpy as np
-from mechdesign.cli import process
-from mechdesign.errors import Interrupted
-from mechdesign.columns import Column
-from mechdesign.results import Result, Table
+from mechdesign.door.cli import process
+from mechdesign.ground.errors import Interrupted
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Result, Table
 
 def kinematics(study, *, seed, jobs, progress):
     result = Result("kinematics", {"motion": Table("motion", (Column("theta", np.arange(3.0), "deg"),))})
@@ -138,7 +138,7 @@ module.kinematics = kinematics
 sys.modules[module.__name__] = module
 
 def command():
-    from mechdesign.cli.app import app
+    from mechdesign.door.cli.app import app
     app()
 
 process.run(command)

@@ -22,8 +22,8 @@ LIBRARY = re.compile(
 # Commands in a row; each says first which it is.
 COMMANDS = """
 import json, sys
-from mechdesign.cli import process
-from mechdesign.cli.app import app
+from mechdesign.door.cli import process
+from mechdesign.door.cli.app import app
 
 def command():
     for words in json.load(sys.stdin):

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.cli import terminal
-from mechdesign.cli.live_table import LiveTable, ProgressNote
-from mechdesign.cli.outcome import Outcome
-from mechdesign.cli.summary import summary
-from mechdesign.report.figures import pictures, style
-from mechdesign.report.figures.rendering import Gallery
+from mechdesign.door.cli import terminal
+from mechdesign.door.cli.live_table import LiveTable, ProgressNote
+from mechdesign.door.cli.outcome import Outcome
+from mechdesign.door.cli.summary import summary
+from mechdesign.drawing import pictures, style
+from mechdesign.drawing.rendering import Gallery
 
 from .conftest import SLIDER, answer
 
@@ -27,9 +27,9 @@ PROGRAM = """
 import sys, time
 from types import ModuleType
 import numpy as np
-from mechdesign.cli.app import main
-from mechdesign.columns import Column
-from mechdesign.results import Result, Table
+from mechdesign.door.cli.app import main
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Result, Table
 
 def kinematics(study, *, seed, jobs, progress):
     progress.start(10, "poses")

@@ -12,10 +12,10 @@ import pytest
 
 import mechdesign
 from mechdesign.commands import QUESTIONS
-from mechdesign.errors import StudyError
-from mechdesign.exporting.exports import exports
-from mechdesign.reference.tables import tables
-from mechdesign.report.names import names
+from mechdesign.door.exporting.exports import exports
+from mechdesign.door.reference.tables import tables
+from mechdesign.door.report.names import names
+from mechdesign.ground.errors import StudyError
 
 from .conftest import SLIDER, answer
 

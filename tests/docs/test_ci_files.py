@@ -10,7 +10,7 @@ import pytest
 import typer.main
 import yaml
 
-from mechdesign.cli.app import app
+from mechdesign.door.cli.app import app
 
 FOLDER = Path(__file__).parents[2] / "docs" / "ci"
 GROUP = typer.main.get_command(app)

@@ -10,7 +10,7 @@ import pytest
 
 import mechdesign
 from mechdesign.commands import COMMANDS
-from mechdesign.reference import entries
+from mechdesign.door.reference import entries
 
 ROOT = Path(__file__).parents[2]
 # Where each page says how far the tool goes: from, and up to.

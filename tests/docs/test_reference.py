@@ -19,10 +19,10 @@ from helpers.studies import study_of
 from helpers.tables import named, unsaid
 
 import mechdesign
-from mechdesign.cautions import KINDS
-from mechdesign.errors import AssemblyError
-from mechdesign.reference import entries, tables
-from mechdesign.results import Result
+from mechdesign.door.reference import entries, tables
+from mechdesign.ground.cautions import KINDS
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.results import Result
 
 ROOT = Path(__file__).parents[2]
 FIVE_BAR = """
@@ -187,7 +187,7 @@ def test_every_table_and_column_of_answers_is_made_by_its_declaration():
     made = [
         f"{path.name}:{call.lineno}"
         for folder in ("questions", "region", "experiments")
-        for path in (*(ROOT / "mechdesign" / folder).rglob("*.py"), ROOT / "mechdesign/cli/summary.py")
+        for path in (*(ROOT / "mechdesign" / folder).rglob("*.py"), ROOT / "mechdesign/door/cli/summary.py")
         for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in ("Table", "Column")
         and path.name != "together.py"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 import typer.main
 
-from mechdesign.cli.app import app
+from mechdesign.door.cli.app import app
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

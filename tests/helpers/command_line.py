@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 from typer.testing import CliRunner, Result
 
-from mechdesign.cli.app import app
+from mechdesign.door.cli.app import app
 
 
 def ask(*arguments: object, study: str) -> Result:

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from mechdesign.errors import AssemblyError
 from mechdesign.family.stacked import at_poses
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.results import Result, Table
 from mechdesign.motion.group import DesignGroup
 from mechdesign.questions.poses import alike, study_poses
-from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mechdesign import load
+from mechdesign.ground.results import Result
 from mechdesign.questions.kinematics.analysis import kinematics
-from mechdesign.results import Result
 from mechdesign.study import Study
 
 FOLDER = Path(__file__).parents[2] / "configs" / "gallery"

@@ -17,7 +17,7 @@ from random import Random
 import numpy as np
 import yaml
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 GROUND = "ground"
 # The same text, ten times as fast, where PyYAML has its C library.

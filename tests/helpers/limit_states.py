@@ -10,7 +10,7 @@ from math import comb, factorial
 import numpy as np
 from scipy.special import gammaincc, ndtr, ndtri
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.problem import LimitStates
 from mechdesign.questions.reliability.laws import MeasuredLaw
 

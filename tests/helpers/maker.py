@@ -11,7 +11,7 @@ from random import Random
 import numpy as np
 
 from helpers.layouts import GROUND, Body, Clamp, Coordinate, Follower, Guide, Layout
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 
 # A group: its new links ("link" or telescopic "leg"), its joints (kind, link, link), the base being -1, and its
 # drives (kind, new link). R revolute, P prismatic, S pin in slot, F fixed; which side has the line is drawn.

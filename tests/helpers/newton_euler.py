@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from helpers.layouts import GROUND, Coordinate, Follower, Layout
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 # What a constraint belongs to: ("pin", point, link), ("slide" | "tie", joint or leg) or ("drive", name).
 Label = tuple[str, ...]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from mechdesign.report.figures import style
+from mechdesign.drawing import style
 
 # Texts may share so many pixels: letters seldom fill their box to its corners.
 SHARED = 2.0

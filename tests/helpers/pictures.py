@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.pictures import pictures
-from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Result
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.pictures import pictures
+from mechdesign.drawing.rendering import Gallery
+from mechdesign.ground.results import Result
 from mechdesign.study import Study
 
 

@@ -19,12 +19,12 @@ from helpers.layouts import DUMPER, GROUND, Coordinate
 from helpers.newton_euler import Bodies, Jet
 from helpers.random_mechanisms import Made, mechanisms
 from helpers.studies import study_of
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.results import Result
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.solving import solve_poses
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.poses import study_poses
-from mechdesign.results import Result
 from mechdesign.study import Study
 
 # A number, or an expression of a coordinate and its velocity: how a study writes it, and what it comes to.

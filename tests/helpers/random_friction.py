@@ -13,7 +13,7 @@ from helpers.layouts import DUMPER
 from helpers.newton_euler import Jet
 from helpers.random_dynamics import Loaded
 from helpers.random_mechanisms import Made, mechanisms
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 
 ROUNDS = 400
 CONVERGED = 1e-13

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from helpers.layouts import Coordinate, Layout
 from helpers.maker import DRIVEN, DYADS, TRIADS, Maker
 from helpers.studies import study_of
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.numerics.arrays import Floats
 
 
 class Made:

@@ -8,7 +8,7 @@ import numpy as np
 
 from helpers.joint_plane import Robot
 from helpers.studies import study_of
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH, SINGLE

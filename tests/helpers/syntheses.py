@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 # What a design costs that does not assemble, and the more so by how much it does not.
 OPEN = 1e6

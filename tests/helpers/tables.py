@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from mechdesign.columns import PLACE, ColumnKind
-from mechdesign.reference import tables
+from mechdesign.door.reference import tables
+from mechdesign.ground.columns import PLACE, ColumnKind
 from mechdesign.study.text.units import KINDS, Units
 
 

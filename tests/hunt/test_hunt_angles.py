@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.errors import AssemblyError
 from mechdesign.family.stacked import tables
+from mechdesign.ground.errors import AssemblyError
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability.analysis import reliability

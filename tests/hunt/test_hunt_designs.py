@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 import mechdesign
-from mechdesign.errors import MechdesignError
 from mechdesign.experiments.answered import Answered
 from mechdesign.experiments.case_numbers import number_of
 from mechdesign.experiments.cases import answers
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
+from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.results import Result
 from mechdesign.motion.group import DesignGroup
 from mechdesign.questions.optimize.question import designs_question
-from mechdesign.results import Result
 
 Seeds = Callable[[int], Iterator[int]]
 NOMINAL = {"p": 10.0, "q": 20.0, "s": 5.0}

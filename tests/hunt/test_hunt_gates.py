@@ -42,7 +42,7 @@ def check(rng: np.random.Generator, text: str, scan: dict[str, np.ndarray]) -> N
     study = study_of(text + "requirements:\n" + "\n".join(lines) + "\n")
     try:
         result = mechdesign.kinematics(study)
-    except mechdesign.errors.AssemblyError:
+    except mechdesign.ground.errors.AssemblyError:
         assert lost.any()
         return
     for (name, upper, bound, _), verdict in zip(wanted, mechdesign.requirements(study, result), strict=True):

@@ -24,9 +24,9 @@ import pytest
 from typer.testing import CliRunner
 
 from mechdesign import load
-from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import StudyError
+from mechdesign.door.cli.app import app
+from mechdesign.ground.errors import StudyError
 from mechdesign.questions.dynamics import motion_in_time
 from mechdesign.questions.optimize import variables
 from mechdesign.study import poses, template

@@ -12,10 +12,10 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
+from mechdesign.ground.results import Result
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH, SINGLE
-from mechdesign.results import Result
 
 Complex = np.ndarray
 Flags = np.ndarray

@@ -18,7 +18,7 @@ from scipy.special import j0, j1
 from scipy.stats import beta
 
 import mechdesign
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 
 Seeds = Callable[[int], Iterator[int]]
 

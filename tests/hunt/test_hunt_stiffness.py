@@ -19,7 +19,7 @@ from helpers.random_mechanisms import Made
 from helpers.random_stiffness import Sprung
 from helpers.studies import study_of
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.solving import solve_poses
 from mechdesign.questions.poses import study_poses

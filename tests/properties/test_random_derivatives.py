@@ -12,13 +12,13 @@ import pytest
 from helpers.random_mechanisms import Made, mechanisms
 from hypothesis import assume, given, settings
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import offset_names
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
-from mechdesign.numerics.arrays import Floats
 
 BEND = 0.7
 STEPS = (-2, -1, 0, 1, 2)

@@ -13,7 +13,7 @@ from helpers.layouts import GROUND, Coordinate, Follower, Layout
 from helpers.random_dynamics import Loaded, loaded
 from hypothesis import given, settings
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 EXACT = 1e-10
 

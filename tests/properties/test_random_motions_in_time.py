@@ -12,9 +12,9 @@ from helpers.random_friction import Rubbed, rubbed
 from helpers.studies import study_of
 from hypothesis import assume, event, given, settings
 
-from mechdesign.errors import MechdesignError
+from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.results import Result
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result
 
 DURATION, ROWS = 0.02, 4
 # Part of the largest number that takes part within which forces agree, and of the energies.

@@ -16,7 +16,7 @@ from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.ground.errors import MechanismError, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.assemblies import assemblies

@@ -19,7 +19,7 @@ from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 import mechdesign
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.solving import solve_poses
 from mechdesign.questions.poses import study_poses

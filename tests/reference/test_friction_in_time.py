@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result, Table
 
 G = 9.81
 UNITS = "units: {length: m, angle: rad, force: N}\n"

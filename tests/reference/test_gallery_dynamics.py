@@ -8,7 +8,7 @@ from helpers.gallery import point, row, study_named, unit
 from scipy.special import ellipk
 
 import mechdesign
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
 
 
 def result_of(name: str) -> Result:

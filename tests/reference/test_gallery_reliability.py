@@ -9,7 +9,7 @@ import pytest
 from helpers.gallery import meet, study_named, unit
 
 import mechdesign
-from mechdesign.results import Table
+from mechdesign.ground.results import Table
 
 
 def below(x):

@@ -9,8 +9,8 @@ import pytest
 from helpers.studies import study_of
 from scipy.special import ellipk
 
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result, Table
 from tests.reference.test_textbook_dynamics import SQUEEZER
 
 UNITS = "units: {length: m, angle: rad, force: N}\n"

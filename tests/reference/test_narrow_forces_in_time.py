@@ -11,8 +11,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
+from mechdesign.ground.results import Result
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result
 
 G = 9.81
 UNITS = "units: {length: m, angle: rad, force: N}\n"

@@ -13,9 +13,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.reliability.engine.problem import CONFIDENCE
 from mechdesign.questions.reliability.methods.auto import PILOT
-from mechdesign.results import Result, Table
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 ARM = {0.03: 1.4855308e-1, 0.05: 6.5387526e-3, 0.08: 3.218867e-6, 0.10: 1.6566e-9}

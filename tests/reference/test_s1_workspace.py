@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH, SINGLE
 from mechdesign.region.rules import Rule
-from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SAMPLES = 40_000

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
 
 STUDY = Path(__file__).parents[2] / "configs" / "toggle.yaml"
 ORDERS = ("position", "velocity", "acceleration")

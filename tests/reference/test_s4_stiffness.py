@@ -37,7 +37,7 @@ def load(kind: str) -> Study:
     return mechdesign.load(CONFIGS / TYPES[kind])
 
 
-def compliance(result: mechdesign.results.Result, row: int) -> np.ndarray:
+def compliance(result: mechdesign.ground.results.Result, row: int) -> np.ndarray:
     table = result.tables["compliance"]
     matrix = np.zeros((3, 3))
     for name in ENTRIES:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
+from mechdesign.ground.results import Result
 from mechdesign.questions.dynamics.analysis import dynamics
-from mechdesign.results import Result
 
 SLENDER = 0.01  # height of the links of Marghitu's examples, m
 

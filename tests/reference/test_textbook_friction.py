@@ -7,7 +7,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
 
 
 def answer(text: str, *overrides: str, question: str = "dynamics") -> Result:

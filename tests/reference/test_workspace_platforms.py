@@ -8,7 +8,7 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.errors import AssemblyError
 
 FIVE_BAR = """
 units: {length: m}

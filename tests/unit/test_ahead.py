@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign.statistics import Request
-from mechdesign.work import ahead
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.work import ahead
 
 MODULE = "module_that_takes_long"
 FOUR_BAR = """

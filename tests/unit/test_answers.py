@@ -9,14 +9,14 @@ import pytest
 from helpers.designs import each_of
 from helpers.studies import study_of
 
-from mechdesign.columns import Column
-from mechdesign.errors import AssemblyError
 from mechdesign.family.stacked import at_poses
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Result
+from mechdesign.ground.statistics import Request
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.poses import study_poses
-from mechdesign.results import Result
-from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs, variant
 

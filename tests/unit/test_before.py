@@ -11,13 +11,13 @@ from helpers.studies import study_of
 from typer.testing import CliRunner
 
 import mechdesign
-from mechdesign.cli.app import app
-from mechdesign.errors import StudyError
-from mechdesign.report.figures import style
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.overlay import COLOR
-from mechdesign.report.figures.pictures import figures
-from mechdesign.report.page.moving import moving
+from mechdesign.door.cli.app import app
+from mechdesign.door.report.page.moving import moving
+from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.overlay import COLOR
+from mechdesign.drawing.pictures import figures
+from mechdesign.ground.errors import StudyError
 
 FOUR_BAR = """
 mechanism:

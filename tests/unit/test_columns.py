@@ -5,8 +5,8 @@ import pickle
 import numpy as np
 import pytest
 
-from mechdesign.columns import ColumnKind
-from mechdesign.results import TableKind
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import TableKind
 
 SPEED = ColumnKind("<output>_velocity", "velocity of <output>", "as the output, per time")
 SPRINGS = TableKind.of("springs", "springs <of what>", SPEED, ("x, y", "place of <link>", "length"), ("leg", "its leg"))

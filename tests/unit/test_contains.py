@@ -12,9 +12,9 @@ from helpers.studies import study_of
 from scipy.optimize import brentq
 
 import mechdesign
-from mechdesign.errors import StudyError
 from mechdesign.family.evaluator import Evaluator
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.inscribed import crossed

@@ -11,12 +11,12 @@ from helpers.studies import SLIDER_CRANK, study_of
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.exporting.sheet import BLOCK, PAPERS, PaperSheet
-from mechdesign.exporting.view import PosedStudy
-from mechdesign.report.figures import style
-from mechdesign.report.figures.dimensions import dimensions_picture, table_rows
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.scene import pose
+from mechdesign.door.exporting.sheet import BLOCK, PAPERS, PaperSheet
+from mechdesign.door.exporting.view import PosedStudy
+from mechdesign.drawing import style
+from mechdesign.drawing.dimensions import dimensions_picture, table_rows
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.scene import pose
 
 FOUR_BAR = """
 mechanism:
@@ -71,7 +71,7 @@ def test_the_table_tells_tolerances_and_sections():
 
 @pytest.mark.slow
 def test_the_pose_that_fails_most_is_drawn_beside_the_sketch():
-    from mechdesign.report.figures.mechanism import mechanism_picture
+    from mechdesign.drawing.mechanism import mechanism_picture
 
     study = study_of(FOUR_BAR.replace("poses: [{theta: 90}]", "poses: [{theta: 90}, {theta: 40}]\n"
                                       "  limits: {C: {radius: 0.2}}\n  samples: 2000"))  # fmt: skip

@@ -8,14 +8,14 @@ from matplotlib.patches import PathPatch
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.labels import Label, paper, place_labels, positions
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.mechanism import mechanism_picture
-from mechdesign.report.figures.scene import hull, pose
-from mechdesign.report.figures.shapes import BAR, Line, Symbol, mechanism_shapes
-from mechdesign.results import Result
+from mechdesign.drawing import style
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.labels import Label, paper, place_labels, positions
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.mechanism import mechanism_picture
+from mechdesign.drawing.scene import hull, pose
+from mechdesign.drawing.shapes import BAR, Line, Symbol, mechanism_shapes
+from mechdesign.ground.results import Result
 
 SLIDER = """
 mechanism:

@@ -11,10 +11,10 @@ from helpers.pages import faults
 from helpers.pictures import figure_of
 
 import mechdesign
+from mechdesign.drawing import style
+from mechdesign.drawing.pictures import figures
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import actions_on
-from mechdesign.report.figures import style
-from mechdesign.report.figures.pictures import figures
 
 SPRUNG = """
 units: {length: mm}

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import mechdesign
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 
 FOUR_BAR = """
 mechanism:

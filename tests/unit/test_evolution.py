@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.numerics.evolution import MUTATION_INDEX, offspring, simplex, survivors
-from mechdesign.numerics.fronts import crowding, front, hypervolume
+from mechdesign.ground.numerics.evolution import MUTATION_INDEX, offspring, simplex, survivors
+from mechdesign.ground.numerics.fronts import crowding, front, hypervolume
 from mechdesign.questions.optimize.variables import from_cube
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechdesign.expressions import Expression
-from mechdesign.functions import Dual
-from mechdesign.notation import ExpressionError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.functions import Dual
+from mechdesign.ground.notation import ExpressionError
 
 DEGREE = math.pi / 180
 

@@ -11,9 +11,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.family.goals import unit_of
-from mechdesign.results import Table
+from mechdesign.ground.errors import MechdesignError, StudyError
+from mechdesign.ground.results import Table
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -6,15 +6,15 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import mechdesign
-from mechdesign.cautions import ALL, KINDS
 from mechdesign.commands import COMMANDS
+from mechdesign.ground.cautions import ALL, KINDS
 
 ROOT = Path(mechdesign.__file__).parent
 # Folders and files from the bottom to the top; each may import what stands in its own line and above.
 ORDER = (
-    ("mechdesign.numerics",),
-    ("mechdesign",),  # the files beside the folders: results, errors, expressions, ...
-    ("mechdesign.work",),
+    ("mechdesign.ground.numerics",),
+    ("mechdesign.ground", "mechdesign.commands"),  # results, errors, expressions, ...; the list of questions
+    ("mechdesign.ground.work",),
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
     ("mechdesign.motion",),
@@ -37,15 +37,16 @@ ORDER = (
     ("mechdesign.questions.workspace",),
     ("mechdesign.family",),
     ("mechdesign.questions.optimize",),
-    ("mechdesign.report.figures",),
+    ("mechdesign.drawing",),
     tuple(f"mechdesign.questions.{name}.figures" for name in COMMANDS),
-    ("mechdesign.report",),
+    ("mechdesign.door.report",),
     ("mechdesign.experiments",),
-    ("mechdesign.importing",),
-    ("mechdesign.exporting",),
-    ("mechdesign.api",),
-    ("mechdesign.reference",),
-    ("mechdesign.cli",),
+    ("mechdesign.study.importing",),
+    ("mechdesign.door",),
+    ("mechdesign.door.exporting",),
+    ("mechdesign.door.api",),
+    ("mechdesign.door.reference",),
+    ("mechdesign.door.cli",),
     ("mechdesign.__init__", "mechdesign.__main__"),
 )  # fmt: skip
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}

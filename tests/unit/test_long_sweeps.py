@@ -13,12 +13,12 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import OutputError
+from mechdesign.door.report.requirements import requirements
+from mechdesign.door.report.tables import csv_blocks
+from mechdesign.ground.errors import OutputError
+from mechdesign.ground.results import LongTable, Result
 from mechdesign.motion import passage, solving
 from mechdesign.questions.kinematics import remarks
-from mechdesign.report.requirements import requirements
-from mechdesign.report.tables import csv_blocks
-from mechdesign.results import LongTable, Result
 
 # Every table with a row a pose, limits between the poses, poses that fail, targets and requirements of their errors.
 FOUR_BAR = """

@@ -10,6 +10,13 @@ from matplotlib.patches import Polygon
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.marks import Picture
+from mechdesign.drawing.mechanism import sketch_picture
+from mechdesign.drawing.panels import drawn_plane
+from mechdesign.drawing.pictures import figures
+from mechdesign.drawing.sweep import Sweep, ranks
 from mechdesign.questions.kinematics.figures.animation import _frames as frames_of
 from mechdesign.questions.kinematics.figures.animation import in_order
 from mechdesign.questions.kinematics.figures.centrodes import centrodes
@@ -18,13 +25,6 @@ from mechdesign.questions.kinematics.figures.paths import path_looks, path_marks
 from mechdesign.questions.kinematics.figures.polygons import centripetal, images
 from mechdesign.questions.kinematics.figures.poses import place_of
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.marks import Picture
-from mechdesign.report.figures.mechanism import sketch_picture
-from mechdesign.report.figures.panels import drawn_plane
-from mechdesign.report.figures.pictures import figures
-from mechdesign.report.figures.sweep import Sweep, ranks
 
 FOUR_BAR = """
 mechanism:

@@ -13,10 +13,10 @@ from helpers.tracks import decoded
 
 import mechdesign
 from mechdesign import load
+from mechdesign.door.report.page.frames import frames
+from mechdesign.door.report.page.moving import moving
+from mechdesign.door.report.page.tracks import PLACES, TURNS, joined
 from mechdesign.questions.workspace.analysis import workspace
-from mechdesign.report.page.frames import frames
-from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import PLACES, TURNS, joined
 
 
 def places(data, point):

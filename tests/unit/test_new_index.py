@@ -7,9 +7,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.door.report.tables import to_csv
+from mechdesign.drawing.pictures import figures
 from mechdesign.questions.workspace import indices
-from mechdesign.report.figures.pictures import figures
-from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.study_file import schema
 
 FILE = '''

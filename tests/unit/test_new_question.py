@@ -37,7 +37,7 @@ class MobilitySection(Section):
     "columns.py": '''
 """The table of mobility and its columns."""
 
-from mechdesign.results import KeyNumber, TableKind
+from mechdesign.ground.results import KeyNumber, TableKind
 
 MOBILITY = TableKind.of("mobility", "what moves", ("links", "number of links"), ("freedoms", "degrees of freedom"))
 KEY_NUMBERS = (KeyNumber(MOBILITY, "freedoms", "degrees of freedom", "first"),)
@@ -45,10 +45,10 @@ KEY_NUMBERS = (KeyNumber(MOBILITY, "freedoms", "degrees of freedom", "first"),)
     "analysis.py": '''
 """Count what moves."""
 
-from mechdesign.progress import NULL
+from mechdesign.ground.progress import NULL
 from mechdesign.questions.mobility.columns import MOBILITY
 from mechdesign.questions.mobility.schema import MobilitySection
-from mechdesign.results import Result
+from mechdesign.ground.results import Result
 
 
 def mobility(study, *, seed=None, jobs=1, progress=NULL):
@@ -61,8 +61,8 @@ def mobility(study, *, seed=None, jobs=1, progress=NULL):
     "figures/counts.py": '''
 """What was counted, as bars."""
 
-from mechdesign.report.figures.marks import Axis, Bars, Panel, Picture
-from mechdesign.report.figures.pictures import View, picture
+from mechdesign.drawing.marks import Axis, Bars, Panel, Picture
+from mechdesign.drawing.pictures import View, picture
 
 
 @picture(View, "counts")

@@ -9,11 +9,11 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mechdesign.expressions import Expression
-from mechdesign.numerics.differences import STEPS, slope
-from mechdesign.numerics.graphs import components
-from mechdesign.numerics.roots import bracketed_roots
-from mechdesign.numerics.sign_changes import Resolved
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerics.differences import STEPS, slope
+from mechdesign.ground.numerics.graphs import components
+from mechdesign.ground.numerics.roots import bracketed_roots
+from mechdesign.ground.numerics.sign_changes import Resolved
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -11,6 +11,10 @@ from helpers.studies import study_of
 from matplotlib.collections import QuadMesh
 
 import mechdesign
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.marks import Dots, Panel, Picture
+from mechdesign.drawing.pictures import figures
 from mechdesign.family.goals import Goal
 from mechdesign.questions.optimize.figures.designs import value_text
 from mechdesign.questions.optimize.figures.front import front_picture
@@ -22,10 +26,6 @@ from mechdesign.questions.optimize.figures.scores import (
     score_curves,
 )
 from mechdesign.questions.optimize.judge import DesignSet
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.marks import Dots, Panel, Picture
-from mechdesign.report.figures.pictures import figures
 
 ARM = """
 mechanism:
@@ -226,10 +226,10 @@ def test_few_designs_of_a_grid_are_cells() -> None:
     table, values = result.tables["designs"], np.asarray(cells.get_array())
     corners = np.asarray(cells.get_coordinates())
     middles = (corners[:-1, :-1] + corners[1:, 1:]) / 2
-    for design in range(len(table)):
-        distance = np.hypot(*(middles - [table["a"][design], table["b"][design]]).transpose(2, 0, 1))
+    for a, b, goal in zip(*(table[name] for name in ("a", "b", "kinematics.P.x")), strict=True):
+        distance = np.hypot(*(middles - [a, b]).transpose(2, 0, 1))
         assert distance.min() == pytest.approx(0, abs=1e-9)
-        assert values.reshape(distance.shape)[distance == distance.min()] == pytest.approx(table["kinematics.P.x"][design])
+        assert values.reshape(distance.shape)[distance == distance.min()] == pytest.approx(goal)
 
 
 FOUR_BAR = """

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign.report.tables import to_csv
-from mechdesign.work import executors, pool
-from mechdesign.work.chunks import map_chunks, on
-from mechdesign.work.pool import LOOK_AHEAD, ChunkMap, LostWorkerError, Pool
-from mechdesign.work.processes import Processes
+from mechdesign.door.report.tables import to_csv
+from mechdesign.ground.work import executors, pool
+from mechdesign.ground.work.chunks import map_chunks, on
+from mechdesign.ground.work.pool import LOOK_AHEAD, ChunkMap, LostWorkerError, Pool
+from mechdesign.ground.work.processes import Processes
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

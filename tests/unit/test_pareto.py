@@ -9,7 +9,7 @@ from helpers.studies import study_of
 from helpers.syntheses import tray
 
 import mechdesign
-from mechdesign.numerics.fronts import crowding
+from mechdesign.ground.numerics.fronts import crowding
 from mechdesign.questions.optimize.explorer import Explorer, Points
 from mechdesign.questions.optimize.pareto import evolve_front, front, knee
 from mechdesign.questions.optimize.search import sample

@@ -8,11 +8,11 @@ from helpers.stiffness import FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.door.report import writer
+from mechdesign.door.report.manifest import Extras
 from mechdesign.mechanism.plan import Plan
 from mechdesign.questions import poses
 from mechdesign.questions.kinematics.special_poses import MOST
-from mechdesign.report import writer
-from mechdesign.report.manifest import Extras
 
 FOUR_BAR = """
 mechanism:

@@ -8,7 +8,7 @@ from helpers.studies import study_of
 from scipy.special import ndtr, owens_t
 
 import mechdesign
-from mechdesign.numerics.statistics import rectangle_failure
+from mechdesign.ground.numerics.statistics import rectangle_failure
 from mechdesign.questions.reliability.circles import disc_failure, disc_failures
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial
 from mechdesign.questions.reliability.first_order import correlation

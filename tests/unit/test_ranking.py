@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.door.report.cases import best_of
+from mechdesign.door.report.page.cases import MOST_CELLS, gates, telling_rows
+from mechdesign.door.report.page.headlines import headlines
 from mechdesign.experiments.ranking import ranked
 from mechdesign.motion.functions import Functions
-from mechdesign.report.cases import best_of
-from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
-from mechdesign.report.page.headlines import headlines
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE, ANGLE = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
@@ -186,7 +186,7 @@ def test_a_case_that_does_not_turn_has_no_rank_and_is_told_unless_it_may_be_so()
     ],
 )
 def test_what_is_wrong_with_the_goals_is_told(best: dict[str, Any], message: str):
-    with pytest.raises(mechdesign.errors.StudyError) as error:
+    with pytest.raises(mechdesign.ground.errors.StudyError) as error:
         swept(best)
     assert message in str(error.value)
 

@@ -3,11 +3,11 @@
 import pytest
 from pydantic import ValidationError
 
-from mechdesign.indices import INDEX_NAMES
+from mechdesign.door.reference import below, entries, find, near, place
+from mechdesign.door.reference.keys import Key, keys
+from mechdesign.ground.indices import INDEX_NAMES
 from mechdesign.questions.reliability import task
 from mechdesign.questions.workspace import quadrature, question
-from mechdesign.reference import below, entries, find, near, place
-from mechdesign.reference.keys import Key, keys
 from mechdesign.region import regions
 from mechdesign.study.schema.study_file import schema
 from mechdesign.study.text.document import read

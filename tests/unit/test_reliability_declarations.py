@@ -11,15 +11,15 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.door.report.tables import to_csv
+from mechdesign.drawing import style
+from mechdesign.drawing.pictures import figures
 from mechdesign.questions.reliability.engine.design_points import DesignPoints
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates
 from mechdesign.questions.reliability.methods import normal
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.task import MethodResult, Task
-from mechdesign.report.figures import style
-from mechdesign.report.figures.pictures import figures
-from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.study_file import schema
 
 LEVER = """

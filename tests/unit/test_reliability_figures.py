@@ -13,15 +13,15 @@ from matplotlib.patches import StepPatch
 from matplotlib.path import Path as Outline
 
 import mechdesign
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.looks import look
+from mechdesign.drawing.panels import number, plane
+from mechdesign.drawing.pictures import figures
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability.figures.bars import allocation, contributions
 from mechdesign.questions.reliability.figures.densities import SHARES, smoothed
 from mechdesign.questions.reliability.schema.methods import METHODS
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.looks import look
-from mechdesign.report.figures.panels import number, plane
-from mechdesign.report.figures.pictures import figures
 
 SLIDER = """
 units: {length: mm}

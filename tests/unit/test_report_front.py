@@ -12,11 +12,11 @@ from helpers.fronts import FRONTS
 from helpers.tracks import decoded
 
 import mechdesign
+from mechdesign.door.report.page import front as page
+from mechdesign.door.report.page.headlines import headlines
+from mechdesign.door.report.page.section import section
+from mechdesign.drawing import style
 from mechdesign.questions.optimize.variables import study_of
-from mechdesign.report.figures import style
-from mechdesign.report.page import front as page
-from mechdesign.report.page.headlines import headlines
-from mechdesign.report.page.section import section
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -8,17 +8,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from mechdesign.columns import Column
+from mechdesign.door.report.page import vector
+from mechdesign.door.report.page.headlines import headlines, shown
+from mechdesign.door.report.requirements import verdict_on
+from mechdesign.drawing import style
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.columns import GIVEN, VALID
 from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.reliability.columns import RELIABILITY
 from mechdesign.questions.stiffness.columns import STIFFNESS
 from mechdesign.questions.workspace.columns import INDICES
-from mechdesign.report.figures import style
-from mechdesign.report.page import vector
-from mechdesign.report.page.headlines import headlines, shown
-from mechdesign.report.requirements import verdict_on
-from mechdesign.results import Result, Table
 from mechdesign.study.schema.conditions import Requirement
 
 X = np.linspace(0, 10, 400)

@@ -9,7 +9,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
 import mechdesign
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability import laws
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.laws import (

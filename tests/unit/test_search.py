@@ -11,7 +11,7 @@ from helpers.syntheses import OPEN, held_height, timed_path, tray
 from typer.testing import CliRunner
 
 import mechdesign
-from mechdesign.cli.app import app
+from mechdesign.door.cli.app import app
 from mechdesign.family.evaluator import Evaluator
 from mechdesign.family.goals import goal
 from mechdesign.questions.optimize.analysis import _doubts

@@ -12,12 +12,12 @@ from helpers.stiffness import ARM, FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.mechanism import mechanism_picture
-from mechdesign.report.figures.panels import plane, quantity, round_down
-from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Result
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.mechanism import mechanism_picture
+from mechdesign.drawing.panels import plane, quantity, round_down
+from mechdesign.drawing.pictures import figures
+from mechdesign.ground.results import Result
 
 
 def pictures(text: str, *overrides: str) -> set[str]:

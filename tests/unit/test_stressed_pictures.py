@@ -11,8 +11,8 @@ from helpers.pictures import figure_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.report.figures import style
-from mechdesign.report.figures.pictures import figures
+from mechdesign.drawing import style
+from mechdesign.drawing.pictures import figures
 
 HAND = "hand_mit_schraubgreifer_für_große_kästen_und_übergrößen_links"
 ORIENTATIONS = f"""

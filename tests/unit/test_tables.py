@@ -7,8 +7,8 @@ import json
 import numpy as np
 
 import mechdesign
-from mechdesign.report.tables import from_csv, json_blocks, to_csv
-from mechdesign.results import LongTable
+from mechdesign.door.report.tables import from_csv, json_blocks, to_csv
+from mechdesign.ground.results import LongTable
 
 
 def table(**columns):

@@ -39,7 +39,7 @@ def test_tables_do_not_depend_on_threads(command, name, changes, jobs):
 @pytest.mark.nightly
 def test_files_do_not_depend_on_threads(tmp_path):
     study = CONFIGS / "two_rpr.yaml"
-    code = "from mechdesign.cli.app import main; main()"
+    code = "from mechdesign.door.cli.app import main; main()"
     for threads in ("1", "2"):
         change = "workspace.indices=[inverse_condition, sigma_min]"
         arguments = ["workspace", str(study), "--quiet", "--out", str(tmp_path / threads), "--set", change]

@@ -13,16 +13,16 @@ from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.columns import Column
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.pictures import figures
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.workspace.figures.boundary import inscribed_picture
 from mechdesign.questions.workspace.figures.index_maps import index_columns
 from mechdesign.questions.workspace.figures.regions import fate, regions
 from mechdesign.questions.workspace.figures.view import WorkspaceView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.pictures import figures
-from mechdesign.results import Result, Table
 
 FIVE_BAR = """
 units: {length: m}

@@ -12,15 +12,15 @@ from helpers.stiffness import FIVE_BAR as ELASTIC_FIVE_BAR
 from helpers.studies import FIVE_BAR, study_of
 
 import mechdesign
-from mechdesign import indices
-from mechdesign.indices import USUAL
+from mechdesign.ground import indices
+from mechdesign.ground.indices import USUAL
+from mechdesign.ground.rows import choose
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.index import prepare
 from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.rays import BATCH
-from mechdesign.rows import choose
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 L1, L2 = np.sqrt(2.0), 1.0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mechdesign.numerics.zero_curves import joined, zero_curves
+from mechdesign.ground.numerics.zero_curves import joined, zero_curves
 
 # Lines of a grid, on none of which a known function has a root.
 LINES = np.linspace(-1.05, 1, 40)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Bars, Lines, Panel, PanelMark, Picture, Words
-from mechdesign.report.figures.pictures import View, picture
-from mechdesign.results import Table
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Bars, Lines, Panel, PanelMark, Picture, Words
+from mechdesign.drawing.pictures import View, picture
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Table
 
 # Panels, and bars of each, that a picture has room for.
 MOST_RESULTS, MOST_BARS = 8, 20

@@ -10,8 +10,8 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from mechdesign.errors import StudyError, printable
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import StudyError, printable
+from mechdesign.ground.expressions import Expression
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import WORDS as WORDS
 from mechdesign.study.schema.conditions import Chosen, check_result, read_result

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from mechdesign.expressions import Expression
+from mechdesign.ground.expressions import Expression
 from mechdesign.mechanism.elements import declared
 from mechdesign.mechanism.elements.declared import Element
 

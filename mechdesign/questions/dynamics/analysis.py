@@ -11,16 +11,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import counted
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result, Table
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.answer import alone
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.motion.solving import solve_rows
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.forward import forward
@@ -33,11 +36,8 @@ from mechdesign.questions.kinematics.cams import outside
 from mechdesign.questions.kinematics.drawn import DrawnPoses, DrawnVectors, Vector
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import Shown, shown_of, study_poses
-from mechdesign.results import Result, Table
-from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import EFFICIENCIES
-from mechdesign.work.threads import one_thread
 
 # Tables with a row a pose, or several.
 A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
 from mechdesign.mechanism.algebra import norm2
 from mechdesign.mechanism.elements.links import Mass
 from mechdesign.mechanism.forces import local_center

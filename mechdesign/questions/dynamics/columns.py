@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import DRIVE, EFFICIENCY, GIVEN, TIMED, VALID
 from mechdesign.questions.kinematics.columns import OVER
-from mechdesign.results import KeyNumber, TableKind
 
 DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies per pose",
     TIMED, DRIVE, GIVEN,

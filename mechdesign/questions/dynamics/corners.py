@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.expressions import Corner, Expression
+from mechdesign.ground.expressions import Corner, Expression
+from mechdesign.ground.notation import Step
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.sign_changes import Resolved
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.rules import TIME
-from mechdesign.notation import Step
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.sign_changes import Resolved
 from mechdesign.questions.dynamics.instants import Instants
 from mechdesign.questions.dynamics.schema import ForwardSection
 from mechdesign.study import Study

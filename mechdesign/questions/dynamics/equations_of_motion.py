@@ -15,8 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, MechanismError
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import AssemblyError, MechanismError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.notation import Step
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.linear import solved
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.charts import Chart, Charts, Positions, Sides, regularity
@@ -33,9 +36,6 @@ from mechdesign.motion.curve import from_sketch
 from mechdesign.motion.motion import in_study_units, radians
 from mechdesign.motion.rows import Poses, instants
 from mechdesign.motion.rules import GivenRows
-from mechdesign.notation import Step
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.linear import solved
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
 from mechdesign.questions.loads import Loading

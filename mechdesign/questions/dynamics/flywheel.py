@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.results import Table
+from mechdesign.ground.statistics import Request, no_value_along
 from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.motion.motion import radians
 from mechdesign.motion.question import PoseValues
@@ -18,8 +20,6 @@ from mechdesign.questions.dynamics.columns import FLYWHEEL
 from mechdesign.questions.dynamics.schema import Flywheel
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.moved import MovedQuestion
-from mechdesign.results import Table
-from mechdesign.statistics import Request, no_value_along
 
 # Work over the next motion that differs by less than this part of the work of the size of the effort is the same; of an
 # effort that is rounding alone, this part of the forces that act.

@@ -7,8 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.columns import Column
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Floats, evenly
+from mechdesign.ground.numerics.sign_changes import Resolved
+from mechdesign.ground.progress import Progress
+from mechdesign.ground.results import Result, Scope, Table
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
@@ -16,9 +20,6 @@ from mechdesign.motion.passage import MAX_SHOWN_POSES
 from mechdesign.motion.question import Mark, PoseValues, unfilled
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import TIME, GivenRows
-from mechdesign.numerics.arrays import Floats, evenly
-from mechdesign.numerics.sign_changes import Resolved
-from mechdesign.progress import Progress
 from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
@@ -32,7 +33,6 @@ from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table,
 from mechdesign.questions.kinematics.moved import full
 from mechdesign.questions.outputs import expand_outputs
 from mechdesign.questions.poses import Shown
-from mechdesign.results import Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
 

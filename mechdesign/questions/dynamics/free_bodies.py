@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
@@ -14,7 +15,6 @@ from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.joint_contacts import PIN, Contact
 from mechdesign.mechanism.wheels import Mesh
 from mechdesign.motion.question import PoseValues
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.columns import Column
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
@@ -17,14 +19,12 @@ from mechdesign.mechanism.statics import balance
 from mechdesign.motion.motion import radians
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import DRIVE
 from mechdesign.questions.dynamics.columns import MODES
 from mechdesign.questions.dynamics.flywheel import flywheel_table
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.along import KinematicAlong
-from mechdesign.results import Table
 
 # Steps of the differences that give a stiffness (radians, or sizes of the mechanism), with their weights: their error
 # is about 1e-12 of the stiffness.

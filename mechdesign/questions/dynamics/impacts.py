@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.charts import Chart, Sides, regularity
 from mechdesign.mechanism.outputs import first
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.corners import Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING
 from mechdesign.questions.dynamics.state_in_time import EndOfRun, MotionInTime

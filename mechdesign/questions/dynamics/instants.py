@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.motion.rows import instants
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.loads import Loading
 
 if TYPE_CHECKING:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.followed import Followed
 from mechdesign.motion.question import PoseValues, Remark
-from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.along import KinematicAlong

@@ -21,12 +21,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.sign_changes import Resolved
+from mechdesign.ground.progress import NULL, Progress
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.charts import Sides, regularity
 from mechdesign.mechanism.configuration import joined
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.sign_changes import Resolved
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.corners import Corners, Threshold
 from mechdesign.questions.dynamics.equations_of_motion import MEETING, Branch, EquationsOfMotion, RatesInTime
 from mechdesign.questions.dynamics.impacts import bounced, rested, turned

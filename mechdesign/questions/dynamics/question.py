@@ -11,8 +11,10 @@ from typing import Self
 
 import numpy as np
 
-from mechdesign.errors import StudyError
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Strands
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
@@ -26,7 +28,6 @@ from mechdesign.mechanism.outputs import first, pulled
 from mechdesign.mechanism.statics import Balance, Reaction, balance, reactions
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import PoseNumbers, Poses
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import JointFriction, Slipping
@@ -36,7 +37,6 @@ from mechdesign.questions.loads import Loading
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
-from mechdesign.results import Strands
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import Load
 from mechdesign.study.schema.motions import CourseText

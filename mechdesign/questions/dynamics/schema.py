@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import Field
 
-from mechdesign.expressions import Expression
+from mechdesign.ground.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.joint_contacts import Joints
 from mechdesign.study.schema.checker import ORDERS, Checker

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
 from mechdesign.questions.dynamics.instants import Instants
 

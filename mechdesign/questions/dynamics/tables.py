@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.rounding import STILL, cleared, larger
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.motion.along import of_swept
 from mechdesign.motion.question import PoseValues
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.rounding import STILL, cleared, larger
 from mechdesign.questions.columns import VALID
 from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
 from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
 from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.extremes import gaps_in_words
 from mechdesign.questions.kinematics.tables import pose_columns
-from mechdesign.results import Table
 
 # Places among the numbers of an extreme that are values.
 VALUES = [0, 2, 4, 6, 7]

@@ -8,12 +8,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics import chebyshev
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Bound
 from mechdesign.motion.motion import radians
-from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.dynamics.corners import Corners
 from mechdesign.questions.dynamics.equations_of_motion import EquationsOfMotion
 from mechdesign.questions.dynamics.instants import Instants

@@ -7,6 +7,9 @@ from functools import partial
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import POSES_ONLY
+from mechdesign.ground.statistics import Request
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import Linearization
@@ -19,14 +22,11 @@ from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.series import Evaluate
 from mechdesign.motion.through import Through
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.friction import APART
 from mechdesign.questions.kinematics import corners, targets
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.moved import MovedQuestion, full
 from mechdesign.questions.kinematics.rates import moving_at, unitless
-from mechdesign.results import POSES_ONLY
-from mechdesign.statistics import Request
 from mechdesign.study.schema.loads import EFFICIENCIES
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where

@@ -8,21 +8,21 @@ from itertools import chain
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import Problem, StudyError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import LongTable, Result, Table
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.motion.answer import alone, answer_of
 from mechdesign.motion.passage import pass_over
 from mechdesign.motion.question import Passage, PoseValues
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.kinematics.answers import Kinematics
 from mechdesign.questions.kinematics.columns import MODES
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.tables import motion_columns
 from mechdesign.questions.poses import Shown, shown_of, study_poses
-from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
-from mechdesign.work.threads import one_thread
 
 # Assembly modes that a picture shows at most.
 MAX_DRAWN_MODES = 12

@@ -8,14 +8,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.results import Table
+from mechdesign.ground.statistics import Request, no_value_along
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.motion.ends import Change
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
 from mechdesign.questions.kinematics.drawn import DrawnMotion
@@ -29,8 +31,6 @@ from mechdesign.questions.kinematics.targets import totals
 from mechdesign.questions.kinematics.values import pole_of, values_of
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import shown_of
-from mechdesign.results import Table
-from mechdesign.statistics import Request, no_value_along
 
 # Tables in the order in which they are shown.
 ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres", "cam")

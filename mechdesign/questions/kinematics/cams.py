@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.motion.motion import in_study_units
 from mechdesign.motion.question import PoseValues, Remark
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.columns import CAM
 from mechdesign.questions.kinematics.moved import OUTSIDE
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Largest pressure angles of a follower that slides and of one that turns (degrees), as textbooks of cams recommend.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import DRIVE, EFFICIENCY, GIVEN, TIMED, VALID
-from mechdesign.results import KeyNumber, TableKind
 
 # Place in the meaning of a table of numbers of whole motions, see `mechdesign.questions.kinematics.along.over`.
 OVER = "over the motion, or of the asked poses only"

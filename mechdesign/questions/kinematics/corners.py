@@ -8,12 +8,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.coordinates import Coordinate, corners_of, expressions_of
 from mechdesign.mechanism.forces import Moving
 from mechdesign.motion.corners import Variables, divide, switched
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.series import Evaluate
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics import targets as targeted
 from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.questions.kinematics.rates import moving_at

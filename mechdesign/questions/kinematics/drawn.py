@@ -9,10 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes
+from mechdesign.ground.results import Drawn, Table
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.motion.question import PoseValues
-from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.limits import LimitPlace
 from mechdesign.questions.kinematics.loops import Toggle
@@ -21,7 +22,6 @@ from mechdesign.questions.kinematics.special_poses import SpecialPoses, special_
 from mechdesign.questions.kinematics.tables import motion_table
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import Shown
-from mechdesign.results import Drawn, Table
 
 # What a vector is of, the point or the places (n,) where it is, and its values (n,), nan where it has none.
 Vector = tuple[str, str | Complexes, Complexes]

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.ground.numerics.rounding import STILL, cleared
+from mechdesign.ground.results import Table
+from mechdesign.ground.statistics import no_value, no_value_along
 from mechdesign.motion.along import of_swept
 from mechdesign.motion.question import PoseValues
-from mechdesign.numerics.rounding import STILL, cleared
 from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.questions.kinematics.targets import error, judged
-from mechdesign.results import Table
-from mechdesign.statistics import no_value, no_value_along
 
 # A row within this part of an extreme of the motion between the rows does not contradict it.
 AT_ROW = 1e-9

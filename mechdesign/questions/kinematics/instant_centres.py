@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.outputs import Rates
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # A centre farther away than this many sizes of the mechanism is at infinity.
 FARTHEST = 1e9

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.margins import Cause
 from mechdesign.motion.ends import Change, MotionEnd
-from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.columns import LIMITS
-from mechdesign.results import Table
 
 # Places that a warning names.
 MOST_NAMED = 4

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, firsts
+from mechdesign.ground.results import Table
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
@@ -15,11 +17,9 @@ from mechdesign.motion.functions import Zeros
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_poses
-from mechdesign.numerics.arrays import Flags, Floats, Ints, firsts
 from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import LOOPS, TOGGLES
 from mechdesign.questions.kinematics.moved import MovedQuestion
-from mechdesign.results import Table
 
 # Angles nearer than this are the same (radians).
 SAME_ANGLE = 1e-12

@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -25,7 +26,6 @@ from mechdesign.motion.question import PoseQuestion, unfilled
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import GivenRows
 from mechdesign.motion.solving import solve_poses
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.schema import KinematicsSection

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
-from mechdesign.errors import counted
+from mechdesign.ground.errors import counted
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.elements.declared import Quantity

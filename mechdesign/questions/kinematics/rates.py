@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, picked
 from mechdesign.mechanism.coordinates import Coordinate
@@ -15,7 +16,6 @@ from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import second
 from mechdesign.motion.motion import SolvedPoses, radians
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text.units import Units
 

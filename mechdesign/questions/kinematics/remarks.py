@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.motion.question import PoseValues, Remark
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import POSES_AT_ONCE
-from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.cams import outside
 from mechdesign.questions.kinematics.instant_centres import REST, TRANSLATION

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field
 
-from mechdesign.errors import counted
+from mechdesign.ground.errors import counted
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plates import CLEARANCE, pairs_of, pins_of
 from mechdesign.study.building.section import TwoLinks

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Ints, distinct
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import PoseValues
-from mechdesign.numerics.arrays import Ints, distinct
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.limits import LimitPlace

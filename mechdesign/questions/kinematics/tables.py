@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.columns import Column
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.question import PoseValues
@@ -16,7 +17,6 @@ from mechdesign.questions.kinematics.columns import INSTANT_CENTRES, JACOBIAN, M
 from mechdesign.questions.kinematics.instant_centres import MOTIONS
 from mechdesign.questions.kinematics.targets import error, judged
 from mechdesign.questions.kinematics.values import entry
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 

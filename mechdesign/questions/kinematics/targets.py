@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.expressions import Corner, Expression
+from mechdesign.ground.expressions import Corner, Expression
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.schema.targets import Target, timing
 from mechdesign.study.text.tables import table_of

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
@@ -17,7 +18,6 @@ from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.mechanism.plates import CLEARANCE, Clearances
 from mechdesign.mechanism.statics import balance
 from mechdesign.motion.motion import SolvedPoses, in_study_units
-from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics.question import KinematicQuestion, characteristic_length
 from mechdesign.questions.loads import Loading
 

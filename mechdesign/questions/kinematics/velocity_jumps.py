@@ -6,10 +6,10 @@ from collections.abc import Collection
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import counted
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.arrays import Floats, distinct
 from mechdesign.mechanism.algebra import quiet
-from mechdesign.numerics.arrays import Floats, distinct
 from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.questions.kinematics.rates import moving_at
 

@@ -9,13 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.family.evaluator import missing
 from mechdesign.family.goals import shape_of
 from mechdesign.family.question import DesignsQuestion
-from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.progress import NULL, Progress
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import AssemblyError, Interrupted, MechdesignError, StudyError
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Drawn, Result
+from mechdesign.ground.work.chunks import workers
+from mechdesign.ground.work.journal import Journal
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.look import ask
@@ -42,11 +46,7 @@ from mechdesign.questions.workspace.question import questions, split
 from mechdesign.region.growth import fitted
 from mechdesign.region.rays import SINGLE
 from mechdesign.region.shapes import Shape
-from mechdesign.results import Drawn, Result
 from mechdesign.study import Study
-from mechdesign.work.chunks import workers
-from mechdesign.work.journal import Journal
-from mechdesign.work.threads import one_thread
 
 # Most numbers of rows behind the goals that a search keeps.
 MAX_KEPT_ROWS = 30_000_000

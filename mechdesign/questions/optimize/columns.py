@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mechdesign.columns import ColumnKind
-from mechdesign.results import KeyNumber, TableKind
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import KeyNumber, TableKind
 
 VARIABLE = ColumnKind("<variable>", "design variable", "as the variable")
 WORST_ROW = ColumnKind("<result>", "worst value of <result>", "as the result")

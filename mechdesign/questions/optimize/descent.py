@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics import quadratic
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics import quadratic
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Points
 from mechdesign.questions.optimize.models import FAR, Models, Stencil, Terms, square, without_lost
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 
 # Least merits, all larger than any goal, of points that miss a condition, of points without a value, and of those of
 # which nothing is known; far enough from each other for an order within each class.

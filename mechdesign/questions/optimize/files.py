@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import MechdesignError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import MechdesignError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.motion.rows import Poses

@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.columns import Column, ColumnKind
 from mechdesign.family.batch import Evaluated
 from mechdesign.family.family import DESIGNS_AT_ONCE
 from mechdesign.family.goals import Goal
 from mechdesign.family.question import DesignsQuestion
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.progress import Progress
+from mechdesign.ground.columns import Column, ColumnKind
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.progress import Progress
+from mechdesign.ground.work.journal import Journal, digest
 from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
 from mechdesign.questions.optimize.explorer import ASSEMBLY, Part, Points
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
 from mechdesign.questions.optimize.variables import unit_of as variable_unit
 from mechdesign.study import Study
-from mechdesign.work.journal import Journal, digest
 
 # Designs evaluated together where a design costs much and a search evaluates few at once.
 SLOW_DESIGNS_AT_ONCE = 16

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.explorer import ASSEMBLY, Explorer, Part
 
 # Step of differences in parts of the ranges; a longer one where values are known to a tolerance only.

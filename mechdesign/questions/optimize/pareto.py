@@ -11,16 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.numerics import fronts
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.evolution import offspring, simplex, survivors
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics import fronts
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.evolution import offspring, simplex, survivors
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.columns import HYPERVOLUME, PARETO
 from mechdesign.questions.optimize.descent import descend
 from mechdesign.questions.optimize.explorer import Explorer, Points, Spent
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.search import sample, search
-from mechdesign.results import Table
 
 # Most evaluations for each goal where the study gives none: of designs in batches, and of designs one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400

@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from mechdesign.errors import StudyError
 from mechdesign.family.batch import Evaluated
 from mechdesign.family.family import Family
 from mechdesign.family.goals import Goal, bounds_of, goal
 from mechdesign.family.question import DesignsQuestion
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.optimize.schema import OptimizeSection
 from mechdesign.questions.optimize.variables import choice_problems, entries, from_cube
 from mechdesign.study import Study

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag, ValidationInfo
 
-from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression
-from mechdesign.notation import ExpressionError
+from mechdesign.ground.errors import suggestion
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.notation import ExpressionError
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.conditions import Condition, Judged, check_result
 from mechdesign.study.schema.variable import Variable

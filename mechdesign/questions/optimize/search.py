@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.descent import descend
 from mechdesign.questions.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Points, Spent
 

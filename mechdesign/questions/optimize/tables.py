@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.columns import BEST, BOUNDS, DESIGNS, NEAREST, OPTIMUM, SENSITIVITY
 from mechdesign.questions.optimize.judge import DesignSet, Judge, weighted
 from mechdesign.questions.optimize.variables import BOUND_ROUNDING, Batch, bounds, ranges, steps
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Number of best designs that are listed for each row of weights, and their least distance in parts of a variable's

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import Problem, StudyError
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
 from mechdesign.study.schema.variable import Variable, plainly

@@ -13,8 +13,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.engine.problem import WIDTH
 from mechdesign.questions.reliability.first_order import FirstOrder
@@ -106,7 +106,7 @@ class Reliable:
 
         Limits that have to be kept together reach a level only if each of them alone does.
         """
-        from mechdesign.numerics.statistics import outside
+        from mechdesign.ground.numerics.statistics import outside
 
         allowed = self.measure(level)
         # Bracket of the deviation's logarithm: exact for symmetric limits, wider where one limit is farther.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.cheapest import DIGITS, Allotment
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.section import ReliabilitySection

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.reliability.aims import Simulated, aim_of
 from mechdesign.questions.reliability.allocated import allocated_data
 from mechdesign.questions.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, cheapest, tolerances
@@ -22,7 +23,6 @@ from mechdesign.questions.reliability.grades import graded
 from mechdesign.questions.reliability.schema.section import Precision, ReliabilitySection
 from mechdesign.questions.reliability.tables import at_poses
 from mechdesign.questions.reliability.task import Partial, Task
-from mechdesign.results import Result, Table
 from mechdesign.study.variants import rewritten
 
 # Most rounds of allocation and simulation.

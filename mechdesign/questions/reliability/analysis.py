@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import Interrupted, StudyError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import Interrupted, StudyError
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result, Table
+from mechdesign.ground.work.threads import keep_freed_memory, one_thread
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import Poses
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
@@ -28,9 +30,7 @@ from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.simulation import Setting, forward_plan
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
-from mechdesign.results import Result, Table
 from mechdesign.study import Study
-from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Number of listed poses that have a density.
 _DENSITIES = 12

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Floats, evenly
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
 from mechdesign.motion.corners import divide
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import curve_with
-from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.questions.kinematics.corners import variables_of
 from mechdesign.questions.loads import coordinates_in, corners_in
 from mechdesign.questions.reliability.forces import pace

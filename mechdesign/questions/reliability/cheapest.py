@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.aims import Aim
 from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.schema.allocation import Cost, half_widths

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.special import erfcx, ndtr
 
-from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.statistics import MAX_DEVIATION, outside
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.statistics import MAX_DEVIATION, outside
 from mechdesign.questions.reliability.question import Limit
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mechdesign.columns import ColumnKind
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import GIVEN, TIMED, VALID
-from mechdesign.results import KeyNumber, TableKind
 
 METHOD = ColumnKind("method", "how it was computed")
 OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.errors import StudyError
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.laws import Marginal, Normal, at_rows
 
 # Edges of the quadrature panels over a standard normal variable; the kinks of its law are added. Three nodes a panel.

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mechdesign.expressions import Expression
-from mechdesign.functions import Tabulated
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.functions import Tabulated
 from mechdesign.mechanism.coordinates import Coordinate
 
 

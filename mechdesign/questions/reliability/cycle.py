@@ -13,14 +13,14 @@ from functools import partial
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Ints
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.reliability.engine.problem import Estimate, counted, reached
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.simulation import CHUNK, Setting, errors_of, generator
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.questions.reliability.task import MethodResult, Partial, Task
-from mechdesign.work.chunks import map_chunks
 
 # End of the names of this module's streams of random numbers, the only names of four numbers.
 _STREAM = (3, 0)

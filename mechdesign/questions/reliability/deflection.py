@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS

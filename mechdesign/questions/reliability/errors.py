@@ -8,14 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.margins import closures
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.question import PoseQuestion, evaluate
 from mechdesign.motion.rows import NOWHERE, Poses
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cautions, elasticity
 from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values

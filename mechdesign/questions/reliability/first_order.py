@@ -12,11 +12,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.expressions import Number
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.laws import Marginal, Normal, Uniform, normal_cdf, normal_quantile
 
 

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.expressions import Expression, Number
+from mechdesign.ground.expressions import Expression, Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value, Vector, quiet
 from mechdesign.mechanism.coordinates import Coordinate
@@ -21,7 +22,6 @@ from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.motion.rows import PoseNumbers, Poses
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.schema import column_kinds
 from mechdesign.questions.kinematics.rates import DriveRates

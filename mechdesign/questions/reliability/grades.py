@@ -13,7 +13,7 @@ from itertools import islice
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.cheapest import ToleranceModel
 from mechdesign.questions.reliability.lengths import WithLengths
 

@@ -17,8 +17,8 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.study.text import fields
 
 # Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].

@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.numerics.arrays import evenly
-from mechdesign.progress import NULL
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import evenly
+from mechdesign.ground.progress import NULL
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, reached
 from mechdesign.questions.reliability.methods.auto import FACTOR, disagree

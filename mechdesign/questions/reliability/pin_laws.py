@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.laws import SIGMAS, Marginal, Normal, TruncatedNormal, Uniform, normal_within
 
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.statistics import outside, rectangle_failure, student
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.statistics import outside, rectangle_failure, student
 from mechdesign.questions.reliability.circles import (
     disc_and_band_failure,
     disc_chance,

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import MechanismError
-from mechdesign.expressions import Expression
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.reliability.corners import Bend, bends, vector_of
 from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends

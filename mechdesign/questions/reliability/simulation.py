@@ -8,11 +8,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from mechdesign.errors import MechanismError
+from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
@@ -20,7 +21,6 @@ from mechdesign.questions.reliability.first_order import derivatives, nominal_va
 from mechdesign.questions.reliability.forces import ForceModel
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.sources import Made, Sources
-from mechdesign.work.chunks import map_chunks
 
 # Samples of a chunk.
 CHUNK = 20_000

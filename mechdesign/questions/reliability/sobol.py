@@ -17,8 +17,9 @@ from functools import partial
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.questions.reliability.engine.problem import CONFIDENCE, POINTS_TOGETHER
 from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.schema.methods import METHODS
@@ -26,7 +27,6 @@ from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.simulation import Setting, errors_of, generator
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.questions.reliability.task import Task
-from mechdesign.work.chunks import map_chunks
 
 # Least number of replicates.
 _REPLICATES = 16
@@ -136,7 +136,7 @@ def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | Non
 def _ratio(parts: Floats, whole: Floats) -> Floats:
     """Ratio of the means over replicates, and its interval (value, low, high), clipped to 0 and 1."""
     # SciPy takes a quarter of a second to import, and reading a study does not need it.
-    from mechdesign.numerics.statistics import student
+    from mechdesign.ground.numerics.statistics import student
 
     count, mean = len(parts), whole.mean(axis=0)
     value = np.where(mean > 0, parts.mean(axis=0) / mean, np.nan)

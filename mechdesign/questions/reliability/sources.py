@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.expressions import Number
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism.algebra import times
 from mechdesign.mechanism.elements.declared import Quantity
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.forces import FOLLOWED
 from mechdesign.questions.reliability.laws import Marginal, at_rows

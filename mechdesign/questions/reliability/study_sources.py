@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import StudyError
-from mechdesign.expressions import Number
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.couplings import MEASURED, play
 from mechdesign.mechanism.elements.declared import Quantity

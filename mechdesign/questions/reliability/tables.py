@@ -9,9 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.columns import Column
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Drawn, Table
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.columns import (
     CAPABILITY,
@@ -29,7 +30,6 @@ from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
 from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
-from mechdesign.results import Drawn, Table
 
 # Bins of a histogram.
 _BINS = 60

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.progress import NULL, Progress
 from mechdesign.mechanism import Reason
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate

@@ -12,7 +12,12 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from mechdesign.cautions import Caution
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Drawn, Result, Table
+from mechdesign.ground.statistics import Request
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.coordinates import Coordinate
@@ -22,8 +27,6 @@ from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, unfilled
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import solve_rows
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.questions.stiffness import tables
@@ -33,10 +36,7 @@ from mechdesign.questions.stiffness.effects import Effects, effects_of
 from mechdesign.questions.stiffness.elements import Hinge, SlideElement
 from mechdesign.questions.stiffness.screws import RIGID
 from mechdesign.questions.stiffness.tables import Springs
-from mechdesign.results import Drawn, Result, Table
-from mechdesign.statistics import Request
 from mechdesign.study import Study
-from mechdesign.work.threads import one_thread
 
 # Number of poses solved together.
 CHUNK = 8192

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector, cross
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.graph import GROUND, rod_of
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.bodies import link_of
 from mechdesign.questions.stiffness.elements import BeamLine, Piece, beam_line, piece_freedoms
 from mechdesign.questions.stiffness.network import Network

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.dynamics.question import ForceQuestion, pace
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mechdesign.columns import ColumnKind
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import GIVEN, TIMED, VALID
-from mechdesign.results import KeyNumber, TableKind
 
 LOAD = ColumnKind("load", "which of the study's loads")
 STIFFNESS = TableKind.of("stiffness", "stiffness at the asked point per pose, axes of the world, per radian",

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.questions.stiffness.screws import RIGID, screw_product
 
 # Determinant of the unit wrenches above which their matrix is inverted in closed form; others need singular values.

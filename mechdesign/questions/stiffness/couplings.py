@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.outputs import node_forces, shares
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Wrench, borne
 from mechdesign.questions.stiffness.bodies import BodyCoupling
 from mechdesign.questions.stiffness.elements import slide_direction

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.force_method import Loaded, moments_about
 from mechdesign.questions.stiffness.network import Network
 

@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.schema import CrossSection, StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist
 

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.stiffness.applied import Applied, borne
 from mechdesign.questions.stiffness.compliance import Held, moved_to, scales
 from mechdesign.questions.stiffness.couplings import Efforts, compliance_of, efforts_on

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.graphs import pieces
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.graphs import pieces
 from mechdesign.questions.stiffness.bodies import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.questions.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, screw_origin

@@ -18,9 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.bodies import TARGET, Bodies, NetworkEdge, is_pin
 from mechdesign.questions.stiffness.elements import Hinge, JointCompliance
 

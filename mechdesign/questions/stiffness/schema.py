@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from mechdesign.expressions import Expression, Number
+from mechdesign.ground.expressions import Expression, Number
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.schema.checker import NO_MOMENT, Checker

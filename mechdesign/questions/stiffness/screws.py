@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.mechanism.algebra import Value, cross, picked, vector
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Singular values below this fraction of the largest one count as zero. Elbows at full stretch, which are found through
 # the root of a difference, are straight to 1e-8 only.

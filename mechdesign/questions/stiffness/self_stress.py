@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.stiffness.compliance import REGULAR, Held, inverses, poses_by, scales, stiffness_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import RANK, RIGID

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.columns import Column
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
+from mechdesign.ground.results import Table, TableKind
 from mechdesign.mechanism.algebra import Value
 from mechdesign.motion.motion import Motion
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
 from mechdesign.questions.stiffness.columns import (
     COMPLIANCE,
     DEFLECTIONS,
@@ -25,7 +26,6 @@ from mechdesign.questions.stiffness.compliance import Held, directional, scales
 from mechdesign.questions.stiffness.effects import Effects, joints_of, points_of
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import principal
-from mechdesign.results import Table, TableKind
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from mechdesign.progress import NULL, Progress
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result
+from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.workspace.boundary import poses_along
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.ellipses import ellipses
@@ -11,9 +13,7 @@ from mechdesign.questions.workspace.question import questions
 from mechdesign.questions.workspace.reached import Reached, reach
 from mechdesign.questions.workspace.remarks import remarks, unreachable
 from mechdesign.questions.workspace.tables import tables
-from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.work.threads import one_thread
 
 
 @one_thread()

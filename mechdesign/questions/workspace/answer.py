@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, MechanismError
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.errors import AssemblyError, MechanismError
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.work.threads import keep_freed_memory
 from mechdesign.questions.workspace.box import bounding_box
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.peaks import find_peaks
@@ -20,7 +21,6 @@ from mechdesign.region.field import Places
 from mechdesign.region.panels import Panels
 from mechdesign.region.pieces import Pieces, counted
 from mechdesign.region.rays import BATCH, Effort
-from mechdesign.work.threads import keep_freed_memory
 
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.region.field import Field
 from mechdesign.region.patches import Patch
 

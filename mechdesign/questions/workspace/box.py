@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.roots import dips
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.roots import dips
 from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import Designs

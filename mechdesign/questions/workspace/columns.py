@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mechdesign.columns import ColumnKind
-from mechdesign.indices import REGIONAL, STATISTICS
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.indices import REGIONAL, STATISTICS
+from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import DRIVE
-from mechdesign.results import KeyNumber, TableKind
 
 HELD = ColumnKind("<held>", "held coordinate", "as the coordinate")
 PLACE = ColumnKind("x, y", "place of the point", "length")

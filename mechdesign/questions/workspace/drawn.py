@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mechdesign.ground.results import Drawn
 from mechdesign.mechanism import Configuration
 from mechdesign.questions.workspace.ellipses import Ellipses
-from mechdesign.results import Drawn
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.local import Local
 from mechdesign.region.field import Field
 from mechdesign.region.patches import Patch

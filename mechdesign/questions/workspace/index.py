@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign import indices
-from mechdesign.errors import StudyError
+from mechdesign.ground import indices
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import power_of_length
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.local import Local

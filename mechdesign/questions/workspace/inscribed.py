@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.region.growth import fitted
 from mechdesign.region.panels import Panels
 from mechdesign.region.shapes import Shape

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.jacobians import Jacobian
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.region.field import LENGTH, Field, Places
 from mechdesign.region.rays import Designs
 

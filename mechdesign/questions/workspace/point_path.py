@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.ground.errors import AssemblyError, Problem, StudyError
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Result
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import regularity
@@ -20,10 +22,8 @@ from mechdesign.motion.functions import Functions
 from mechdesign.motion.motion import in_study_units
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import GivenRows
-from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.workspace.columns import PATH, PATH_INDICES
 from mechdesign.questions.workspace.schema import WorkspaceSection
-from mechdesign.results import Result
 from mechdesign.study import Study
 
 # Rows of the table of one path.

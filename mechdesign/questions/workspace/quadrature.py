@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.strips import (
     BLOCK,

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
-from mechdesign.numerics.arrays import Flags
+from mechdesign.ground.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
+from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.questions.workspace.index import Prepared, prepare
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.strips import Integrand

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.workspace.answer import Evaluation, answer, area_in_any_assembly, areas
 from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.questions.workspace.question import Question

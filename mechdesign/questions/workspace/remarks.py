@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
-from mechdesign.cautions import Caution
-from mechdesign.errors import AssemblyError
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import AssemblyError
 from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.reached import Reached

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
-from mechdesign.indices import INDEX_NAMES, needed_section
+from mechdesign.ground.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields

@@ -12,11 +12,11 @@ from itertools import groupby
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.zero_curves import joined, zero_curves
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.numerics.zero_curves import joined, zero_curves
 from mechdesign.region.field import Field
 from mechdesign.region.patches import GRID, Patch
 

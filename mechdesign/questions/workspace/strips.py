@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.workspace.index import Prepared
 from mechdesign.questions.workspace.local import Local
 from mechdesign.region.rays import Designs

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.columns import Column
-from mechdesign.indices import index
+from mechdesign.ground.columns import Column
+from mechdesign.ground.indices import index
+from mechdesign.ground.numerics.arrays import Ints
+from mechdesign.ground.results import Table
 from mechdesign.motion.motion import in_study_units
-from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.columns import power_of_length
 from mechdesign.questions.workspace.boundary import drives_on
 from mechdesign.questions.workspace.columns import (
@@ -29,7 +30,6 @@ from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import COLUMNS, Question, split
 from mechdesign.questions.workspace.reached import Reached
 from mechdesign.questions.workspace.singularities import causes
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 

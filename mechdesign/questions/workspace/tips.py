@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.algebra import cross
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.strips import Parts, Strips
 from mechdesign.region.panels import Panels

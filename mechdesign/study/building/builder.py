@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import suggestion
+from mechdesign.ground.expressions import Expression
 from mechdesign.mechanism.algebra import fit
 from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.elements.declared import Physical, Quantity, Term

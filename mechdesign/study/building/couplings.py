@@ -8,9 +8,10 @@ from decimal import Decimal
 
 import numpy as np
 
-from mechdesign.errors import MechanismError, StudyError
-from mechdesign.expressions import Expression
-from mechdesign.functions import Tabulated
+from mechdesign.ground.errors import MechanismError, StudyError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.functions import Tabulated
+from mechdesign.ground.notation import Step
 from mechdesign.mechanism.coordinates import coupled
 from mechdesign.mechanism.elements.couplings import Cam, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
@@ -19,7 +20,6 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import build_graph
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.sketch import locate
-from mechdesign.notation import Step
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.elements import Written

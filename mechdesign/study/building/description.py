@@ -7,14 +7,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechdesign.expressions import Expression
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.notation import ExpressionError
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
 from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
-from mechdesign.notation import ExpressionError
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.couplings import build_couplings, with_phases
 from mechdesign.study.building.elements import Written

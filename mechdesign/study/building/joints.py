@@ -6,11 +6,11 @@ import contextlib
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from mechdesign.errors import suggestion
+from mechdesign.ground.errors import suggestion
+from mechdesign.ground.numerics.graphs import pieces
 from mechdesign.mechanism.elements.joints import AnyJoint, Fixed, Friction, Joint, LinkLine, Prismatic, Slot
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.graphs import pieces
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text.document import KeyPath

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
-from mechdesign.errors import suggestion
+from mechdesign.ground.errors import suggestion
 from mechdesign.study.text import fields
 from mechdesign.study.text.inputs import file_of
 from mechdesign.study.text.reading import Context, failure, read_rows, shown

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.expressions import Expression, Number
+from mechdesign.ground.expressions import Expression, Number
 from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.model import Place
 

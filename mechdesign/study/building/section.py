@@ -13,8 +13,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from mechdesign.errors import cut
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import cut
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.notation import ExpressionError
 from mechdesign.mechanism.elements.couplings import Coupling
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.drives import Drive
@@ -24,7 +25,6 @@ from mechdesign.mechanism.elements.measures import Limit, Measure
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND, OF_LINKS
-from mechdesign.notation import ExpressionError
 from mechdesign.study.building import notations
 from mechdesign.study.building.elements import Written
 from mechdesign.study.text import fields

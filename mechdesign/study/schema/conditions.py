@@ -11,18 +11,18 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression
-from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
-from mechdesign.notation import ExpressionError
-from mechdesign.statistics import STATISTICS as STATISTICS_OF_ROWS
-from mechdesign.statistics import Interval
+from mechdesign.ground.errors import suggestion
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
+from mechdesign.ground.notation import ExpressionError
+from mechdesign.ground.statistics import STATISTICS as STATISTICS_OF_ROWS
+from mechdesign.ground.statistics import Interval
+from mechdesign.ground.terms import command_of, sum_of
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reading import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
-from mechdesign.terms import command_of, sum_of
 
 # Commands that need their section in the study.
 _UNASSUMED = ("reliability", "stiffness")
@@ -114,7 +114,7 @@ class Span(fields.Model):
             yield fields.Misfit(self.at_least >= self.at_most, "nothing is at least {} and at most {}", ends)
 
     def interval(self, unit: str) -> Interval:
-        """The values in a unit; see `mechdesign.rows.Span`.
+        """The values in a unit; see `mechdesign.ground.rows.Span`.
 
         Raises
         ------

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import StudyError, suggestion
+from mechdesign.ground.errors import StudyError, suggestion
 from mechdesign.study.building.builder import place_name
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.study_file import entry, kinds_of

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from mechdesign.expressions import Expression
+from mechdesign.ground.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND

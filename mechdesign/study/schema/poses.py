@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mechdesign.errors import cut
+from mechdesign.ground.errors import cut
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.schema.paths import PathSection, Speed

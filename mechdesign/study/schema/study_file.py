@@ -11,9 +11,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, create_model
 from pydantic.fields import FieldInfo
 
-from mechdesign.cautions import ALL, KINDS
 from mechdesign.commands import SECTIONS
-from mechdesign.errors import StudyError, cut, suggestion
+from mechdesign.ground.cautions import ALL, KINDS
+from mechdesign.ground.errors import StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text import fields

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import StudyError
-from mechdesign.expressions import Expression
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Mechanism
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import WrittenTarget
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text.csv_files import read_table

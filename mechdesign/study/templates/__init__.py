@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mechdesign.errors import StudyError, suggestion
+from mechdesign.ground.errors import StudyError, suggestion
 
 _FOLDER = Path(__file__).parent
 # The one that is taken where none is named.

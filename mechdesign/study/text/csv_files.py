@@ -8,8 +8,8 @@ import math
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reading import MIN_NUMBER, Context, read_number
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from mechdesign.errors import Problem, StudyError
+from mechdesign.ground.errors import Problem, StudyError
 
 KeyPath = tuple[str | int, ...]
 

@@ -19,9 +19,9 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from mechdesign.docstrings import KeyText, key_texts, quoted
-from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression
+from mechdesign.ground.docstrings import KeyText, key_texts, quoted
+from mechdesign.ground.errors import suggestion
+from mechdesign.ground.expressions import Expression
 from mechdesign.study.text.document import read
 from mechdesign.study.text.reading import MIN_LENGTH, MIN_NUMBER, Context, failure, read_expression, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, measure, written

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.study.text.document import in_yaml
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.study.text.document import KeyPath
 
 # Endings of the names of files with a table.

@@ -15,9 +15,9 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from mechdesign.errors import cut, suggestion
-from mechdesign.expressions import Expression
-from mechdesign.notation import ExpressionError
+from mechdesign.ground.errors import cut, suggestion
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.notation import ExpressionError
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:\s*[^\W\d].*)?")

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
 
-from mechdesign.errors import Problem, StudyError, nearest, suggestion
+from mechdesign.ground.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
 from mechdesign.study.text.fields import Model
 from mechdesign.study.text.reading import LOST, MAX_NAMED, shown

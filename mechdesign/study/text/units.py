@@ -16,8 +16,8 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from mechdesign.errors import nearest
-from mechdesign.expressions import Expression, Number
+from mechdesign.ground.errors import nearest
+from mechdesign.ground.expressions import Expression, Number
 from mechdesign.study.text.unit_table import Powers, listed, unit_value
 
 KINDS: dict[str, Powers] = {

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import counted
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import fitting_panels
+from mechdesign.drawing.marks import Dots, Own, Panel, Picture
+from mechdesign.drawing.pictures import picture
 from mechdesign.experiments.figures.sweep.quantities import (
     CLASSES,
     MOST_DRAWN,
@@ -19,10 +22,7 @@ from mechdesign.experiments.figures.sweep.quantities import (
     without_number,
 )
 from mechdesign.experiments.figures.sweep.view import CasesView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import fitting_panels
-from mechdesign.report.figures.marks import Dots, Own, Panel, Picture
-from mechdesign.report.figures.pictures import picture
+from mechdesign.ground.errors import counted
 
 # Entries, rows of panels, and quantities that a picture has room for.
 MOST_ENTRIES = 6

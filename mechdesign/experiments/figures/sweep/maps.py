@@ -12,6 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.patheffects import withStroke
 
+from mechdesign.drawing import style
+from mechdesign.drawing.contours import colour_steps, constant, round_levels
+from mechdesign.drawing.marks import Contours, Own, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.pictures import picture
 from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
 from mechdesign.experiments.figures.sweep.quantities import (
     MOST_OVER_MAP,
@@ -23,11 +27,7 @@ from mechdesign.experiments.figures.sweep.quantities import (
     without_number,
 )
 from mechdesign.experiments.figures.sweep.view import CasesView
-from mechdesign.numerics.arrays import Floats
-from mechdesign.report.figures import style
-from mechdesign.report.figures.contours import colour_steps, constant, round_levels
-from mechdesign.report.figures.marks import Contours, Own, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats
 
 # Entries of which every two have a map, and maps of a picture, also where none have room side by side.
 MOST_ENTRIES, MOST_MAPS, MOST_BELOW = 4, 6, 4

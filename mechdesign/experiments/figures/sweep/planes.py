@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.experiments.figures.sweep.quantities import MOST_DRAWN, CaseAxis
-from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
-from mechdesign.results import Table
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.ground.results import Table
 
 # Points of a map along each axis.
 _FINE = 141

@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.columns import Column
-from mechdesign.errors import counted, cut
-from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
-from mechdesign.report.cases import FRONT, RANK, best_of, short
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Dots, Lines, PanelMark, Zone
-from mechdesign.results import Table
+from mechdesign.door.report.cases import FRONT, RANK, best_of, short
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Dots, Lines, PanelMark, Zone
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import counted, cut
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.ground.results import Table
 from mechdesign.study.text.units import Amount
 
 # More values than this are gathered into classes of equal numbers of cases.

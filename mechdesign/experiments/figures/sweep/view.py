@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.door.report.requirements import DrawnCases
+from mechdesign.drawing.pictures import View
 from mechdesign.experiments.figures.sweep.quantities import CaseAxis
-from mechdesign.report.figures.pictures import View
-from mechdesign.report.requirements import DrawnCases
-from mechdesign.results import Table
+from mechdesign.ground.results import Table
 
 
 class CasesView(View):

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.joints import NOTHING, PEAK, place_in_words
+from mechdesign.drawing.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import MAX_PANELS, Along, quantity
+from mechdesign.drawing.pictures import picture
 from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.questions.friction import SMOOTH
-from mechdesign.report.figures import style
-from mechdesign.report.figures.joints import NOTHING, PEAK, place_in_words
-from mechdesign.report.figures.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import MAX_PANELS, Along, quantity
-from mechdesign.report.figures.pictures import picture
 
 # A peak beyond so many times the root mean square, near a singularity, leaves the axis.
 _BEYOND = 6.0

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Panel, Picture, Trace
+from mechdesign.drawing.panels import quantity
+from mechdesign.drawing.pictures import picture
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Panel, Picture, Trace
-from mechdesign.report.figures.panels import quantity
-from mechdesign.report.figures.pictures import picture
 
 _FLAT, _STILL = 0.03, 1e-4  # of the range of all curves; of that
 _LOOKS: dict[str, dict[str, Any]] = {

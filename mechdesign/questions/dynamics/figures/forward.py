@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Lines, Panel, Picture, Trace
+from mechdesign.drawing.panels import MAX_PANELS
+from mechdesign.drawing.pictures import picture
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Lines, Panel, Picture, Trace
-from mechdesign.report.figures.panels import MAX_PANELS
-from mechdesign.report.figures.pictures import picture
 
 _DOTTED = {"color": style.FAINT, "linestyle": ":", "linewidth": 1.0, "zorder": 1.5}
 

@@ -9,22 +9,22 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
+from mechdesign.drawing import shapes, style
+from mechdesign.drawing.arrows import RATES, Arrows
+from mechdesign.drawing.callouts import arc, arrow
+from mechdesign.drawing.drawing import draw, write
+from mechdesign.drawing.framing import extent, fitting_windows
+from mechdesign.drawing.joints import NOTHING
+from mechdesign.drawing.labels import Label
+from mechdesign.drawing.marks import Late, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import quantity, round_down
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import Still, pose
+from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
 from mechdesign.questions.poses import pose_in_words
-from mechdesign.report.figures import shapes, style
-from mechdesign.report.figures.arrows import RATES, Arrows
-from mechdesign.report.figures.callouts import arc, arrow
-from mechdesign.report.figures.drawing import draw, write
-from mechdesign.report.figures.framing import extent, fitting_windows
-from mechdesign.report.figures.joints import NOTHING
-from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.marks import Late, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import quantity, round_down
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Still, pose
-from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut
 
 MAX_LINKS = 11
 LEAST = 5e-3  # part of the largest force, and of the largest moment, below which nothing is drawn

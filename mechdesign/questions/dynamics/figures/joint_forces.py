@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.drawing.joints import MAX_JOINTS, JointLoad, joint_curves, joint_hodographs
+from mechdesign.drawing.marks import Picture
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.report.figures.joints import MAX_JOINTS, JointLoad, joint_curves, joint_hodographs
-from mechdesign.report.figures.marks import Picture
-from mechdesign.report.figures.pictures import picture
 
 HEADING = "Forces in the joints"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.joints import NOTHING, force_panel, hodograph, peak
+from mechdesign.drawing.marks import Axis, Lines, Panel, Picture, Trace
+from mechdesign.drawing.panels import quantity
+from mechdesign.drawing.pictures import picture
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.joints import NOTHING, force_panel, hodograph, peak
-from mechdesign.report.figures.marks import Axis, Lines, Panel, Picture, Trace
-from mechdesign.report.figures.panels import quantity
-from mechdesign.report.figures.pictures import picture
 
 
 @picture(DynamicsView, "shaking", order=50)

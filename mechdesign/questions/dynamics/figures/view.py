@@ -6,15 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.drawing.joints import NOTHING, JointLoad, loaded, peak
+from mechdesign.drawing.pictures import PosesView
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.numerics.rounding import STILL
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.state_in_time import STANDSTILL
 from mechdesign.questions.dynamics.tables import question_of
-from mechdesign.report.figures.joints import NOTHING, JointLoad, loaded, peak
-from mechdesign.report.figures.pictures import PosesView
 
 
 class DynamicsView(PosesView):

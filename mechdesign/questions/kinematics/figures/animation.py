@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mechdesign.numerics.arrays import Ints, evenly
+from mechdesign.drawing import style
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.marks import Picture
+from mechdesign.drawing.panels import drawn_plane
+from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.numerics.arrays import Ints, evenly
 from mechdesign.questions.kinematics.figures.paths import path_marks
 from mechdesign.questions.poses import Shown
-from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.layout import draw
-from mechdesign.report.figures.marks import Picture
-from mechdesign.report.figures.panels import drawn_plane
-from mechdesign.report.figures.sweep import Sweep
 
 FRAMES = 36  # at most
 _COLORS = 32

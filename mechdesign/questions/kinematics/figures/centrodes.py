@@ -6,18 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.marks import Dots, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import drawn_plane
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.numerics.arrays import Complexes, Flags
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import vector
-from mechdesign.numerics.arrays import Complexes, Flags
 from mechdesign.questions.kinematics.figures.poses import centre_look
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.marks import Dots, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import drawn_plane
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.sweep import Sweep
-from mechdesign.results import Table
 
 MOST_PAIRS = 4
 _NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window

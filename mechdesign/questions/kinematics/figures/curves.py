@@ -8,22 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.columns import Column
+from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.layout import fitting_rows
+from mechdesign.drawing.legends import fitting
+from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
+from mechdesign.drawing.overlay import DASHES, both_named
+from mechdesign.drawing.panels import Along, abscissa, moving_names, times
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.sweep import ranks
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.layout import fitting_rows
-from mechdesign.report.figures.legends import fitting
-from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
-from mechdesign.report.figures.overlay import DASHES, both_named
-from mechdesign.report.figures.panels import Along, abscissa, moving_names, times
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.sweep import ranks
-from mechdesign.results import Table
 from mechdesign.study import Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart

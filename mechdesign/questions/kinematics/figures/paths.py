@@ -13,22 +13,22 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
+from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.labels import Label, paper
+from mechdesign.drawing.marks import Late, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.overlay import both_named, sweep_marks
+from mechdesign.drawing.panels import drawn_plane, moving_names
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.shapes import Color, darker, lighter, link_colors
+from mechdesign.drawing.sweep import Sweep, ranks
+from mechdesign.ground.numerics.arrays import Complexes, Ints
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.labels import Label, paper
-from mechdesign.report.figures.marks import Late, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.overlay import both_named, sweep_marks
-from mechdesign.report.figures.panels import drawn_plane, moving_names
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.shapes import Color, darker, lighter, link_colors
-from mechdesign.report.figures.sweep import Sweep, ranks
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Largest number of moving links, and for it the number of ghosts.

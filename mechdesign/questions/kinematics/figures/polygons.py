@@ -7,20 +7,20 @@ from functools import partial
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.arrows import RATES, Arrows
+from mechdesign.drawing.drawing import write
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.labels import Label
+from mechdesign.drawing.marks import Axis, Dots, Late, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import hull
+from mechdesign.drawing.shapes import link_colors
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.figures.poses import KINDS, place_of, rates_of
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.special_poses import SpecialPose
-from mechdesign.report.figures import style
-from mechdesign.report.figures.arrows import RATES, Arrows
-from mechdesign.report.figures.drawing import write
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.marks import Axis, Dots, Late, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import hull
-from mechdesign.report.figures.shapes import link_colors
 
 MOST_POSES = 3
 POLE = "p"

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.drawing import style
+from mechdesign.drawing.arrows import RATES, Arrows
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.marks import Dots, PanelMark, Picture
+from mechdesign.drawing.panels import drawn_plane
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import Scene
+from mechdesign.drawing.sweep import ranks
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
-from mechdesign.report.figures import style
-from mechdesign.report.figures.arrows import RATES, Arrows
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.marks import Dots, PanelMark, Picture
-from mechdesign.report.figures.panels import drawn_plane
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene
-from mechdesign.report.figures.sweep import ranks
 from mechdesign.study import Study
 
 _MAX_COLUMNS = 3

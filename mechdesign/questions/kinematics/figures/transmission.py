@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.patheffects import withStroke
 
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
+from mechdesign.drawing.panels import Along, abscissa, moving_names
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
-from mechdesign.report.figures.panels import Along, abscissa, moving_names
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.sweep import Sweep
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Transmission angles that textbooks call good, degrees.

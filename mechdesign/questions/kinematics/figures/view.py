@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.drawing.pictures import View
+from mechdesign.drawing.sweep import Sweep
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.report.figures.pictures import View
-from mechdesign.report.figures.sweep import Sweep
 
 
 class MotionView(View):

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.errors import counted
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis
+from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import Design, variables_of
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis
-from mechdesign.results import Table
 
 FEW = 1000  # so many designs have larger dots
 GREY_DOTS: dict[str, Any] = {"marker": ".", "color": style.FAINT, "markeredgewidth": 0, "alpha": 0.6}

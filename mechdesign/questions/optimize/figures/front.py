@@ -7,13 +7,13 @@ from string import ascii_uppercase
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Dots, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.figures.designs import FEW, GREY_DOTS, listed
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import DesignSet
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Dots, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 
 _FRONT_MARKS = "so^DvPX"
 

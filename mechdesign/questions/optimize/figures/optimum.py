@@ -7,8 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.mechanism import sketch_and_first_pose
+from mechdesign.drawing.panels import MAX_PANELS, Along, abscissa, drawn_plane
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Mechanism
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.paths import drawn_panel, paths_panel
 from mechdesign.questions.optimize.analysis import DrawnDesign, drawn_design
@@ -19,14 +27,6 @@ from mechdesign.questions.poses import Shown
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.boundary import regions_picture, workspace_picture
 from mechdesign.questions.workspace.figures.regions import regions
-from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.marks import Axis, Lines, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.mechanism import sketch_and_first_pose
-from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, drawn_plane
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.sweep import Sweep
-from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # Angles at which the outline of a contained shape is drawn.

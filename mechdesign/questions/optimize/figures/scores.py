@@ -14,7 +14,21 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import FuncFormatter
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.drawing import style
+from mechdesign.drawing.contours import colour_steps, round_levels
+from mechdesign.drawing.marks import (
+    Axis,
+    Coloured,
+    Dots,
+    Panel,
+    PanelMark,
+    Picture,
+    Trace,
+    Words,
+)
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.figures.designs import (
     FEW,
     GREY_DOTS,
@@ -29,20 +43,6 @@ from mechdesign.questions.optimize.figures.designs import (
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import DesignSet
 from mechdesign.questions.optimize.variables import variables_of
-from mechdesign.report.figures import style
-from mechdesign.report.figures.contours import colour_steps, round_levels
-from mechdesign.report.figures.marks import (
-    Axis,
-    Coloured,
-    Dots,
-    Panel,
-    PanelMark,
-    Picture,
-    Trace,
-    Words,
-)
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 
 MAP_LEVELS = 14
 FEW_COLORS = 9

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.drawing.pictures import View
+from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.questions.optimize.judge import DesignSet
-from mechdesign.report.figures.pictures import View
-from mechdesign.results import Table
 
 MIN_MAP_DESIGNS = 9
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.engine.problem import LimitStates
 
 # Most steps of the iteration.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.questions.reliability.engine.descent import alike, descend, sizes
 from mechdesign.questions.reliability.engine.problem import LimitStates, failed
 

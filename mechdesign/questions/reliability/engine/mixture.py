@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.problem import LimitStates
 
 # Samples of the law itself, for each dimension, that are added to the samples from which a density is learned.

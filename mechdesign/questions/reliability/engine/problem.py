@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.schema.section import Precision
 
 # Probability with which an interval holds the true value.

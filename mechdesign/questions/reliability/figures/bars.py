@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import fitting_names, fitting_panels
+from mechdesign.drawing.looks import best_probability, followed_in_words, heading
+from mechdesign.drawing.marks import Axis, Bars, Dots, Lines, Panel, PanelMark, Picture, Words
+from mechdesign.drawing.panels import MAX_PANELS, number
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.motion.rows import Poses
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import fitting_names, fitting_panels
-from mechdesign.report.figures.looks import best_probability, followed_in_words, heading
-from mechdesign.report.figures.marks import Axis, Bars, Dots, Lines, Panel, PanelMark, Picture, Words
-from mechdesign.report.figures.panels import MAX_PANELS, number
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 MAX_SOURCES = 16

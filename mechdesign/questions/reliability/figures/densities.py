@@ -10,14 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.looks import heading, look
+from mechdesign.drawing.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.shapes import lighter
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.tables import Samples
-from mechdesign.report.figures import style
-from mechdesign.report.figures.looks import heading, look
-from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Trace
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.shapes import lighter
 
 # Shares of the made mechanisms that an ellipse or a region holds, with the ellipses' dashes and the regions' tints.
 SHARES = (0.5, 0.9, 0.997)

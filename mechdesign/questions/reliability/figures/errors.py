@@ -8,12 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.poses import pose_in_words
-from mechdesign.questions.reliability.figures.view import ErrorsView
-from mechdesign.questions.reliability.schema.methods import METHODS, Method
-from mechdesign.report.figures import style
-from mechdesign.report.figures.looks import (
+from mechdesign.drawing import style
+from mechdesign.drawing.looks import (
     best_moments,
     best_probability,
     channels,
@@ -21,10 +17,14 @@ from mechdesign.report.figures.looks import (
     look,
     methods,
 )
-from mechdesign.report.figures.marks import Area, Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
-from mechdesign.report.figures.panels import MAX_PANELS, Along, maps, number
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
+from mechdesign.drawing.marks import Area, Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
+from mechdesign.drawing.panels import MAX_PANELS, Along, maps, number
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.results import Table
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.figures.view import ErrorsView
+from mechdesign.questions.reliability.schema.methods import METHODS, Method
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
 MAX_MAPS = 4

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import fitting_panels
+from mechdesign.drawing.looks import apart, channels, heading, look, methods
+from mechdesign.drawing.marks import Area, Axis, Lines, Panel, PanelMark, Picture, Steps, Trace, Zone
+from mechdesign.drawing.panels import MAX_PANELS, number
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.tables import Samples
-from mechdesign.report.figures import style
-from mechdesign.report.figures.layout import fitting_panels
-from mechdesign.report.figures.looks import apart, channels, heading, look, methods
-from mechdesign.report.figures.marks import Area, Axis, Lines, Panel, PanelMark, Picture, Steps, Trace, Zone
-from mechdesign.report.figures.panels import MAX_PANELS, number
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.drawing.looks import followed_in_words, look
+from mechdesign.drawing.pictures import PosesView
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.tables import DrawnErrors, Samples
-from mechdesign.report.figures.looks import followed_in_words, look
-from mechdesign.report.figures.pictures import PosesView
 
 
 class ErrorsView(PosesView):

@@ -10,13 +10,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.questions.reliability.engine.problem import Estimate
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.simulation import Setting
 from mechdesign.questions.reliability.task import MethodResult, Partial, Task
-from mechdesign.work.chunks import map_chunks
 
 Value = TypeVar("Value")
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.descent import descend, sizes
 from mechdesign.questions.reliability.engine.design_points import DesignPoints, find
 from mechdesign.questions.reliability.engine.mixture import Mixture

@@ -13,7 +13,7 @@ from operator import add
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.design_points import (
     EXPLORED,
     DesignPoints,

@@ -13,7 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import JointMoments
 from mechdesign.questions.reliability.laws import Normal
 from mechdesign.questions.reliability.methods import of_moments

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats
 
 
 class ToleranceClassError(ValueError):

@@ -24,7 +24,7 @@ class Method:
         Rank, higher where its numbers are the more accurate ones; no two are alike. Where a picture has room for the
         numbers of one method, they are those of the highest rank.
     color, marker, dashes : str
-        Color of `mechdesign.report.figures.style` (vermilion is left to limits), Matplotlib's marker of its values, and
+        Color of `mechdesign.drawing.style` (vermilion is left to limits), Matplotlib's marker of its values, and
         dashes of computed values; those of made mechanisms have whiskers instead.
     sampled : bool
         Whether it solves made mechanisms at random. It takes ``samples``, and its probability has an interval.

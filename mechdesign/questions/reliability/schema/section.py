@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 from pydantic import BeforeValidator, Field
 
 from mechdesign.commands import COMMANDS
-from mechdesign.expressions import Number
+from mechdesign.ground.expressions import Number
 from mechdesign.mechanism.graph import GROUND, OF_LINKS, Graph
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.kinematics.schema import KinematicsSection

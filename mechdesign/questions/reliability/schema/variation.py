@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechdesign.errors import StudyError
-from mechdesign.expressions import Number
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.elements.couplings import MEASURED
 from mechdesign.mechanism.model import Place
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.reliability.laws import LAWS, Distribution, Marginal
 from mechdesign.questions.reliability.schema.iso_tolerances import (
     ToleranceClassError,

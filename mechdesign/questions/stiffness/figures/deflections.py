@@ -10,8 +10,16 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from mechdesign.drawing import style
+from mechdesign.drawing.callouts import ARC, arc, force
+from mechdesign.drawing.drawing import Posed, draw
+from mechdesign.drawing.marks import Dots, Late, Own, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import drawn_plane, quantity, round_down
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import Scene, Still, hull, pose
+from mechdesign.drawing.shapes import Shape
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.bodies import NetworkEdge
@@ -20,14 +28,6 @@ from mechdesign.questions.stiffness.figures.joint_forces import cases_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.schema import StiffnessSection
-from mechdesign.report.figures import style
-from mechdesign.report.figures.callouts import ARC, arc, force
-from mechdesign.report.figures.drawing import Posed, draw
-from mechdesign.report.figures.marks import Dots, Late, Own, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import drawn_plane, quantity, round_down
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, Still, hull, pose
-from mechdesign.report.figures.shapes import Shape
 from mechdesign.study import Study
 
 MAX_LOADS = 4

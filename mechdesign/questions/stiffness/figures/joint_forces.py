@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechdesign.expressions import Expression
-from mechdesign.questions.stiffness.figures.view import StiffnessView
-from mechdesign.questions.stiffness.schema import StiffnessSection
-from mechdesign.report.figures import style
-from mechdesign.report.figures.joints import (
+from mechdesign.drawing import style
+from mechdesign.drawing.joints import (
     MAX_JOINTS,
     NOTHING,
     JointLoad,
@@ -17,9 +14,12 @@ from mechdesign.report.figures.joints import (
     loaded,
     peak,
 )
-from mechdesign.report.figures.marks import Picture
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
+from mechdesign.drawing.marks import Picture
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.expressions import Expression
+from mechdesign.ground.results import Table
+from mechdesign.questions.stiffness.figures.view import StiffnessView
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.study import Study
 from mechdesign.study.schema.loads import Load, Quantity
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.marks import Axis, Panel, Picture, Trace
+from mechdesign.drawing.panels import Along, Plane, maps, quantity
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.questions.stiffness.figures.view import StiffnessView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.marks import Axis, Panel, Picture, Trace
-from mechdesign.report.figures.panels import Along, Plane, maps, quantity
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 _LOOKS = {

@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.drawing import style
+from mechdesign.drawing.callouts import point_labels
+from mechdesign.drawing.drawing import Posed, draw, write
+from mechdesign.drawing.labels import Label
+from mechdesign.drawing.marks import Late, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import drawn_plane, quantity
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import Still, hull, pose
+from mechdesign.drawing.shapes import Line, Shape, Strut, Symbol, coil
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.figures.view import StiffnessView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.callouts import point_labels
-from mechdesign.report.figures.drawing import Posed, draw, write
-from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.marks import Late, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import drawn_plane, quantity
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Still, hull, pose
-from mechdesign.report.figures.shapes import Line, Shape, Strut, Symbol, coil
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
 _SHARES = (0.5, 0.3, 0.75)  # of a spring's length, where the labels of some stand

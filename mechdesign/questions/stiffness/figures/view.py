@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.drawing.pictures import PosesView
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.stiffness.analysis import DrawnStiffness
-from mechdesign.report.figures.pictures import PosesView
 
 
 class StiffnessView(PosesView):

@@ -11,9 +11,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Patch, Rectangle
 
+from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.drawing import Posed, write
+from mechdesign.drawing.labels import HALO, Label
+from mechdesign.drawing.marks import Axis, Late, Lines, Own, Panel, PanelMark, Picture, Trace, Words
+from mechdesign.drawing.overlay import both_named, line_mark, posed_before
+from mechdesign.drawing.panels import MAX_PANELS, Along
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import Scene, pose, sketched
+from mechdesign.ground.numerics.arrays import Complexes, evenly
+from mechdesign.ground.results import Table
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
-from mechdesign.numerics.arrays import Complexes, evenly
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
     Region,
@@ -32,16 +42,6 @@ from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.region.regions import regions
-from mechdesign.report.figures import style
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import Posed, write
-from mechdesign.report.figures.labels import HALO, Label
-from mechdesign.report.figures.marks import Axis, Late, Lines, Own, Panel, PanelMark, Picture, Trace, Words
-from mechdesign.report.figures.overlay import both_named, line_mark, posed_before
-from mechdesign.report.figures.panels import MAX_PANELS, Along
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import Scene, pose, sketched
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 SIDES = ("inner", "outer")

@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.marks import Own, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import quantity, round_down
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.regions import fill, region_marks, region_picture, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.marks import Own, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import quantity, round_down
-from mechdesign.report.figures.pictures import picture
 
 # Half axis of the largest ellipse drawn at the common scale, over the distance of neighbouring places; of this share
 # of the ellipses none is larger. The rest would cover others: they grow without bounds towards singularities.

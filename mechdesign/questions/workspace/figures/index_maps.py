@@ -13,8 +13,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.patheffects import withStroke
 
-from mechdesign.indices import INDEX_NAMES
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.contours import Grid, colour_steps, constant, contour_lines, filled, round_levels
+from mechdesign.drawing.labels import paper
+from mechdesign.drawing.marks import Coloured, Late, Own, PanelMark, Picture
+from mechdesign.drawing.panels import node_areas, quantile, quantity
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.indices import INDEX_NAMES
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.regions import (
     Region,
     fill,
@@ -25,12 +31,6 @@ from mechdesign.questions.workspace.figures.regions import (
     some,
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
-from mechdesign.report.figures import style
-from mechdesign.report.figures.contours import Grid, colour_steps, constant, contour_lines, filled, round_levels
-from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.marks import Coloured, Late, Own, PanelMark, Picture
-from mechdesign.report.figures.panels import node_areas, quantile, quantity
-from mechdesign.report.figures.pictures import picture
 from mechdesign.study import Study
 
 # Columns of the table that are no indices, beside the held coordinates.

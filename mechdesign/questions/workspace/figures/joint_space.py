@@ -11,20 +11,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
+from mechdesign.drawing import style
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.labels import HALO
+from mechdesign.drawing.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Words
+from mechdesign.drawing.panels import coordinate_label
+from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.results import Table
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.regions import PALE, Region, inner_loci, places, region_marks, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.tables import curves
-from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.labels import HALO
-from mechdesign.report.figures.marks import Axis, Dots, Own, Panel, PanelMark, Picture, Words
-from mechdesign.report.figures.panels import coordinate_label
-from mechdesign.report.figures.pictures import picture
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 _SHAPE = 0.6  # height over width of a panel over an angle and a length

@@ -7,20 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.drawing import Posed
+from mechdesign.drawing.marks import Axis, Coloured, Panel, Picture, Trace
+from mechdesign.drawing.overlay import both_named
+from mechdesign.drawing.panels import coordinate_label
+from mechdesign.drawing.pictures import picture
+from mechdesign.drawing.scene import sketched
+from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.results import Table
 from mechdesign.questions.workspace.figures.boundary import DASHES, marks_before, places_before
 from mechdesign.questions.workspace.figures.regions import coloured, pieces, places, region_picture
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.schema import WorkspaceSection
-from mechdesign.report.figures import style
-from mechdesign.report.figures.before import Before
-from mechdesign.report.figures.drawing import Posed
-from mechdesign.report.figures.marks import Axis, Coloured, Panel, Picture, Trace
-from mechdesign.report.figures.overlay import both_named
-from mechdesign.report.figures.panels import coordinate_label
-from mechdesign.report.figures.pictures import picture
-from mechdesign.report.figures.scene import sketched
-from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Speed ratios grow without bound at dead centres: colours end at this quantile.

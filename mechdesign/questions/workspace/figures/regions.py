@@ -13,14 +13,14 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withStroke
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
+from mechdesign.drawing import style
+from mechdesign.drawing.contours import Grid
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.marks import Own, PanelMark, Picture, Trace
+from mechdesign.drawing.panels import drawn_plane, round_down
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints, evenly
+from mechdesign.ground.results import Result, Table
 from mechdesign.questions.workspace.tables import curves
-from mechdesign.report.figures import style
-from mechdesign.report.figures.contours import Grid
-from mechdesign.report.figures.framing import extent
-from mechdesign.report.figures.marks import Own, PanelMark, Picture, Trace
-from mechdesign.report.figures.panels import drawn_plane, round_down
-from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # How a piece of the boundary is drawn by what ends the region there, and loci of singularities inside, of the closure

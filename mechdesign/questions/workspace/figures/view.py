@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from mechdesign.drawing.pictures import View
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import Region, regions
-from mechdesign.report.figures.pictures import View
 
 
 class WorkspaceView(View):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Floats
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.index import Evaluate, Index, length, of_compliance
 

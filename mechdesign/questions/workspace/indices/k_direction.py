@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
 from mechdesign.questions.stiffness.compliance import directional
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.index import Evaluate, Index, of_compliance, stiffness

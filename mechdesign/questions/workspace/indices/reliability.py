@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mechdesign.errors import StudyError
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.index import Evaluate, Index, number, of_configurations
 
 if TYPE_CHECKING:

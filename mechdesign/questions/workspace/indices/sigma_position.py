@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.index import Evaluate, Index, length, of_configurations
 from mechdesign.questions.workspace.schema import WorkspaceSection
 

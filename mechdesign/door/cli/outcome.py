@@ -1,0 +1,57 @@
+"""What became of a command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mechdesign.door.report import manifest
+from mechdesign.door.report.requirements import Verdict
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import Interrupted
+from mechdesign.ground.files import FORMATS
+from mechdesign.ground.results import Table
+
+OUTCOMES = {
+    0: "done",
+    1: "requirement not met",
+    2: "wrong study",
+    3: "cannot be assembled",
+    4: "failed",
+    Interrupted.exit_code: "interrupted",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of one command; `rows` are those of the main table."""
+
+    study: str
+    command: str
+    directory: Path
+    exit_code: int
+    rows: int
+    warnings: Sequence[Caution] = ()
+    failed: str = ""
+    verdicts: Sequence[Verdict] = ()
+    seconds: float = 0.0
+    kept: bool = False
+    written: bool = False  # whether the results are in the directory
+    table: Table | None = None  # the main table
+    shard: str = ""  # what became of the shard, with --shard
+    left: bool = False  # whether the run ended before this question
+    reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
+
+    @property
+    def picture(self) -> Path | None:
+        """The most telling of its pictures; None where there is none."""
+        content = manifest.read(self.directory) if self.written else None
+        files = manifest.recorded_files(content) if content is not None else {}
+        # The pictures of a question are listed in their order, which begins with the most telling.
+        return next((self.directory / name for name in files if name.rpartition(".")[2] in FORMATS), None)
+
+    @property
+    def word(self) -> str:
+        """The outcome in a word or two."""
+        return OUTCOMES[self.exit_code] if self.reached else "not reached"

@@ -1,0 +1,350 @@
+"""A drawing sheet for the drawing office: the mechanism with its dimensions at a standard scale, tables, a title block.
+
+Frame and margins are those of ISO 5457, the fields of the title block those of ISO 7200, scales those of ISO 5455.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.text import Annotation, Text
+from matplotlib.textpath import text_to_path
+
+from mechdesign import __version__
+from mechdesign.door.exporting.exports import Content, export
+from mechdesign.door.exporting.view import PosedStudy
+from mechdesign.door.report.requirements import requirements
+from mechdesign.drawing import style
+from mechdesign.drawing.dimensions import draw_dimensions, table_rows
+from mechdesign.drawing.framing import extent
+from mechdesign.drawing.scene import Still, pose
+from mechdesign.ground.cautions import Caution
+from mechdesign.ground.errors import MechdesignError, StudyError, printable
+from mechdesign.ground.results import Result
+from mechdesign.mechanism.plates import pins_of
+from mechdesign.questions.kinematics.analysis import kinematics
+
+INCH = 25.4
+# Width and height of the papers, and the margins left and elsewhere (mm).
+PAPERS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0)}
+LEFT, MARGIN = 20.0, 10.0
+# Of the title block and the tables above it, and the height of its rows (mm).
+WIDTH, BLOCK = 180.0, (9.0, 15.0, 10.0)
+# Height of a row of a table, and between tables; least height of the drawing on A4 (mm).
+ROW, GAP, LEAST = 4.2, 3.5, 110.0
+# Room for each point of a mechanism below which a larger paper is taken (mm^2).
+CROWDED = 400.0
+# Part of the size of the mechanism, or of a turn, below which a number is rounding.
+ROUNDING = 1e-12
+# Around the mechanism, for dimension lines and names (mm).
+PAD = 22.0
+# Sizes of type, of labels, tables and values (points), and the least part to which a table's is reduced.
+LABEL, CELL, VALUE, REDUCED = 4.6, 6.6, 8.5, 0.75
+# Between columns of a table (mm).
+COLUMN = 3.0
+# Rows of a table at most.
+MOST = {"links": 20, "pins": 12, "motion": 16, "requirements": 10}
+# Scales larger and smaller than life.
+SCALES = [f * 10.0**k for k in range(4, -7, -1) for f in (5.0, 2.0, 1.0)]
+
+# Rows of a table, of which the first is its head.
+Rows = Sequence[Sequence[str]]
+
+
+@export(
+    "sheet.pdf",
+    "a drawing sheet: dimensions at a standard scale, tables, a title block",
+    order=40,
+    options=("at", "paper"),
+)
+def sheet_pdf(view: PosedStudy) -> Content:
+    """The sheet as a PDF, and a warning where numbers of the motion are not on it."""
+    mechanism = view.mechanism
+    scene = pose(mechanism, view.pose)
+    assert scene is not None
+    result, warnings = _motion(view)
+    tables = [_shortened(name, rows) for name, rows in _tables(view, scene, result) if rows]
+    with style.context():
+        bands = _bands(tables)
+        sheet = PaperSheet.of(view, scene, sum(band.height for band in bands))
+        figure = sheet.draw(view, scene, bands)
+        return Content(style.encoded(figure, "pdf", f"mechdesign {__version__}"), warnings)
+
+
+def _motion(view: PosedStudy) -> tuple[Result | None, tuple[Caution, ...]]:
+    """The answer of kinematics; none where the study gives no motion that can be assembled."""
+    try:
+        return kinematics(view.study), ()
+    except MechdesignError as error:
+        return None, (Caution("incomplete", f"numbers of the motion are not on the sheet: {error}"),)
+
+
+def _tables(view: PosedStudy, scene: Still, result: Result | None) -> Iterator[tuple[str, Rows]]:
+    """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
+    study, label = view.study, view.study.units.label
+    scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
+    yield "links", table_rows(study, scene)
+    yield "pins", _pins(view)
+    if result is None:
+        return
+    rows: list[tuple[str, ...]] = [("motion", "from", "to", "range", "unit")]
+    poses = result.tables["motion"]
+    for name in view.mechanism.drives:
+        if name in poses.names:
+            values = poses[name]
+            low, high = float(np.nanmin(values)), float(np.nanmax(values))
+            unit = style.printed(poses.column(name).unit)
+            rows.append((f"drive {name}", f"{low:.5g}", f"{high:.5g}", f"{high - low:.5g}", unit))
+    if "extremes" in result.tables:
+        table = result.tables["extremes"]
+        for row in table:
+            if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
+                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
+                extremes = (float(row[key]) for key in ("min", "max", "range"))
+                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
+                rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
+    if "loops" in result.tables:
+        for row in result.tables["loops"]:
+            least = f"{row['transmission_min']:.4g}"
+            rows.append((f"least transmission angle, {row['joints']}", least, "", "", style.printed(label("angle"))))
+    yield "motion", rows if len(rows) > 1 else []
+    verdicts = [
+        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{own.worst:.5g} {style.printed(own.unit)}")
+        for verdict in requirements(study, result)
+        for own in [verdict.as_required]
+    ]
+    yield "requirements", [("requirement", "", "worst"), *verdicts] if verdicts else []
+
+
+def _pins(view: PosedStudy) -> list[tuple[str, ...]]:
+    """Pins of plates, with fits and clearances of the study."""
+    study, description = view.study, view.mechanism.description
+    clearances = study.reliability.clearances if study.reliability is not None else {}
+    if description.plates is None and not clearances:
+        return []
+    rows: list[tuple[str, ...]] = [("pin", "joins", "diameter", "fit or clearance")]
+    for pin in pins_of(description):
+        clearance = clearances.get(pin.name)
+        fit = ""
+        if clearance is not None:
+            fit = clearance.fit.text if clearance.fit is not None else f"radial {float(clearance.radius):.5g}"
+        size = f"\N{DIAMETER SIGN}{2 * float(view.sizes.pin(pin.name)):.5g}" if description.plates is not None else ""
+        rows.append((pin.name, ", ".join(pin.links), size, fit))
+    kept = [k for k in range(4) if any(row[k] for row in rows[1:])]
+    return [tuple(row[k] for k in kept) for row in rows]
+
+
+def _shortened(name: str, rows: Rows) -> Rows:
+    """A table with at most so many rows; the last one says how many more there are."""
+    most = MOST[name] + 1
+    if len(rows) <= most:
+        return rows
+    more = [f"and {len(rows) - most + 1} more", *([""] * (len(rows[0]) - 1))]
+    return [*rows[: most - 1], more]
+
+
+@dataclass(frozen=True)
+class PaperSheet:
+    """A sheet of paper, the drawing's region on it (left, low, width, height; mm), and its scale."""
+
+    paper: str
+    region: tuple[float, float, float, float]
+    scale: float
+
+    @classmethod
+    def of(cls, view: PosedStudy, scene: Still, tables: float) -> PaperSheet:
+        """The paper that is asked for, or the smallest with room, and the largest standard scale on it.
+
+        `tables` is the height of the tables (mm).
+
+        Raises
+        ------
+        StudyError
+            If another paper is asked for.
+        """
+        if view.paper not in (None, *PAPERS):
+            raise StudyError(f"--paper is {' or '.join(PAPERS)}, not {view.paper!r}")
+        low = MARGIN + sum(BLOCK) + tables
+        small, large = (wide - LEFT - MARGIN for wide, _ in PAPERS.values())
+        tall = PAPERS["A4"][1] - MARGIN
+        sheets = {
+            "A4": cls._scaled("A4", (LEFT, low, small, tall - low), view, scene),
+            "A3": cls._scaled("A3", (LEFT, MARGIN, large - WIDTH, tall - MARGIN), view, scene),
+        }
+        fits = sheets["A4"].region[3] >= LEAST
+        if view.paper == "A4" and not fits:
+            raise StudyError("the tables leave no room for the drawing on A4: ask for --paper A3")
+        _, across, up = extent(scene.places)
+        area = across * up * (sheets["A4"].scale * view.millimetres) ** 2
+        crowded = area < CROWDED * len(scene.points)
+        return sheets[view.paper or ("A4" if fits and not crowded else "A3")]
+
+    @classmethod
+    def _scaled(
+        cls, paper: str, region: tuple[float, float, float, float], view: PosedStudy, scene: Still
+    ) -> PaperSheet:
+        """A sheet at the largest standard scale at which the mechanism fits into the region."""
+        _, across, up = extent(scene.places)
+        most = min((region[2] - 2 * PAD) / across, (region[3] - 2 * PAD) / up) / view.millimetres
+        return cls(paper, region, next((scale for scale in SCALES if scale <= most), SCALES[-1]))
+
+    @property
+    def words(self) -> str:
+        """The scale as ISO 5455 writes it."""
+        return f"{self.scale:g} : 1" if self.scale >= 1 else f"1 : {1 / self.scale:g}"
+
+    def draw(self, view: PosedStudy, scene: Still, bands: Sequence[TableColumns]) -> Figure:
+        """The whole sheet."""
+        wide, tall = PAPERS[self.paper]
+        figure = Figure(figsize=(wide / INCH, tall / INCH))
+        FigureCanvasAgg(figure)
+        page = figure.add_axes((0, 0, 1, 1))
+        page.set_xlim(0, wide)
+        page.set_ylim(0, tall)
+        page.axis("off")
+        right = wide - MARGIN
+        _box(page, LEFT, MARGIN, right - LEFT, tall - 2 * MARGIN, 0.7)
+        for x, y, dx, dy in ((wide / 2, MARGIN, 0, -5), (wide / 2, tall - MARGIN, 0, 5),
+                             (LEFT, tall / 2, -5, 0), (right, tall / 2, 5, 0)):  # fmt: skip
+            page.plot([x, x + dx], [y, y + dy], color=style.INK, linewidth=0.7 * 72 / INCH)
+        self._mechanism(figure, page, view, scene)
+        self._title(page, view, right - WIDTH)
+        top = MARGIN + sum(BLOCK)
+        for band in reversed(bands):
+            top += band.height
+            for k, column in enumerate(band.columns):
+                y = top - GAP / 2
+                for rows in column:
+                    _draw_table(page, right - WIDTH + 2 + k * (band.room + 2 * COLUMN), y, rows, band.room)
+                    y -= _height(rows)
+        return figure
+
+    def _mechanism(self, figure: Figure, page: Axes, view: PosedStudy, scene: Still) -> None:
+        wide, tall = PAPERS[self.paper]
+        left, low, across, up = self.region
+        axes = figure.add_axes((left / wide, low / tall, across / wide, up / tall))
+        axes.axis("off")
+        middle, _, _ = extent(scene.places)
+        half = complex(across, up) / 2 / self.scale / view.millimetres
+        axes.set_xlim(middle.real - half.real, middle.real + half.real)
+        axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
+        draw_dimensions(scene, axes)
+        _keep_inside(axes)
+        unit = view.study.units.label("length")
+        words = f"Dimensions{f' in {unit}' if unit else ''}, at {view.posed}"
+        words += "; lengths of guides are not to scale" * bool(scene.guides)
+        page.text(left + 4, low + up - 6, words, fontsize=CELL, color=style.INK)
+
+    def _title(self, page: Axes, view: PosedStudy, left: float) -> None:
+        study = view.study
+        unit = study.units.label("length") or "none (as mm)"
+        rows = (
+            (("Legal owner", "", 60.0), ("Created by", "", 40.0), ("Approved by", "", 40.0), ("Date", "", 40.0)),
+            (("Title", printable(study.name), 110.0), ("Document type", "Mechanism with its dimensions", 70.0)),
+            (("Scale", self.words, 25.0), ("Unit of length", unit, 30.0), ("Paper", self.paper, 15.0),
+             ("Sheet", "1 / 1", 15.0), ("Identification (SHA-256 of the study)", study.text_sha256[:16], 55.0),
+             ("Made with", f"mechdesign {__version__}", 40.0)),
+        )  # fmt: skip
+        top = MARGIN + sum(BLOCK)
+        _box(page, left, MARGIN, WIDTH, sum(BLOCK), 0.7)
+        for height, cells in zip(BLOCK, rows, strict=True):
+            x, top = left, top - height
+            for label, value, width in cells:
+                _box(page, x, top, width, height, 0.25)
+                page.text(x + 1, top + height - 1, label, fontsize=LABEL, va="top", color=style.INK)
+                size = VALUE if label != "Title" else 1.4 * VALUE
+                size *= min(1.0, (width - 3) / max(_width(value, size), 1e-9))
+                page.text(x + 1.5, top + 0.38 * height, value, fontsize=size, va="center", color=style.INK)
+                x += width
+
+
+def _keep_inside(axes: Axes) -> None:
+    """Move names that reach beyond the sides of the drawing's region back into it, as far as they have room."""
+    for name in axes.texts:
+        if isinstance(name, Annotation) and name.get_text():
+            # The first call places the name, and its box has the line that leads there too.
+            name.get_window_extent()
+            box = Text.get_window_extent(name)
+            beyond = max(box.x1 - axes.bbox.x1, 0.0) + min(box.x0 - axes.bbox.x0, 0.0)
+            x, y = name.xyann
+            name.xyann = (x - beyond * 72 / axes.figure.dpi, y)
+
+
+def _box(page: Axes, left: float, low: float, width: float, height: float, line: float) -> None:
+    x = [left, left + width, left + width, left, left]
+    y = [low, low, low + height, low + height, low]
+    page.plot(x, y, color=style.INK, linewidth=line * 72 / INCH, solid_joinstyle="miter")
+
+
+def _width(words: str, size: float) -> float:
+    """Width of words (mm)."""
+    wide = text_to_path.get_text_width_height_descent(words, FontProperties(size=size), False)[0] if words else 0.0
+    return float(wide) * INCH / 72
+
+
+def _height(rows: Rows) -> float:
+    return ROW * len(rows) + GAP if rows else 0.0
+
+
+def _widths(rows: Rows) -> list[float]:
+    """Widths of the columns (mm)."""
+    return [max(_width(row[k], 1.05 * CELL) for row in rows) for k in range(len(rows[0]))]
+
+
+@dataclass(frozen=True)
+class TableColumns:
+    """Tables beside each other, in columns of tables below each other, each `room` wide (mm)."""
+
+    columns: Sequence[Sequence[Rows]]
+    room: float
+
+    @property
+    def height(self) -> float:
+        """Height of the tallest column (mm)."""
+        return max(sum(map(_height, column)) for column in self.columns)
+
+
+def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
+    """Tables in two columns where they are narrow enough, in their order; what is wider has its own band."""
+    room = WIDTH - 4.0
+    half = room / 2 - COLUMN
+    narrow = [rows for rows in tables if REDUCED * sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
+    bands = [TableColumns([[rows]], room) for rows in tables if rows not in narrow]
+    if len(narrow) < 2:
+        return [TableColumns([[rows]], room) for rows in tables]
+    # Split where the taller column is lowest.
+    splits = [[narrow[:k], narrow[k:]] for k in range(1, len(narrow))]
+    return [min((TableColumns(split, half) for split in splits), key=lambda band: band.height), *bands]
+
+
+def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) -> None:
+    """Draw a table, reduced where it is wider than the room; words without room are cut."""
+    widths = _widths(rows)
+    gaps = COLUMN * (len(widths) - 1)
+    share = max(REDUCED, min(1.0, (room - gaps) / sum(widths)))
+    widths = [share * width for width in widths]
+    # The widest column gives up what is still missing.
+    widest = int(np.argmax(widths))
+    widths[widest] -= max(0.0, sum(widths) + gaps - room)
+    starts = left + np.concatenate([[0.0], np.cumsum(np.array(widths[:-1]) + COLUMN)])
+    for number, row in enumerate(rows):
+        y = top - (number + 0.5) * ROW
+        for x, words, width in zip(starts, row, widths, strict=True):
+            page.text(x, y, _cut(words, share * CELL, width), fontsize=share * CELL, va="center", color=style.INK,
+                      fontweight="bold" if number == 0 else "normal")  # fmt: skip
+    page.plot([left, left + room], [top - ROW] * 2, color=style.INK, linewidth=0.25 * 72 / INCH)
+
+
+def _cut(words: str, size: float, width: float) -> str:
+    """Words that fit into a width, with dots in place of what does not."""
+    if _width(words, size) <= width + 0.1:
+        return words
+    while words and _width(words + "\N{HORIZONTAL ELLIPSIS}", size) > width:
+        words = words[:-1]
+    return words + "\N{HORIZONTAL ELLIPSIS}"

@@ -1,0 +1,34 @@
+"""The field's words for what the reference has under another name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from mechdesign.door.reference.entries import Entry
+
+# A word: the word of the reference in its place, and what it means.
+SYNONYMS: Mapping[str, tuple[str, str]] = {
+    "torque": (
+        "<drive>_effort",
+        "the effort of an angle drive; kinematics.loads asks for it, extremes.csv has its peak",
+    ),
+    "mechanical advantage": (
+        "<output>_advantage",
+        "the force of an output over that of the drive, without friction: kinematics.mechanical_advantage asks for it",
+    ),
+    "tolerance stack": ("contributions", "the share of each tolerance in an error: contributions.csv of reliability"),
+    "toggle": ("toggles", "poses at which two links are in line: toggles.csv of kinematics"),
+    "baseline": ("compare", "results to compare with: mechdesign compare BASELINE RESULTS"),
+    "backlash": ("clearances", "reliability.clearances, the play in pins and gears"),
+    "slop": ("clearances", "reliability.clearances, the play in pins and gears"),
+    "lash": ("clearances", "reliability.clearances, the play in pins and gears"),
+    "play": ("clearances", "reliability.clearances, the play in pins and gears"),
+    "stroke": ("range", "the range of a coordinate: kinematics.extremes.B.x.range of extremes.csv"),
+    "swing": ("range", "the range of an angle: kinematics.extremes.rocker.angle.range of extremes.csv"),
+}
+
+
+def entries() -> Iterator[Entry]:
+    """Words of the field, and what they are called here."""
+    for word, (own, meaning) in SYNONYMS.items():
+        yield Entry(word, "other word", f"see {own}: {meaning}")

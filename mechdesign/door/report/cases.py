@@ -1,0 +1,92 @@
+"""Cases of a sweep in words: their changes, and which cases are best."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechdesign.ground.columns import CHOSEN, VARIED
+from mechdesign.ground.errors import counted
+from mechdesign.ground.results import Table
+from mechdesign.study.text.document import in_yaml
+
+RANK, FRONT = "rank", "front"
+
+
+def short(name: str) -> str:
+    """The name of an entry without ``mechanism.parameters.`` or ``mechanism.``."""
+    return name.removeprefix("mechanism.parameters.").removeprefix("mechanism.")
+
+
+def text_of(value: Any) -> str:
+    """A value in words."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value if isinstance(value, str) else in_yaml(value)
+
+
+def changes_in_words(changes: Iterable[tuple[str, Any]]) -> str:
+    """``r 35, l 120``."""
+    return ", ".join(f"{short(name)} {text_of(value)}" for name, value in changes)
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best case of a sweep.
+
+    Parameters
+    ----------
+    case : int
+        Its number, from 1; of equals the first.
+    changes : str
+        Its values in words.
+    ranked, equals, front : int
+        How many cases are ranked, are as good as it, and are on the Pareto front.
+    """
+
+    case: int
+    changes: str
+    ranked: int
+    equals: int
+    front: int
+
+    @property
+    def words(self) -> str:
+        """``case 17 (r 35, l 120)``."""
+        more = f" and {self.equals - 1} more as good" if self.equals > 1 else ""
+        return f"case {self.case} ({self.changes}){more}"
+
+    def __str__(self) -> str:
+        front = f"; {self.front} of them are on the Pareto front" if self.front > self.equals else ""
+        return f"best of {counted(self.ranked, 'ranked case')} is {self.words}{front}"
+
+
+def telling_columns(table: Table) -> list[str]:
+    """Columns of a sweep that are shown first: the case, the results asked for, what varies, and what is required."""
+    chosen = [column.name for column in table.columns if column.meaning == CHOSEN]
+    varied = [column.name for column in table.columns if column.meaning == VARIED]
+    required = [name for name in table.names if f"{name}_met" in table]
+    return ["case", *(["label"] if "label" in table else []), *chosen, *varied, *required]
+
+
+def best_of(table: Table) -> Best | None:
+    """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
+    if FRONT not in table:
+        return None
+    best: tuple[int, str] | None = None
+    numbers = np.zeros(3, dtype=np.intp)
+    for part in table.blocks():
+        rank = part[RANK]
+        first = np.flatnonzero(rank == 1)
+        if best is None and len(first):
+            row = first[0]
+            changes = [
+                (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
+            ]
+            label = f"{part['label'][row]}: " if "label" in part and part["label"][row] else ""
+            best = int(part["case"][row]), label + changes_in_words(changes)
+        numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
+    return None if best is None else Best(*best, *numbers.tolist())

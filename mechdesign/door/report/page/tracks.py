@@ -1,0 +1,230 @@
+"""Poses of a mechanism, and its numbers in them, as integers that a small script draws from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechdesign.door.report.page.linkage import Canvas
+from mechdesign.drawing import style
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Table
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.elements.links import Link
+from mechdesign.mechanism.graph import GROUND
+
+# Integers in a unit of a drawing, and in a degree.
+PLACES = 20
+TURNS = 100
+TIMES = 10_000  # in the time of a motion
+ROWS = 1_000_000  # from one row of a table to the next
+# Digits of integers.
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+_BASE = 32
+_NOTHING = "."
+# Smallest number of steps between zero and the usual size of a number.
+_STEPS = 1000
+_COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
+_ROUNDING = 1e-11  # a number that should be zero may be this part of the others of its unit
+_POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number in the pose that is drawn: its index among all numbers, its text and its unit."""
+
+    number: int
+    text: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map of a local index that a drawing can show."""
+
+    index: str
+    label: str  # with its unit
+    meaning: str
+    href: str  # the id of its group in the drawing
+    window: str  # the view box around its region
+
+
+@dataclass(frozen=True)
+class MovingPicture:
+    """A mechanism that moves in a page."""
+
+    drawing: str  # inline SVG in one pose: what is seen without script and in print
+    beside: str  # inline SVG that shows where it is: motion curves, or nothing where the drawing has the map
+    data: Mapping[str, Any]  # what the script moves it by, as JSON
+    words: str  # the pose drawn
+    headings: Sequence[str]  # of the columns of numbers
+    rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
+    meanings: Mapping[str, str]  # of these rows, where no unit tells what they are
+    replaces: Sequence[str] = ()  # pictures of the question that show the same
+    maps: Sequence[tuple[str, Sequence[Map]]] = ()  # maps to choose from, by what the orientation is
+
+
+class ShownNumbers:
+    """Columns as integers in units of their last shown decimal, and the text of each in the pose that is drawn.
+
+    Those of further poses have as many decimals as `alike`, and the same units.
+    """
+
+    def __init__(self, table: Table, rows: Ints, begin: int, alike: ShownNumbers | None = None) -> None:
+        self.rows, self.begin, self.alike = rows, begin, alike
+        self.sizes: dict[str, float] = {}
+        for column in table.columns:
+            if column.values.dtype.kind == "f":
+                self.sizes[column.unit] = max(self.sizes.get(column.unit, 0.0), _size(column.values[rows]))
+        self.tracks: list[list[Any]] = []
+        self.scaled: dict[str, tuple[int, int, int]] = {}
+        self.units: dict[str, str] = {}
+
+    def add(self, column: Column) -> int:
+        """Add a column and return its index among the numbers."""
+        if column.name in self.scaled:
+            return self.scaled[column.name][0]
+        values = column.values[self.rows]
+        decimals, power = self._digits(column) if self.alike is None else self.alike.scaled[column.name][1:]
+        self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
+        self.scaled[column.name] = len(self.tracks) - 1, decimals, power
+        factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
+        self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
+        return len(self.tracks) - 1
+
+    def _digits(self, column: Column) -> tuple[int, int]:
+        """Decimals of a column, and the power of ten of its unit."""
+        size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
+        if size <= _ROUNDING * max(1.0, largest):
+            # A column that is constant up to rounding gets as many digits as the columns that vary.
+            size = largest if largest > _ROUNDING else 1.0
+        power = math.floor(math.log10(size))
+        power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
+        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power
+
+    def cell(self, column: Column) -> Cell:
+        """The column's number in the pose drawn."""
+        which = self.add(column)
+        _, decimals, power = self.scaled[column.name]
+        value = float(column.values[self.rows[self.begin]])
+        text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
+        return Cell(which, text, self.units[column.name])
+
+
+def meanings(table: Table) -> dict[str, str]:
+    """Meanings of the columns without a unit, such as indices."""
+    return {column.name: column.meaning for column in table.columns if not column.unit and column.meaning}
+
+
+def _size(values: Floats) -> float:
+    """How large the numbers of a column usually are."""
+    sizes = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(sizes, _COMMON) or sizes.max()) if len(sizes) else 0.0
+
+
+def deltas(values: Floats, factor: float) -> str:
+    """Values times a factor as integers in letters: the first, then the step from the last known one.
+
+    A step s is 2 s, or -2 s - 1 where it is negative, in digits to the base 32, the lowest first; all but the last of
+    them are 32 more. Where there is no value stands a point; steps of zero at the end are left out.
+    """
+    letters: list[str] = []
+    last = 0
+    for value in (values * factor).tolist():
+        if math.isfinite(value):
+            step, last = round(value) - last, round(value)
+            letters.append(_letters(2 * step if step >= 0 else -2 * step - 1))
+        else:
+            letters.append(_NOTHING)
+    return "".join(letters).rstrip(_letters(0))
+
+
+def steps(text: str, count: int) -> Floats:
+    """The integers that `deltas` has written, shape (count,); where there is no value the last one before it."""
+    integers, value, place = [], 0, 1
+    for letter in text:
+        digit = _LETTERS.find(letter)
+        value += place * (digit % _BASE if digit >= 0 else 0)
+        place *= _BASE
+        if digit < _BASE:
+            integers.append(-(value + 1) // 2 if value % 2 else value // 2)
+            value, place = 0, 1
+    return np.cumsum([*integers, *[0] * (count - len(integers))]).astype(np.float64)
+
+
+def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """A `MovingPicture` as plain data with the arrows and the numbers of another that moves along the same motion.
+
+    These are taken straight between the poses of the other.
+    """
+    data, more = part["data"], other["data"]
+    at, own = (_values(drawing["rows"], drawing["poses"]) for drawing in (data, more))
+    same = np.minimum(np.searchsorted(own, at), len(own) - 1)
+
+    def along(track: str, factor: float = 1.0, begin: float = 0.0) -> str:
+        values = _values(track, len(own))
+        return deltas(factor * np.where(own[same] == at, values[same], np.interp(at, own, values)) + begin, 1.0)
+
+    # From one drawing to the other, whose windows may differ.
+    factor = data["scale"] / more["scale"]
+    shift = [PLACES * data["scale"] * sign * (there - here)
+             for sign, there, here in zip((1, -1), more["corner"], data["corner"], strict=True)]  # fmt: skip
+
+    def placed(place: str | Sequence[str]) -> str | list[str]:
+        if isinstance(place, str):
+            return place
+        return [along(track, factor, begin) for track, begin in zip(place, shift, strict=True)]
+
+    titles = {kind["title"] for group in data["arrows"] for kind in group["layers"]}
+    groups = []
+    for group in more["arrows"]:
+        layers = [
+            layer | {"shafts": [[words, placed(at), [*map(along, way)]] for words, at, way in layer["shafts"]]}
+            for layer in group["layers"] if layer["title"] not in titles
+        ]  # fmt: skip
+        groups += [group | {"layers": layers}] if layers else []
+    numbers = [[decimals, along(track)] for decimals, track in more["numbers"]]
+    begin, named = len(data["numbers"]), {name for name, _ in part["rows"]}
+    rows = [
+        [name, [cell and cell | {"number": cell["number"] + begin} for cell in cells]]
+        for name, cells in other["rows"] if name not in named
+    ]  # fmt: skip
+    data = {**data, "arrows": [*data["arrows"], *groups], "numbers": [*data["numbers"], *numbers]}
+    rows = [*part["rows"], *rows]
+    return {**part, "data": data, "rows": rows, "meanings": {**other["meanings"], **part["meanings"]}}
+
+
+def _values(track: str, count: int) -> Floats:
+    """The integers of `deltas`, nan where there is no value, shape (count,)."""
+    given = np.array([letter == _NOTHING for letter in track if _LETTERS.find(letter) < _BASE], dtype=bool)
+    gone = np.append(given, np.zeros(count - len(given), dtype=bool))
+    return np.where(gone, np.nan, steps(track, count))
+
+
+def _letters(number: int) -> str:
+    letters = ""
+    while number >= _BASE:
+        letters += _LETTERS[_BASE + number % _BASE]
+        number //= _BASE
+    return letters + _LETTERS[number]
+
+
+def places(sheet: Canvas, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:
+    """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
+    valid = configuration.valid
+    tracks: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
+                             "x": {}, "y": {}, "turn": {}}  # fmt: skip
+    for point in dict.fromkeys(point for link in links.values() for point in link.all_points):
+        at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
+        tracks["x"][point], tracks["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
+    for name in links:
+        if name != GROUND:
+            angles = np.full(len(valid), np.nan)
+            angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
+            tracks["turn"][name] = deltas(np.degrees(angles), TURNS)
+    return tracks

@@ -1,0 +1,315 @@
+"""The look of every picture: fonts, colours and bytes that do not depend on the user's settings."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any, NamedTuple, cast
+
+import matplotlib
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
+from matplotlib.ticker import LogFormatter, NullLocator, ScalarFormatter
+from numpy.typing import NDArray
+from PIL import Image
+
+DPI = 120
+# Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
+DEFLATE_LEVEL = 8
+
+
+class Look(NamedTuple):
+    """A page and how finely it is drawn: laid out with type of 10 points on so many inches, and then reduced."""
+
+    width: float
+    height: float  # at most
+    dots: int  # an inch of the layout
+    reduction: float
+
+
+# Inches, of a journal's column.
+_COLUMN = 88 / 25.4
+_TALLEST = 230 / 25.4
+_REDUCTION = 0.8  # to type of 8 points
+_NARROW = 6.0  # inches
+LOOKS = {
+    # 960 pixels, which a README shows at about 800.
+    "screen": Look(8.0, math.inf, DPI, 1.0),
+    # 300 dots an inch of paper.
+    "paper": Look(_COLUMN / _REDUCTION, _TALLEST / _REDUCTION, 240, _REDUCTION),
+}
+
+# Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
+PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")
+BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = PALETTE
+# For pictures in grey, where brightness tells few apart.
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (2, 1)), (0, (6, 1, 1.5, 1)), (0, (1, 1.5)), (0, (8, 1, 1, 1, 1, 1)))
+HATCHES = ("", "////", "....", "xxxx")
+INK = "#222222"
+FAINT = "#9A9A9A"
+COLORMAP = "cividis"
+_DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers of ten alone have ticks
+# Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
+_PLAIN = 5e-3, 2e4
+
+_MICROMETRES = re.compile(r"\bum\b")
+_PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
+
+_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
+
+# A name, an equals sign, a number and its unit.
+_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
+# What a long word may be broken into.
+_PARTS = re.compile(r"[^._]+[._]*|[._]+")
+NO_BREAK = "\N{NO-BREAK SPACE}"
+_MINUS = "\N{MINUS SIGN}"
+
+_SETTINGS: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "axes.titlesize": 11,
+    # Given: to find it from all that stands above the axes takes as long as a tenth of the picture.
+    "axes.titley": 1.0,
+    "axes.labelsize": 10,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.prop_cycle": cycler(color=PALETTE),
+    "axes.formatter.useoffset": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "image.cmap": COLORMAP,
+    # Names of clips in SVG follow from what they are; PDF has fonts that journals take.
+    "svg.hashsalt": "mechdesign",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def context(look: str = "screen") -> Iterator[None]:
+    """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again."""
+    wide, _, dots, reduction = LOOKS[look]
+    page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
+    # As rcdefaults, which reads all styles that come with Matplotlib besides.
+    defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
+    with matplotlib.rc_context():
+        matplotlib.rcParams.update(defaults | _SETTINGS | page)
+        yield
+
+
+def width() -> float:
+    """Width of the page, inches of its layout."""
+    return float(matplotlib.rcParams["figure.figsize"][0])
+
+
+def dots() -> float:
+    """Dots an inch of the layout."""
+    return float(matplotlib.rcParams["figure.dpi"])
+
+
+def tallest() -> float:
+    """Greatest height of the page, inches of its layout."""
+    return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
+
+
+def narrow() -> bool:
+    """Whether panels have no room side by side."""
+    return width() < _NARROW
+
+
+class NotebookFigure(Figure):
+    """A figure that notebooks show as a PNG; plain Matplotlib figures are shown only if pyplot manages them."""
+
+    def _repr_png_(self) -> bytes:
+        with context():
+            return encoded(self)
+
+
+def new_figure(height: float) -> Figure:
+    """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
+    figure = NotebookFigure(figsize=(width(), height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def line(size: float) -> float:
+    """Height of a line of type of a size (points), inches."""
+    return 1.2 * size / 72
+
+
+def folded(words: str, size: float, room: float) -> str:
+    """Text of a size (points) in lines of at most `room` inches.
+
+    ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a word that fits no line is broken after
+    its dots and underscores.
+    """
+    lines: list[str] = []
+    if max(map(len, words.split("\n"))) * size <= 72 * room:
+        return words  # no letter is wider than high
+
+    def fits(line: str) -> bool:
+        return length(line, size) <= 72 * room
+
+    def joined(equation: re.Match[str]) -> str:
+        if fits(equation[0]):
+            return equation[0].replace(" ", NO_BREAK)
+        name, value = equation[0].split(" ", 1)
+        return f"{name} {value.replace(' ', NO_BREAK)}"
+
+    for line in words.split("\n"):
+        lines.append("")
+        for word in _EQUATION.sub(joined, line).split(" "):
+            gap = " "
+            for part in [word] if fits(word) else _PARTS.findall(word):
+                longer = f"{lines[-1]}{gap if lines[-1] else ''}{part}"
+                if lines[-1] and not fits(longer):
+                    lines.append(part)
+                else:
+                    lines[-1] = longer
+                gap = ""
+    return "\n".join(lines).replace(NO_BREAK, " ")
+
+
+@lru_cache(maxsize=1024)
+def length(line: str, size: float) -> float:
+    """Points of a line of type of a size."""
+    return float(text_to_path.get_text_width_height_descent(line, FontProperties(size=size), False)[0])
+
+
+def axis_label(name: str, unit: str = "") -> str:
+    """``name [unit]``, or the name alone where there is no unit."""
+    return f"{name} [{printed(unit)}]" if unit else name
+
+
+class _Powers(LogFormatter):
+    """Powers of ten in plain type: Matplotlib sets them as formulas, which takes as long as the rest of a picture."""
+
+    def __call__(self, value: float, position: int | None = None) -> str:
+        if not super().__call__(value, position):
+            return ""
+        digit, power = f"{value:.0e}".split("e")
+        return ("" if digit == "1" else f"{digit}\N{MIDDLE DOT}") + f"10{raised(int(power))}"
+
+
+def name_powers(panels: Iterable[Axes]) -> None:
+    """Write the power of ten of an axis into its label, ``force [10\N{SUPERSCRIPT THREE} N]``, once all is drawn.
+
+    At the end of the axis, where Matplotlib writes it, it would lie over titles and legends. An axis without a label,
+    such as that of a bar of colours below a title, keeps it there.
+    """
+    for axes in panels:
+        for axis in (axes.xaxis, axes.yaxis):
+            formatter, label = axis.get_major_formatter(), axis.get_label_text()
+            if isinstance(formatter, LogFormatter):
+                axis.set_major_formatter(_Powers())
+                axis.set_minor_formatter(_Powers())
+                low, high = axis.get_view_interval()
+                if high > _DECADES * low:
+                    # Each of its ticks costs as much as a line.
+                    axis.set_minor_locator(NullLocator())
+            if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
+                continue
+            axis.offsetText.set_visible(False)
+            exponent = power(float(np.abs(axis.get_view_interval()).max()))
+            formatter.set_scientific(exponent != 0)
+            if exponent:
+                formatter.set_powerlimits((exponent, exponent))
+                name, bracket, unit = label.rpartition("[")
+                ten = f"10{raised(exponent)}"
+                axis.set_label_text(f"{name}[{ten} {unit}" if bracket else f"{label} [{ten}]")
+
+
+def power(largest: float) -> int:
+    """Power of ten, a multiple of three, of which the numbers up to a largest one are written as multiples."""
+    return 0 if _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 else 3 * int(np.floor(np.log10(largest) / 3))
+
+
+def printed(unit: str) -> str:
+    """A unit with powers, products and micrometres as they are set in print."""
+    unit = _MICROMETRES.sub("\N{MICRO SIGN}m", unit)
+    for plain, sign in _PRINTED.items():
+        unit = unit.replace(plain, sign)
+    return unit
+
+
+def in_powers(value: float) -> str:
+    """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
+    digits, power = f"{value:.2e}".split("e")
+    return f"{digits}\N{MIDDLE DOT}10{raised(int(power))}"
+
+
+def raised(power: int) -> str:
+    """A whole number as an exponent."""
+    return str(power).translate(_RAISED)
+
+
+def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:
+    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made a PDF.
+
+    A PNG has at most 256 colours, a third of the size.
+    """
+    stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
+    if kind == "svg":
+        figure.savefig(stream, format=kind, metadata={"Date": None})
+        return _reduced(stream.getvalue(), _reduction())
+    if kind == "pdf":
+        # Its modules take a fifth of a second to import.
+        from mechdesign.drawing.reduced_pdf import pdf
+
+        return pdf(figure, creator, _reduction())
+    figure.canvas.draw()
+    few = _in_few_colours(np.asarray(cast(Any, figure.canvas).buffer_rgba()))
+    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL)
+    return stream.getvalue()
+
+
+def _in_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
+    """A picture of pixels (height, width, 4) in at most 256 colours; no colour moves by more than some 15 of 255.
+
+    A run of equal pixels is looked up as one pixel, which takes a third of the time.
+    """
+    height, width, _ = pixels.shape
+    colours = pixels.view(np.uint32).ravel()
+    begins = np.flatnonzero(np.diff(colours, prepend=~colours[:1]))
+    runs = Image.frombytes("RGBA", (len(begins), 1), colours[begins].tobytes()).convert("RGB")
+    # Of Pillow's ways this one keeps rare colours.
+    few = runs.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    numbers = np.repeat(np.asarray(few).ravel(), np.diff(begins, append=len(colours)))
+    picture = Image.frombytes("P", (width, height), numbers.tobytes())
+    picture.putpalette(few.getpalette() or [])
+    return picture
+
+
+def _reduction() -> float:
+    """Inches of paper over those of the layout."""
+    return float(matplotlib.rcParams["figure.dpi"] / matplotlib.rcParams["savefig.dpi"])
+
+
+def _reduced(drawing: bytes, share: float) -> bytes:
+    """An SVG shown at a share of its size: its coordinates stay."""
+    if share == 1.0:
+        return drawing
+
+    def smaller(size: re.Match[bytes]) -> bytes:
+        return b'%s="%.6gpt"' % (size[1], share * float(size[2]))
+
+    return re.sub(rb'(width|height)="([0-9.]+)pt"', smaller, drawing, count=2)

@@ -1,0 +1,1 @@
+"""What everything stands on: numbers, errors, expressions, tables, work; nothing here knows a mechanism."""
