@@ -14,6 +14,7 @@ import os
 import shutil
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -40,6 +41,8 @@ SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
 # Of each generation of the garbage collector, in place of 700, 10, 10.
 THRESHOLDS = (20_000, 20, 50)
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+# Tests that took more than half a second where they were measured, and are left to the night: `pytest --durations`.
+NIGHTLY = Path(__file__).with_name("nightly.txt")
 ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the pages"
 
 
@@ -66,6 +69,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     parser.addoption("--cases", type=int, default=None, help="cases of each random search of tests/hunt")
     parser.addoption("--first", type=int, default=0, help="seed of the first case")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Config) -> None:
+    """Tests of the list are nightly ones; a line that names no test of a file is an error."""
+    listed = set(NIGHTLY.read_text(encoding="utf-8").splitlines())
+    for item in items:
+        if item.nodeid in listed:
+            item.add_marker(pytest.mark.nightly)
+    if not any("::" in argument for argument in config.args):
+        read = {item.nodeid.partition("::")[0] for item in items}
+        lost = {line for line in listed if line.partition("::")[0] in read} - {item.nodeid for item in items}
+        if lost:
+            raise pytest.UsageError(f"{NIGHTLY.name} names no test: {min(lost)}")
 
 
 def pytest_collection_finish() -> None:
