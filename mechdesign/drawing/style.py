@@ -24,7 +24,7 @@ from PIL import Image
 
 DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
-DEFLATE_LEVEL = 8
+DEFLATE_LEVEL = 7
 
 
 class Look(NamedTuple):

@@ -51,6 +51,7 @@ def _import(module: str) -> None:
     import_module(module)
     # What was imported is no garbage, among which a collection would look for some.
     gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
     gc.enable()
 
 
