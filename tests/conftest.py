@@ -41,7 +41,7 @@ SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
 # Of each generation of the garbage collector, in place of 700, 10, 10.
 THRESHOLDS = (20_000, 20, 50)
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
-# Tests that took more than half a second where they were measured, and are left to the night: `pytest --durations`.
+# Tests that took a third of a second or more where they were measured, and are left to the night.
 NIGHTLY = Path(__file__).with_name("nightly.txt")
 ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the pages"
 
