@@ -61,7 +61,6 @@ def settle() -> None:
     """Look for garbage from here on, but not among what the command imported (see `mechdesign.__main__`)."""
     if not gc.isenabled():
         gc.freeze()
-        gc.set_threshold(50_000, 20, 20)
         gc.enable()
 
 

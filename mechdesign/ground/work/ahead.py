@@ -49,9 +49,9 @@ def importing(module: str, jobs: int) -> Iterator[None]:
 
 def _import(module: str) -> None:
     import_module(module)
-    # What was imported is no garbage, among which a collection would look for some.
+    # What was imported is no garbage, among which a collection would look for some; a figure makes many small things.
     gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
+    gc.set_threshold(200_000, 20, 20)
     gc.enable()
 
 
