@@ -29,7 +29,7 @@ from mechdesign.door.cli.app import app
 from mechdesign.ground.errors import StudyError
 from mechdesign.questions.dynamics import motion_in_time
 from mechdesign.questions.optimize import variables
-from mechdesign.study import poses, template
+from mechdesign.study import motions, template
 from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
 
@@ -110,7 +110,7 @@ def moderate(data: object) -> object:
 
 @pytest.fixture
 def moderately(monkeypatch):
-    monkeypatch.setattr(poses, "MAX_POSES", MOST_POSES)
+    monkeypatch.setattr(motions, "MAX_POSES", MOST_POSES)
     monkeypatch.setattr(variables, "MAX_DESIGNS", MOST_DESIGNS)
     monkeypatch.setattr(motion_in_time, "MAX_SECONDS", SECONDS / 5)
 
