@@ -20,6 +20,14 @@ MAX_POSES = 10_000_000
 _Section = TypeVar("_Section", bound=Model)
 
 
+def _followed(number: float, parameters: Mapping[str, Floats], nominal: Mapping[str, float]) -> Number:
+    """A number of a study: an array where it follows parameters that differ from the `nominal` ones."""
+    expression = Amount.of(number).expression
+    if expression is None or expression.names.isdisjoint(parameters):
+        return float(number)
+    return expression.evaluate({**nominal, **parameters})
+
+
 @dataclass(frozen=True, eq=False)
 class DesignNumbers:
     """The numbers of a study for some designs."""
@@ -33,9 +41,7 @@ class DesignNumbers:
 
     def of(self, number: float) -> Floats:
         """A number of each design, shape (count,)."""
-        expression = Amount.of(number).expression
-        moved = expression is not None and self.moves(number)
-        value = expression.evaluate({**self.nominal, **self.parameters}) if expression and moved else float(number)
+        value = _followed(number, self.parameters, self.nominal)
         return np.broadcast_to(np.asarray(value, dtype=float), self.count)
 
     def moves(self, number: float) -> bool:
@@ -81,10 +87,7 @@ class PoseNumbers:
 
     def of(self, number: float) -> Number:
         """A number of the study: an array where it follows parameters that differ."""
-        expression, parameters = Amount.of(number).expression, self.parameters
-        if expression is None or expression.names.isdisjoint(parameters):
-            return float(number)
-        return expression.evaluate({**self.nominal, **parameters})
+        return _followed(number, self.parameters, self.nominal)
 
     def section(self, section: _Section) -> _Section:
         """A section of the study, with arrays where its numbers follow such parameters."""

@@ -32,7 +32,7 @@ MAX_DEVIATION = 1e6
 MAX_LOAD = 1e100
 
 
-def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[Caution]]:
+def find_sources(study: Study, poses: Poses = NOWHERE) -> tuple[Sources, list[Caution]]:
     """Sources of a study, and warnings about parameters that vary several places together.
 
     `poses` of designs give numbers that are arrays of poses, for the first order.
@@ -47,7 +47,6 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
         message = "asks what varies: give 'dimensions' or 'clearances'"
         raise StudyError((study.problem(message, "reliability"),))
     mechanism: Mechanism = study.mechanism
-    poses = poses or NOWHERE
     section = poses.section(section)
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
     scalars, warnings, together = list[Scalar](), list[Caution](), list[str]()
