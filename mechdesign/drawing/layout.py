@@ -326,6 +326,8 @@ def _measure(cell: _Cell, renderer: Any) -> None:
     axes = cell.axes
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_visible(False)
+        # `_place` places it; else Matplotlib looks for a place beside the numbers of all axes that share a scale.
+        axis.set_label_coords(0.5, 0.5)
     tight = axes.get_tightbbox(renderer) if cell.panel.shows is None else None
     if tight is None:
         # In a plane nothing else reaches beyond its axes; numbers that are not shown would cost as much as the others.
