@@ -1,0 +1,224 @@
+"""Solutions of a task: which keep the conditions, their order, their numbers, and each as a study file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.four_bars import four_bars
+from mechdesign.mechanism.mechanism import Variant
+from mechdesign.questions.synthesize.judging import Way
+from mechdesign.questions.synthesize.kinds import FOUR_BAR, Kind
+from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+
+# Two linkages whose values differ by less than this part of the task are one.
+_SAME = 1e-5
+# An error below this part of the task's size is none.
+EXACT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Linkages of one kind and assembly that do a task, and how well; each array has a first axis (count,)."""
+
+    way: Way
+    errors: Floats  # at each position, shape (count, positions)
+
+    @property
+    def kind(self) -> Kind:
+        """Their kind."""
+        return self.way.kind
+
+    def rms(self) -> Floats:
+        """Root mean square of the errors."""
+        return np.asarray(np.sqrt((self.errors**2).mean(axis=1)))
+
+    def solution(self, row: int) -> Solution:
+        """One of them."""
+        way = self.way
+        return Solution(
+            way.kind, way.modes, way.values[row], way.angles[row], self.errors[row], way.defects[row],
+            float(way.transmission[row]), bool(way.full_turn[row]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """One linkage that does a task."""
+
+    kind: Kind
+    modes: tuple[int, ...]
+    values: Floats  # shape (places,), angles in radians
+    angles: Floats  # drive at the positions
+    errors: Floats  # at the positions
+    defects: str
+    transmission: float  # radians
+    full_turn: bool
+    share: tuple[float, float, float] = (np.nan, np.nan, np.nan)  # of made linkages that keep the limit, and its ends
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the errors."""
+        return float(np.sqrt((self.errors**2).mean()))
+
+    @cached_property
+    def poses(self) -> Configuration:
+        """Its poses at the positions."""
+        return self.kind.solve(self.values[None], self.angles[None], self.modes)
+
+    @property
+    def size(self) -> float:
+        """The greatest extent of its points along x or y."""
+        places = np.concatenate([np.broadcast_to(node, self.poses.shape).ravel() for node in self.poses.nodes])
+        return float(max(np.ptp(places.real), np.ptp(places.imag)))
+
+    @property
+    def variant(self) -> Variant:
+        """Its mechanism."""
+        description = self.kind.mechanism.description
+        places = {
+            name: replace(place, nominal=float(value))
+            for (name, place), value in zip(description.places.items(), self.values, strict=True)
+        }
+        return Variant(self.kind.mechanism, replace(description, places=places))
+
+    @property
+    def grashof(self) -> str:
+        """Class of its first four-bar or slider-crank; empty where it has none."""
+        return next((loop.type for loop in four_bars(self.variant)), "")
+
+
+class Conditions:
+    """What linkages must keep, and how many were dropped for each."""
+
+    def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
+        self.section, self.centre, self.size, self.factor = section, centre, size, factor
+        self.dropped: Counter[str] = Counter()
+        #: Of those that keep not all the one that misses fewest: how many it misses, the pool, its row, and which.
+        self.nearest: tuple[int, Pool, int, list[str]] | None = None
+
+    def kept(self, pool: Pool) -> Flags:
+        """Which linkages keep all conditions; the others are counted by the first that they miss."""
+        judged = [*self._judged(pool.way)]
+        kept, missed = np.ones(len(pool.way), dtype=bool), np.zeros(len(pool.way), dtype=int)
+        for reason, good in judged:
+            lost = kept & ~good
+            if lost.any():
+                self.dropped[reason] += int(lost.sum())
+            kept &= good
+            missed += ~good
+        fewest = np.where(kept, 10**6, missed)
+        row = int(np.lexsort((pool.rms(), fewest))[0])
+        if not kept[row] and (self.nearest is None or fewest[row] < self.nearest[0]):
+            self.nearest = int(fewest[row]), pool, row, [reason for reason, good in judged if not good[row]]
+        return kept
+
+    def solutions(self, pool: Pool) -> Iterator[Solution]:
+        """The linkages of a pool that keep all conditions."""
+        if len(pool.way):
+            yield from (pool.solution(int(row)) for row in np.flatnonzero(self.kept(pool)))
+
+    def _judged(self, way: Way) -> Iterator[tuple[str, Flags]]:
+        kind, values, section = way.kind, way.values, self.section
+        pivots = np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1)
+        held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
+        links = kind.links(values)
+        lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
+        yield "a pivot is too far away (limits.reach)", (
+            np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size
+        )
+        with np.errstate(all="ignore"):
+            ratio = lengths.max(axis=0) / lengths.min(axis=0)
+        yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
+        if isinstance(section.pivots, Region):
+            yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size).all(axis=1)
+        elif section.pivots is not None:
+            given = np.array([complex(*place) for place in section.pivots])
+            gap = np.abs(held[..., None] - given).min(axis=2)
+            yield "a pivot is none of those given (pivots)", (gap <= 1e-6 * self.size).all(axis=1)
+        for box in section.keep_out:
+            wrong = (
+                (pivots.real > box.x[0]) & (pivots.real < box.x[1]) & (pivots.imag > box.y[0]) & (pivots.imag < box.y[1])
+            )
+            yield "a pivot lies where none may (keep_out)", ~wrong.any(axis=1)
+        for name, (low, high) in section.lengths.items():
+            if name in links:
+                good = (links[name] >= low) & (links[name] <= high)
+                yield f"{name} is too short or too long (lengths)", good
+        if section.grashof and kind.name == FOUR_BAR:
+            ordered = np.sort(lengths, axis=0)
+            good = ordered[0] + ordered[-1] <= ordered[1:-1].sum(axis=0)
+            yield "no link can turn fully (grashof)", good
+        if section.needs_turn:
+            yield "the drive cannot turn fully (full_turn)", way.full_turn
+        if section.transmission is not None:
+            least = float(np.sin(section.transmission.at_least * self.factor))
+            yield "the transmission angle is too small (transmission)", np.sin(way.transmission) >= least
+        if section.defects == "dropped":
+            yield "it has a defect", np.array([not words for words in way.defects], dtype=bool)
+
+    @staticmethod
+    def _on_slide(kind: Kind, column: int) -> bool:
+        """Whether a point of the frame only tells where a slide runs."""
+        point = kind.places[column].split(".")[1]
+        return any(joint["slot"] == "ground" and joint["through"] == point for joint in kind.data.get("joints", {}).values())
+
+
+def inside(region: Region, places: Any, size: float) -> Any:
+    """Which places, x + i y, lie in a region; a line has a width within rounding."""
+    slack = 1e-6 * size
+    if region.through is not None:
+        away = (places - complex(*region.through)) * np.exp(-1j * region.direction)
+        return np.abs(away.imag) <= slack
+    good = np.ones(np.shape(places), dtype=bool)
+    for ends, values in ((region.x, places.real), (region.y, places.imag)):
+        if ends is not None:
+            low, high = ends if isinstance(ends, tuple) else (ends, ends)
+            good &= (values >= low - slack) & (values <= high + slack)
+    return good
+
+
+def distinct(solutions: Sequence[Solution], size: float) -> list[Solution]:
+    """Solutions by their errors, each once; those with a defect behind the others."""
+    ordered = sorted(solutions, key=lambda one: (one.defects != "", rounded(one.error, size), -one.transmission))
+    kept: list[Solution] = []
+    seen: dict[tuple[str, tuple[int, ...]], list[Floats]] = {}
+    for one in ordered:
+        others = seen.setdefault((one.kind.name, one.modes), [])
+        scale = np.maximum(np.abs(one.values), size)
+        if not others or (np.abs(np.array(others) - one.values) / scale).max(axis=1).min() > _SAME:
+            others.append(one.values)
+            kept.append(one)
+    return kept
+
+
+def rounded(error: float, size: float) -> float:
+    """An error, 0 where it is rounding; to four digits, so that rounding orders nothing."""
+    return 0.0 if error < EXACT * size else float(f"{error:.4g}")
+
+
+def ranked(solutions: Sequence[Solution], weights: Mapping[str, float], size: float) -> tuple[list[Solution], list[float]]:
+    """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
+    measures = {
+        "error": [-rounded(one.error, size) for one in solutions], "yield": [one.share[0] for one in solutions],
+        "transmission": [one.transmission for one in solutions], "size": [-one.size for one in solutions],
+    }  # fmt: skip
+    total, whole = np.zeros(len(solutions)), sum(weights.values())
+    for name, weight in weights.items():
+        values = np.nan_to_num(np.array(measures[name], dtype=float), nan=-np.inf)
+        known = values[np.isfinite(values)]
+        low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+        share = (np.maximum(values, low) - low) / (high - low) if high > low else np.ones(len(values))
+        total += weight / whole * np.where(np.isfinite(values), share, 0.0)
+    order = sorted(
+        range(len(solutions)),
+        key=lambda k: (solutions[k].defects != "", -round(float(total[k]), 9), -solutions[k].transmission),
+    )
+    return [solutions[k] for k in order], [float(total[k]) for k in order]

@@ -1,0 +1,292 @@
+"""The three tasks: how each finds linkages, and how far a linkage is from it at each of its positions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.questions.synthesize import body, paths
+from mechdesign.questions.synthesize.body import Candidates, Positions
+from mechdesign.questions.synthesize.dyads import LINK, Dyads
+from mechdesign.questions.synthesize.judging import passed
+from mechdesign.questions.synthesize.kinds import BODY, FOUR_BAR, POINT, Kind, kind_of
+from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.solutions import EXACT, Pool, Solution
+from mechdesign.study import Study
+from mechdesign.study.text.csv_files import read_table
+
+# Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
+PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 4_000
+# An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
+_OTHER = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTask:
+    """Positions of a body."""
+
+    section: SynthesisSection
+    factor: float  # radians in the study's unit of angle
+    positions: Positions
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the places."""
+        return self.positions.centre
+
+    @property
+    def size(self) -> float:
+        """The extent of the places."""
+        return self.positions.size
+
+    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
+        """Linkages of every kind and assembly; what is found is told in words."""
+        found, words = body.choices(self.positions, self.section, random)
+        tell(words)
+        for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
+            yield from assembled(part, self.gaps(part), self.section, self.size)
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0
+
+    apart: ClassVar[tuple[str, ...]] = (f"{BODY}.{POINT}.x", f"{BODY}.{POINT}.y")  #: places that are no dimensions of the linkage
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and what the outputs should be at each position, in the study's units."""
+        turns = np.unwrap(np.angle(self.positions.rotations)) / self.factor
+        return POINT, {POINT: _pairs(self.positions.places), f"{BODY}.angle": turns.tolist()}
+
+    def gaps(self, part: Candidates) -> list[Floats]:
+        """Distance of the body's origin from each position, of each assembly; shape (count, positions)."""
+        return [
+            np.abs(part.kind.points(part.kind.solve(part.values, part.angles, modes)) - self.positions.places)
+            for modes in part.kind.modes
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionTask:
+    """Pairs of an input angle and an output angle or place."""
+
+    section: SynthesisSection
+    factor: float
+    inputs: Floats  # radians
+    outputs: Floats  # radians, or lengths
+
+    @property
+    def slides(self) -> bool:
+        """Whether the output is a slide."""
+        return self.section.output_kind != FOUR_BAR
+
+    @property
+    def size(self) -> float:
+        """The frame of a four-bar, or the stroke of a slider."""
+        return float(np.ptp(self.outputs)) if self.slides else float(self.section.frame or 1.0)
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the mechanism."""
+        return complex(self.outputs.mean(), 0.0) if self.slides else self.size / 2 + 0j
+
+    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
+        """Linkages of every assembly; what is found is told in words."""
+        # The output link, or the slider, as it is seen from the input link.
+        back = np.exp(-1j * self.inputs)
+        place = self.outputs if self.slides else np.full(len(back), self.size)
+        seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
+        found, words = body.choices(seen, self.section, random, zeros=self.section.zeros == "fixed", slides=self.slides)
+        tell(words)
+        links = next(part for part in found if part.kind == LINK)
+        # The frame itself is a dyad between the links.
+        links = links.take((np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size)))
+        if len(links):
+            part = self._linkage(links)
+            yield from assembled(part, self.gaps(part, links), self.section, self.size if self.slides else 1.0)
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0 if self.slides else self.factor
+
+    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and what it should be at each position, in the study's units."""
+        if self.slides:
+            zero = solution.poses.point("B")[0].real.mean() - self.outputs.mean()
+            return "B.x", {"B.x": (self.outputs + zero).tolist()}
+        reached = np.unwrap(np.angle(solution.poses.rotation("rocker")[0] * np.exp(-1j * self.outputs)))
+        return "rocker.angle", {"rocker.angle": ((self.outputs + reached.mean()) / self.factor).tolist()}
+
+    def _linkage(self, links: Dyads) -> Candidates:
+        """The linkages with these couplers; the crank stands at the input plus the angle of its pin."""
+        kind = kind_of("function", self.section.output_kind)
+        values = np.tile(kind.nominal, (len(links), 1))
+        numbers = {"ground.O.x": 0.0, "ground.O.y": 0.0, "crank.length": np.abs(links.pivot), "coupler.length": links.length}
+        if self.slides:
+            numbers |= {"ground.D.x": 0.0, "ground.D.y": links.pin.imag, "rail.direction": 0.0}
+        else:
+            numbers |= {"ground.D.x": self.size, "ground.D.y": 0.0, "rocker.length": np.abs(links.pin)}
+        for name, number in numbers.items():
+            values[:, kind[name]] = number
+        return Candidates(kind, values, self.inputs + np.angle(links.pivot)[:, None])
+
+    def gaps(self, part: Candidates, links: Dyads) -> list[Floats]:
+        """Errors of the output at each input, of each assembly."""
+        gaps = []
+        for modes in part.kind.modes:
+            poses = part.kind.solve(part.values, part.angles, modes)
+            if self.slides:
+                gaps.append(np.abs(part.kind.points(poses).real - self.outputs - links.pin.real[:, None]))
+                continue
+            turned = np.where(poses.valid, poses.rotation("rocker"), np.nan)
+            gaps.append(np.abs(np.angle(turned * np.exp(-1j * (self.outputs + np.angle(links.pin)[:, None])))))
+        return gaps
+
+
+@dataclass(frozen=True, eq=False)
+class PathTask:
+    """Points that a point passes."""
+
+    section: SynthesisSection
+    factor: float
+    path: paths.Points
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the points."""
+        return self.path.centre
+
+    @property
+    def size(self) -> float:
+        """The extent of the points."""
+        return self.path.size
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0
+
+    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and where it should be at each position."""
+        return POINT, {POINT: _pairs(self.path.points)}
+
+    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
+        """Linkages of every kind and assembly."""
+        section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
+        for name in section.kinds or (FOUR_BAR,):
+            kind = kind_of("path", name)
+            bound = Bound(kind, self)
+            for modes in kind.modes:
+                samples = paths.samples(kind, random, count, section.limits.ratio, full_turn=section.needs_turn)
+                fits = paths.fits(kind, modes, self.path, samples, bound)
+                if not len(fits.costs):
+                    continue
+                gaps = np.abs(kind.points(kind.solve(fits.values, fits.angles, modes)) - self.path.points)
+                way = passed(kind, modes, fits.values, fits.angles, full_turn=section.needs_turn)
+                yield Pool(way, gaps)
+
+
+Task = BodyTask | FunctionTask | PathTask
+
+
+def _pairs(places: Complexes) -> list[list[float]]:
+    return [[place.real, place.imag] for place in places.tolist()]
+
+
+class Bound:
+    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can."""
+
+    def __init__(self, kind: Kind, task: PathTask) -> None:
+        self.kind, self.task = kind, task
+        section = task.section
+        self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
+        self.ends = {
+            kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
+        }
+        pivots = section.pivots
+        self.given = None if pivots is None or isinstance(pivots, Region) else np.array([complex(*p) for p in pivots])
+        self.box = pivots if isinstance(pivots, Region) and pivots.through is None else None
+        self.fixed = np.zeros(len(kind.places), dtype=bool)
+        if self.given is not None and len(self.given) >= len(kind.pivots):
+            self.fixed[[column for pair in kind.pivots for column in pair]] = True
+
+    def __call__(self, values: Floats) -> Floats:
+        values, limits = values.copy(), self.task.section.limits
+        for number, (x, y) in enumerate(self.kind.pivots):
+            place = values[:, x] + 1j * values[:, y]
+            if self.fixed.any():
+                assert self.given is not None
+                # In the order of the points: D before O in the columns, O first as given.
+                place = np.full(len(values), self.given[self._order(x)])
+            away = place - self.task.centre
+            far = np.maximum(np.abs(away) / (limits.reach * self.task.size), 1.0)
+            place = self.task.centre + away / far
+            if self.box is not None:
+                place = np.clip(place.real, *_ends(self.box.x)) + 1j * np.clip(place.imag, *_ends(self.box.y))
+            values[:, x], values[:, y] = place.real, place.imag
+        # The shortest gives way to the ratio; a negative length is one to the other side.
+        own = np.abs(values[:, self.links])
+        values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
+        for column, (low, high) in self.ends.items():
+            values[:, column] = np.clip(values[:, column], low, high)
+        return values
+
+    def _order(self, column: int) -> int:
+        names = sorted(self.kind.places[x].split(".")[1] for x, _ in self.kind.pivots)
+        names.sort(key="ODF".index)
+        return names.index(self.kind.places[column].split(".")[1])
+
+
+def _ends(ends: Any) -> tuple[float, float]:
+    return ends if isinstance(ends, tuple) else (-np.inf, np.inf) if ends is None else (ends, ends)
+
+
+def assembled(part: Candidates, gaps: Sequence[Floats], section: SynthesisSection, size: float) -> Iterator[Pool]:
+    """Linkages by the assembly in which they are at the first position, with how they pass the others."""
+    stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
+    nearest = stack.min(axis=0)
+    first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
+    for number, modes in enumerate(part.kind.modes):
+        some = np.flatnonzero((first == number) & np.isfinite(nearest).all(axis=1))
+        if len(some):
+            other = stack[number, some] > nearest[some] + _OTHER * size
+            way = passed(part.kind, modes, part.values[some], part.angles[some], other.any(axis=1),
+                         full_turn=section.needs_turn)  # fmt: skip
+            yield Pool(way, nearest[some])
+
+
+def task_of(study: Study, section: SynthesisSection) -> Task:
+    """The task of a study."""
+    factor = study.units.angle_factor
+    if section.body is not None:
+        places = np.array([complex(part.x, part.y) for part in section.body])
+        positions = Positions(places, np.exp(1j * factor * np.array([part.angle for part in section.body])))
+        return BodyTask(section, factor, positions)
+    if section.function is not None:
+        outputs = np.array(section.function.output, dtype=float)
+        slides = section.output_kind != FOUR_BAR
+        inputs = factor * np.array(section.function.input, dtype=float)
+        return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
+    assert section.path is not None
+    points = section.path.points
+    table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
+    if table.shape[1] != 2 or len(table) < 2:
+        raise StudyError([study.problem("a path has two points or more, a row [x, y] each", "synthesis", "path", "points")])
+    timing = None if section.path.timing is None else factor * np.array(section.path.timing)
+    if timing is not None and len(timing) != len(table):
+        message = f"{len(timing)} crank angles for {len(table)} points"
+        raise StudyError([study.problem(message, "synthesis", "path", "timing")])
+    path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
+    if not path.size > 0:
+        raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
+    return PathTask(section, factor, path)
