@@ -22,7 +22,7 @@ JOINT_FORCES = TableKind.of("joint_forces", "what joints and couplings without w
     ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
     ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies; of a "
      "coupling without wheels, whose moment is that of a controller or a hidden gear, the coupling itself"),
-    ("fx, fy", "force on the one by the other, axes of the world", "force"),
+    ("fx, fy", "force on the one by the other, axes of the world; of a slide with the push of its drive", "force"),
     ("moment", "moment likewise, about the joint's point; nan where equilibrium leaves it open", "moment"),
     ("magnitude", "size of the force", "force"), ("angle", "its direction from the world's x axis", "angle"),
     ("normal", "of a slide the force across its line, to the left positive; of a cam the contact force, negative where "

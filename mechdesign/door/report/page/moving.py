@@ -61,6 +61,8 @@ _ARROWS = {
     "inertia": ("Inertia", LOOKS["inertia"].color),
     "load": ("Loads", LOOKS["load"].color),
     "spring": ("Springs", LOOKS["spring"].color),
+    "effort": ("Drives", LOOKS["effort"].color),
+    "coupling": ("Couplings", LOOKS["coupling"].color),
     "shaking": ("Shaking force", style.PURPLE),
 }
 _WHY = {
