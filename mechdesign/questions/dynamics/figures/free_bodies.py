@@ -22,6 +22,7 @@ from mechdesign.drawing.panels import quantity, round_down
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Still, pose
 from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut
+from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.questions.dynamics.figures.view import DynamicsView
@@ -60,7 +61,7 @@ LOOKS = {
 def free_bodies_picture(view: DynamicsView) -> Picture | None:
     """The mechanism with what acts on it from outside, and each link with all that acts on it; None without forces."""
     drawn, mechanism = view.drawn, view.study.mechanism
-    index = _worst(view)
+    index, everywhere = _worst(view)
     scene = None if index is None else pose(mechanism, drawn.shown.configuration, index)
     if index is None or scene is None:
         return None
@@ -77,7 +78,7 @@ def free_bodies_picture(view: DynamicsView) -> Picture | None:
     shown = {name: mine for name, mine in bodies.items() if name in held}
     unit, row = view.study.units.label("force"), int(drawn.shown.rows[index])
     where = pose_in_words(view.study, view.poses, row, 4)
-    words = f"Forces on the links [{style.printed(unit)}] at {where}, where a joint bears most"
+    words = f"Forces on the links [{style.printed(unit)}] at {where}" + ", where a joint bears most" * (not everywhere)
     words += f"; of {len(bodies)} links those {len(shown)} with the largest forces" * (len(shown) < len(bodies))
     whole, centers = shapes.mechanism_shapes(scene), mass_centers(view.study, drawn.shown.configuration, index)
     outside = _telling([action for action in acting if action.link != GROUND and _outside(action, acting)], rounding)
@@ -108,13 +109,15 @@ def free_bodies_picture(view: DynamicsView) -> Picture | None:
     return Picture(words, panels, across=1 if style.narrow() else 3)
 
 
-def _worst(view: DynamicsView) -> int | None:
-    """Which of the shown poses has the largest joint force; None where no joint bears any."""
+def _worst(view: DynamicsView) -> tuple[int | None, bool]:
+    """The first of the shown poses with the largest joint force, None where no joint bears any; whether all have it."""
     rows = view.drawn.shown.rows
     forces = [np.nan_to_num(view.column(name)[rows]) for name in view.question.forces]
     if not forces or not np.any(forces):
-        return None
-    return int(np.max(forces, axis=0).argmax())
+        return None, False
+    largest = np.max(forces, axis=0)
+    most = largest >= (1 - STILL) * largest.max()
+    return int(most.argmax()), bool(most.all() and len(rows) > 1)
 
 
 def _alone_drawn(name: str, acting: Sequence[Action]) -> bool:
