@@ -14,6 +14,7 @@ from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.drawing.style import printed, raised
 from mechdesign.ground.columns import VARIED, Column
 from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.rounding import unchanging
 from mechdesign.ground.results import KeyNumber, Result, Table
 from mechdesign.ground.rows import choose, unit_of
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
@@ -182,7 +183,9 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            own = row, values[row], _Pose() if rule.row in ("first", "each") else _pose(table, row)
+            alike = [other for other in finite.tolist() if groups[other] == groups[row]]
+            constant = bool(unchanging(values[alike].min(), values[alike].max()))
+            own = row, values[row], _Pose() if rule.row in ("first", "each") or constant else _pose(table, row)
             _, value, pose = between or own
             at = f"at {pose.words}" if pose.words else ""
             notes += [at] * bool(at)
@@ -205,11 +208,13 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
     sign, absolute = -1 if rule.row in _LOWEST else 1, rule.row in _ABSOLUTE
     courses = [*choose(result, f"{rule.table.name}.{column.name}", {}).courses.values()]
     ends = [tuple(float(end[0]) for end in course.worst(sign, absolute=absolute)) for course in courses]
-    present = [row for row, (_, place) in enumerate(ends) if np.isfinite(place)]
+    present = [row for row, (value, _) in enumerate(ends) if np.isfinite(value)]
     if not present:
         return None
     row = max(present, key=lambda number: sign * ends[number][0])
     value, at = ends[row]
+    if np.isnan(at):
+        return row, value, _Pose()
     return row, value, _Pose(courses[row].shown(at), courses[row].pose(at), at)
 
 

@@ -40,11 +40,13 @@ from mechdesign.mechanism import Reason
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
+from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
 from mechdesign.questions.kinematics.figures.curves import motion_curves
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.study import Study
+from mechdesign.study.schema.loads import EFFICIENCIES
 from mechdesign.study.schema.poses import MotionSection
 
 _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
@@ -61,6 +63,8 @@ _ARROWS = {
     "inertia": ("Inertia", LOOKS["inertia"].color),
     "load": ("Loads", LOOKS["load"].color),
     "spring": ("Springs", LOOKS["spring"].color),
+    "effort": ("Drives", LOOKS["effort"].color),
+    "coupling": ("Couplings", LOOKS["coupling"].color),
     "shaking": ("Shaking force", style.PURPLE),
 }
 _WHY = {
@@ -190,7 +194,10 @@ def _rows(table: Table, numbers: ShownNumbers) -> tuple[list[str], list[tuple[st
     rows = []
     for name in dict.fromkeys(names):
         cells = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
-        rows.append((name, [None if column is None else numbers.cell(column) for column in cells]))
+        # Those of dynamics have the same names.
+        static = table.name == MOTION.name and (name.endswith("_effort") or name in EFFICIENCIES)
+        shown = [None if column is None else numbers.cell(column) for column in cells]
+        rows.append((f"{name} (static)" if static else name, shown))
     return ["value", *kinds[1:]], rows
 
 
