@@ -85,12 +85,15 @@ class DrawnCases(Drawn):
         Columns of goals: 1 where one is to be small, -1 where it is to be large.
     verdicts : tuple of Verdict
         The worst over the cases, a requirement each.
+    case : callable
+        The study of a case by its number, from 1.
     """
 
     entries: Sequence[str]
     results: Mapping[str, Limits]
     goals: Mapping[str, int]
     verdicts: tuple[Verdict, ...]
+    case: Callable[[int], Study]
 
 
 def named(kind: str) -> str:

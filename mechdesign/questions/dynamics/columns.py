@@ -70,10 +70,10 @@ MODES = TableKind.of("modes", "natural frequencies of small motion about each po
      "or without inertia", "1/time", "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
     ("<drive>_shape", "share of <drive> in the mode, the largest 1; lengths in sizes of the mechanism"))  # fmt: skip
 KEY_NUMBERS = (
+    KeyNumber(FLYWHEEL, "added_inertia", "moment of inertia that the flywheel adds on {drive}", "first"),
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name} with weights and inertia", "size"),
-    KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),
+    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
+    KeyNumber(DYNAMICS, "<drive>_power", "peak power of {name}", "size"),
     KeyNumber(DYNAMICS, "efficiency", "smallest efficiency", "smallest"),
     KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
-    KeyNumber(FLYWHEEL, "added_inertia", "moment of inertia that the flywheel adds on {drive}", "first"),
-    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
 )  # fmt: skip

@@ -83,10 +83,10 @@ MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
 KEY_NUMBERS = (
+    KeyNumber(MOTION, "<drive>_effort", "largest static effort of {name}", "size"),
+    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
     KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
-    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(MOTION, "<coupling>_curvature_radius", "smallest {meaning}", "least"),
-    KeyNumber(MOTION, "<drive>_effort", "largest static effort of {name}", "size"),
-    KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
+    KeyNumber(MOTION, "conditioning", "smallest {name} (0 singular, 1 best)", "smallest"),
 )  # fmt: skip
