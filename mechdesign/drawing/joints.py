@@ -15,6 +15,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.panels import Along, quantity
 from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.rounding import unchanging
 from mechdesign.motion.rules import TIME
 from mechdesign.study import Study
 
@@ -118,6 +119,8 @@ def _mark_worst(
     if beyond:
         ends = -usual if least < -usual else 1.1 * least, usual
         value = float(np.clip(value, *ends))
+    if unchanging(np.nanmin(values[which]), np.nanmax(values[which])):
+        return f"{quantity(most, unit)} everywhere, in {names[int(which)]}", ends
     marks.append(Lines([over.values[row]], "x", look={"color": style.FAINT, "linewidth": 0.9, "zorder": 1.5}))
     marks.append(Dots([over.values[row]], [value], look=PEAK | {"marker": "^" if beyond else "o"}))
     where = place_in_words(study, over, float(over.values[row]))

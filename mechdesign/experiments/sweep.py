@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -184,7 +185,12 @@ def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[Goal]
     limits = dict(zip(requirement_names(study, entries), bounds, strict=True))
     results = limits | {goal.name: (None, None) for goal in numbers}
     goals = {goal.name: int(goal.sign) for goal in _goals(study)}
-    return DrawnCases(entries, results, goals, verdicts)
+    return DrawnCases(entries, results, goals, verdicts, partial(_study_of, study, cases))
+
+
+def _study_of(study: Study, cases: Design, number: int) -> Study:
+    """The study of a case by its number, from 1."""
+    return with_entries(study, cases[number - 1])
 
 
 def _limits_of_cases(study: Study, entries: Sequence[str]) -> set[int]:

@@ -119,19 +119,23 @@ def along(judged: Judgement, chosen: Chosen, bounds: Bounds, *, absolute: bool =
         return judged
     lost = (judged.row >= 0) & np.isnan(judged.values)
     between, gone, rounding = [], np.zeros(len(lost), dtype=bool), np.zeros(len(lost))
-    placed = np.zeros(len(lost), dtype=bool)
+    constant, least = np.ones(len(lost), dtype=bool), np.full(len(lost), np.inf)
+    nearest = np.full(len(lost), -1)
     for strand, course in enumerate(chosen.courses.values()):
         for sign, bound in _sides(bounds):
             value, at = course.worst(int(sign), absolute=absolute)
             value = np.abs(value) if absolute else value
-            judged = judged.where(judged.worse(Judgement.of(value, _one_side(sign, bound), -1, at, strand)), ~lost)
+            own = Judgement.of(value, _one_side(sign, bound), -1, at, strand)
+            judged = judged.where(judged.worse(own), ~lost)
             between.append(value)
-            placed |= np.isfinite(at)
+            constant &= np.isfinite(value) & np.isnan(at)
+            nearest, least = np.where(own.margins < least, strand, nearest), np.fmin(own.margins, least)
         gone |= course.lost > 0
         rounding = np.maximum(rounding, course.rounding)
-    # Where a motion has no place of its extremes, all of it is rounding.
-    still = Judgement.of(cleared(judged.values, rounding), bounds, np.where(placed, judged.row, -1), judged.at)
+    still = Judgement.of(cleared(judged.values, rounding), bounds, judged.row, judged.at)
     judged = judged.where(replace(still, strand=judged.strand), (np.abs(judged.values) <= rounding) & ~lost)
+    # A motion without places of its extremes is the same everywhere: it has no worst row.
+    judged = judged.where(replace(judged, row=np.full(len(lost), -1), strand=nearest), constant & ~lost)
     judged = judged.where(Judgement.of(np.full(len(lost), np.nan), bounds), gone & ~lost)
     return replace(judged, between=(*between,))
 

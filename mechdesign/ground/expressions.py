@@ -19,7 +19,9 @@ from mechdesign.ground.functions import (
     DECLARED,
     Dual,
     Function,
+    OfOneNumber,
     Repeated,
+    Rise,
     Tabulated,
     arity,
     chained,
@@ -100,7 +102,7 @@ class Expression:
 
     def repeated(self, name: str, first: float, period: float) -> Expression:
         """The expression with its values in a period of a variable, from `first` on, again in every other period."""
-        again: Step = ("call", Repeated(first, period))
+        again: Step = ("call", Repeated(first, period, kept=True))
         program = [part for step in self.program for part in ((step, again) if step == ("name", name) else (step,))]
         return replace(self, program=tuple(program))
 
@@ -234,7 +236,7 @@ class Expression:
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if isinstance(item, Tabulated | Repeated):
+                if isinstance(item, OfOneNumber):
                     stack[-1:] = [call(item, stack[-1:])]
                 elif kind == "call":
                     count = arity(str(item))
@@ -279,7 +281,7 @@ class Expression:
                 total[variable] = total.get(variable, 0.0) + chained(partial, seed) * inner * outer
         return function.value(*values) * outer, total
 
-    def _angle_factors(self, function: Function | Tabulated | Repeated) -> tuple[float, float]:
+    def _angle_factors(self, function: Function | OfOneNumber) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
@@ -305,6 +307,8 @@ def _corners(
     """Programs, levels and periods of the corners of a call, and whether it has peaks; see `Corner`."""
     if isinstance(function, Tabulated):
         yield inner[0], tuple(place for place, _ in function.rows), function.period, False
+    elif isinstance(function, Rise):
+        yield inner[0], function.places, 0.0, False
     elif isinstance(function, Repeated):
         yield inner[0], (function.first,), function.period, False
     elif function in ("min", "max"):
@@ -333,5 +337,5 @@ def _corners(
             yield inner[0], (), 0.0, True
 
 
-def _function(called: Called) -> Function | Tabulated | Repeated:
+def _function(called: Called) -> Function | OfOneNumber:
     return DECLARED[called] if isinstance(called, str) else called

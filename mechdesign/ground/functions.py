@@ -6,12 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from mechdesign.ground.motion_laws import LAWS, PhaseTable
+
 # Beyond its ends a table holds for this part of its length, by which angles in degrees are rounded.
 TABLE_ROUNDING = 1e-12
+# A law begins and ends, and what repeats begins again, before its place by this part of its way: by rounding.
+SAME_PLACE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -150,9 +154,31 @@ def _where(zero: Any, number: Any) -> Any:
     return np.where(zero, 0.0, number)
 
 
+class OfOneNumber:
+    """A function of one number that has derivatives of every order; its argument is no angle of trigonometry."""
+
+    angles: ClassVar[Literal[""]] = ""
+
+    def value(self, x: Any) -> Any:
+        """Its value."""
+        return self._along(x, 0)
+
+    def partials(self, x: Any) -> tuple[Any]:
+        """Its derivative."""
+        return (self._along(x, 1),)
+
+    def _along(self, x: Any, order: int) -> Any:
+        if isinstance(x, Dual):
+            return Dual(self._along(x.value, order), self._along(x.value, order + 1) * x.slope)
+        return self._at(x, order)
+
+    def _at(self, x: Any, order: int) -> Any:
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class Tabulated:
-    """A function of one number by a table: a cubic spline through its rows, periodic if it ends as it begins.
+class Tabulated(OfOneNumber):
+    """A function by a table: a cubic spline through its rows, periodic if it ends as it begins.
 
     `rows` are the numbers, in rising order, and the function's value at each. Beyond the table it is not a number,
     unless it has the given `period`.
@@ -160,7 +186,6 @@ class Tabulated:
 
     rows: tuple[tuple[float, float], ...]
     period: float = 0.0
-    angles: Literal[""] = ""
 
     @cached_property
     def _spline(self) -> Any:
@@ -170,8 +195,6 @@ class Tabulated:
         return CubicSpline(places, values, bc_type="periodic" if self.period else "not-a-knot", extrapolate=False)
 
     def _at(self, x: Any, order: int) -> Any:
-        if isinstance(x, Dual):
-            return Dual(self._at(x.value, order), self._at(x.value, order + 1) * x.slope)
         first, last = self.rows[0][0], self.rows[-1][0]
         if self.period:
             return self._spline(first + np.mod(np.subtract(x, first), self.period), order)
@@ -179,33 +202,50 @@ class Tabulated:
         inside = np.clip(x, first, last)
         return self._spline(np.where(np.abs(inside - x) <= TABLE_ROUNDING * (last - first), inside, x), order)
 
-    def value(self, x: Any) -> Any:
-        """Value of the spline."""
-        return self._at(x, 0)
 
-    def partials(self, x: Any) -> tuple[Any]:
-        """Its derivative."""
-        return (self._at(x, 1),)
+@dataclass(frozen=True)
+class Rise(OfOneNumber):
+    """The rise of a motion law from 0 to 1: 0 before the way from 0 to 1, and 1 beyond it.
+
+    At its end counts what follows. `falls` is the way of a move to a smaller value.
+    """
+
+    law: str
+    falls: bool = False
+
+    @cached_property
+    def _phases(self) -> PhaseTable:
+        return PhaseTable.of(LAWS[self.law].ways[self.falls])
+
+    @cached_property
+    def places(self) -> tuple[float, ...]:
+        """Where its phases begin, and its end."""
+        return (*(phase.begin for phase in LAWS[self.law].phases), 1.0)
+
+    def _at(self, x: Any, order: int) -> Any:
+        phase = np.searchsorted(self.places[1:-1], np.add(x, SAME_PLACE), side="right")
+        s = self._phases.take(phase).rise(np.clip(x, 0.0, 1.0), order)
+        return np.where(np.abs(np.subtract(x, 0.5) + SAME_PLACE) <= 0.5, s, 0.0) if order else s
 
 
 @dataclass(frozen=True)
-class Repeated:
-    """A number within a period from `first` on, whole periods aside: what follows from it repeats."""
+class Repeated(OfOneNumber):
+    """A number within a period from `first` on, whole periods aside: what follows from it repeats.
+
+    The last place of the first period is the first one again, unless it is `kept`.
+    """
 
     first: float
     period: float
-    angles: Literal[""] = ""
+    kept: bool = False
 
-    def value(self, x: Any) -> Any:
-        """The number within the first period, both ends of which are kept."""
-        if isinstance(x, Dual):
-            return Dual(self.value(x.value), x.slope)
+    def _at(self, x: Any, order: int) -> Any:
+        if order:
+            return float(order == 1)
         away = np.subtract(x, self.first)
-        return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
-
-    def partials(self, x: Any) -> tuple[Any]:
-        """Its derivative."""
-        return (1.0,)
+        if self.kept:
+            return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
+        return self.first + away - self.period * np.floor(away / self.period + SAME_PLACE)
 
 
 def meanings() -> dict[str, tuple[str, str]]:

@@ -11,8 +11,7 @@ from mechdesign.ground.functions import (
     BINDING,
     CONSTANTS,
     FUNCTIONS,
-    Repeated,
-    Tabulated,
+    OfOneNumber,
     arity,
 )
 
@@ -31,9 +30,9 @@ class ExpressionError(ValueError):
 
 
 _UNARY_BINDING = 30
-# What an expression calls: a function by its name, a table, or what makes it repeat.
-Called = str | Tabulated | Repeated
-Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated | Repeated]
+# What an expression calls: a function by its name, a table, a motion law, or what makes it repeat.
+Called = str | OfOneNumber
+Step = tuple[Literal["constant", "name", "call"], float | Called]
 
 
 def constant_step(value: float) -> tuple[Step, ...]:

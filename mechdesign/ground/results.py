@@ -74,6 +74,7 @@ class KeyNumber:
     #: Size is the largest and least the smallest, whatever their signs.
     row: Literal["first", "each", "largest", "smallest", "size", "least"] = "each"
     by: tuple[str, ...] = ()  #: columns of words of which each value counts by itself
+    rank: Callable[[str], int] | None = None  #: of the words of the first of these columns: the highest stands first
     bounds: tuple[str, str] | None = None  #: columns of the ends between which it lies
     interval: str = "from {low} to {high}"
     several: str = ""  #: what the rows are, where the smallest of several stands beside the largest

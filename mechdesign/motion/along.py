@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.ground.columns import Column
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
-from mechdesign.ground.numerics.rounding import STILL, cleared, larger
+from mechdesign.ground.numerics.rounding import STILL, cleared, larger, unchanging
 from mechdesign.ground.results import TableKind
 from mechdesign.ground.statistics import Part, Request
 from mechdesign.mechanism.algebra import Value, quiet
@@ -145,13 +145,14 @@ class AlongMotion:
         return self._worst[key]
 
     def _worst_of(self, name: str, sign: int, absolute: bool, still: float) -> tuple[Floats, Floats]:
-        if absolute and sign < 0:
-            values, places = self.least([name], still)
-            return values[0], places[0]
         peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
         low, high = cleared(peaks.value[:, 0], STILL * self.functions.size(name))
-        # What is rounding everywhere has no place.
-        low_at, high_at = np.where((low == 0) & (high == 0), np.nan, peaks.place[:, 0])
+        # What is the same everywhere has no place.
+        constant = unchanging(low, high, self.functions.size(name))
+        if absolute and sign < 0:
+            values, places = self.least([name], still)
+            return values[0], np.where(constant, np.nan, places[0])
+        low_at, high_at = np.where(constant, np.nan, peaks.place[:, 0])
         if not absolute:
             return (high, high_at) if sign > 0 else (low, low_at)
         upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))

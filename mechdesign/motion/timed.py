@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.motion_laws import PhaseTable
+from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.motion.paths import bends, between
 from mechdesign.motion.rules import TIME, Rows
 
@@ -19,10 +20,10 @@ SAME_TIME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class TimedCourse:
-    """A coordinate over time, phase by phase: value + rise s(u), by a law's phases `schema.motion_laws.Phase`.
+    """A coordinate over time, phase by phase: value + rise s(u).
 
     u is the time from ``origin`` on, over ``duration``. Arrays are of shape (designs, phases), of one design where all
-    are alike.
+    are alike. The ``table`` has the s of each phase, and behind them those of phases that fall.
     """
 
     begin: Floats  # time at which each phase begins
@@ -30,25 +31,16 @@ class TimedCourse:
     duration: Floats
     value: Floats
     rise: Floats
-    powers: Floats  # shape (phases, powers)
-    waves: Complexes  # shape (phases,)
-    frequencies: Floats
+    table: PhaseTable
     marks: Floats  # times at which segments end, shape (designs, segments); none of what is held
 
     def at(self, line: Ints, phase: Ints, time: Floats, order: int = 0) -> Floats:
         """Value, velocity (order 1) or acceleration (order 2) of some designs at times of phases, all of shape (n,)."""
         own = _row(self.begin, line), phase
-        duration, powers = self.duration[own], self.powers[phase]
+        duration, rise = self.duration[own], self.rise[own]
         u = (time - self.origin[own]) / duration
-        for _ in range(order):
-            powers = powers[:, 1:] * np.arange(1, powers.shape[1])
-        s = np.zeros(len(u))
-        for column in powers.T[::-1]:
-            s = s * u + column
-        if self.waves.any():
-            frequency = self.frequencies[phase]
-            s += (self.waves[phase] * 1j**order * np.exp(1j * frequency * u)).imag * frequency ** (order - 1.0)
-        return np.asarray(self.rise[own] * s / duration**order + (self.value[own] if order == 0 else 0.0))
+        s = self.table.take(phase + self.begin.shape[1] * (rise < 0)).rise(u, order)
+        return np.asarray(rise * s / duration**order + (self.value[own] if order == 0 else 0.0))
 
     def take(self, designs: Ints) -> TimedCourse:
         """That of some designs."""

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.motion_laws import LAWS, Phase, PhaseTable
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.motion.timed import SAME_TIME, TimedCourse, TimedRows
-from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import CourseText
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.inputs import Folder
@@ -67,7 +67,7 @@ def _courses(
             assert given.held is not None
             held = table_of([[given.held]], value)[..., 0]
             one, none = np.ones_like(held), np.zeros_like(held)
-            courses[name] = TimedCourse(none, none, one, held, none, none[:1], *_still(1), none[:, :0])
+            courses[name] = TimedCourse(none, none, one, held, none, PhaseTable.of_powers(none[:1]), none[:, :0])
     return courses
 
 
@@ -81,21 +81,18 @@ def _by_laws(name: str, given: CourseText, value: Callable[[float], Floats]) -> 
         places.append(places[-1] if segment.to is None else segment.to)
     table = table_of([[0.0, places[0]], *([s.duration, to] for s, to in zip(segments, places[1:], strict=True))], value)
     durations, ends = table[:, 1:, 0], np.cumsum(table[..., 0], axis=1)
-    which, parts = list[int](), list[Phase]()
+    which, parts, falling = list[int](), list[Phase](), list[Phase]()
     for k, segment in enumerate(segments):
-        own = LAWS[segment.law].phases if segment.to is not None else LAWS["constant"].phases
-        which += [k] * len(own)
-        parts += own
-    widest = max(len(part.powers) for part in parts)
-    powers = np.array([[*part.powers, *[0.0] * (widest - len(part.powers))] for part in parts])
-    waves = np.array([part.wave for part in parts], dtype=complex)
-    frequencies = np.array([part.frequency for part in parts], dtype=float)
+        rising, other = LAWS[segment.law if segment.to is not None else "constant"].ways
+        which += [k] * len(rising)
+        parts += rising
+        falling += other
     origin: Floats = ends[:, which]
     duration: Floats = durations[:, which]
     begins: Floats = np.array([part.begin for part in parts])
     return TimedCourse(
-        origin + begins * duration, origin, duration, table[:, which, 1], np.diff(table[..., 1])[:, which], powers,
-        waves, frequencies, ends[:, 1:],
+        origin + begins * duration, origin, duration, table[:, which, 1], np.diff(table[..., 1])[:, which],
+        PhaseTable.of([*parts, *falling]), ends[:, 1:],
     )  # fmt: skip
 
 
@@ -115,12 +112,9 @@ def _spline(folder: Folder, file: str) -> TimedCourse:
     steps = np.diff(times)
     powers = curve.c[::-1].T * steps[:, None] ** np.arange(4)
     begin, one = times[None, :-1], np.ones((1, len(steps)))
-    return TimedCourse(begin, begin, steps[None], 0 * one, one, powers, *_still(len(steps)), times[None, -1:])
-
-
-def _still(phases: int) -> tuple[Complexes, Floats]:
-    """Waves, and their frequencies, of phases without any."""
-    return np.zeros(phases, dtype=complex), np.ones(phases)
+    return TimedCourse(
+        begin, begin, steps[None], 0 * one, one, PhaseTable.of_powers(powers), times[None, -1:]
+    )  # fmt: skip
 
 
 def _faults(courses: Mapping[str, TimedCourse]) -> Iterator[tuple[Flags, str]]:

@@ -19,11 +19,14 @@ from mechdesign.door.report.page.section import section
 from mechdesign.door.report.page.vector import picture
 from mechdesign.door.report.requirements import requirements
 from mechdesign.drawing import style
+from mechdesign.drawing.before import Before
+from mechdesign.drawing.pictures import figures
 from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
+from mechdesign.questions.stiffness.analysis import stiffness
 from mechdesign.questions.workspace.analysis import workspace
 
 try:
@@ -32,7 +35,8 @@ except ImportError:
     expect = None
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-# Of a sweep; the last cannot be built.
+# Of a sweep; of the first the last cannot be built.
+LONGEST = "matrix={vary: {mechanism.parameters.l: [5, 4, 6]}, best: {maximize: [kinematics.extremes.B.x.max]}}"
 FEW_CASES = ("matrix={vary: {mechanism.parameters.l: [5, 4, -1]}, results: [kinematics.extremes.B.x.range]}",)
 PIXELS = 0.2  # of the drawing: a step of the places and of the angles that the page has
 
@@ -47,14 +51,15 @@ def answers():
         ("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics), ("five_bar", workspace),
         ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
         ("gallery/straight_line_front", optimize, "optimize.evaluations=200"),
-        ("gallery/offset_slider_crank", sweep, *FEW_CASES),
+        ("gallery/offset_slider_crank", sweep, *FEW_CASES), ("best_case", sweep, LONGEST, "requirements=[]"),
         ("gallery/twin_cylinder", dynamics, "dynamics.sweep.crank.step=30"),
     ):  # fmt: skip
-        study = load(CONFIGS / f"{name}.yaml", overrides)
+        study = load(CONFIGS / f"{STUDIES.get(name, name)}.yaml", overrides)
         found[Path(name).name] = study, command(study)
     return found
 
 
+STUDIES = {"best_case": "gallery/offset_slider_crank"}
 # Pictures that are in a study's report, beside what moves.
 PICTURES = {"four_bar": ("transmission", "paths"), "five_bar": ("inscribed",)}
 
@@ -84,8 +89,10 @@ def opened(browser, reports):
     """Open a study's report; at the end nothing was asked of the network, and nothing complained."""
     pages, complaints = [], []
 
-    def look(name, width=1400, height=900, **options):
-        page = browser.new_page(viewport={"width": width, "height": height}, **options)
+    def look(name, width=1400, height=900, *, plays=False, **options):
+        # A page that need not play is still from the start.
+        motion = "no-preference" if plays else "reduce"
+        page = browser.new_page(viewport={"width": width, "height": height}, reduced_motion=motion, **options)
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda request: complaints.append(request.url)
@@ -149,7 +156,7 @@ def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers
 
 
 def test_between_poses_45_degrees_apart_the_crank_keeps_its_length_and_its_angle_is_that_in_words(opened):
-    page = opened("four_bar")
+    page = opened("four_bar", plays=True)
     slider = page.get_by_role("slider")
     angles = set()
 
@@ -212,22 +219,22 @@ def test_a_pose_of_another_question_is_a_link_where_the_motion_passes_it(opened,
         assert link.get_attribute("href") is None
 
 
-def test_it_plays_on_request_only_and_stops(opened):
-    page = opened("slider_crank")
-    slider, button = page.get_by_role("slider"), page.get_by_role("button", name="Play")
-    page.wait_for_timeout(150)
-    assert slider.input_value() == "0"
-    button.click()
+@pytest.mark.parametrize("name", ["slider_crank", "straight_line_front", "best_case"])
+def test_it_moves_when_the_page_opens_and_stops_by_a_key(opened, name):
+    page = opened(name, plays=True)
+    slider = page.locator(".stage").get_by_role("slider")
     expect(slider).to_have_value(re.compile(r"[4-9]|\d\d"))
-    slider.press(" ")
+    page.get_by_role("button", name="Pause").press("Enter")
     page.get_by_role("button", name="Play").wait_for()
     stopped = slider.input_value()
     page.wait_for_timeout(150)
     assert slider.input_value() == stopped
 
 
-def test_who_wants_no_motion_sees_steps(opened):
-    page = opened("slider_crank", reduced_motion="reduce")
+def test_who_wants_no_motion_sees_a_still_linkage_and_steps_on_request(opened):
+    page = opened("slider_crank")
+    page.wait_for_timeout(150)
+    assert page.get_by_role("slider").input_value() == "0"
     page.get_by_role("button", name="Play").click()
     page.wait_for_timeout(300)
     assert page.get_by_role("slider").input_value() == "0"
@@ -303,6 +310,7 @@ def test_one_cursor_goes_through_every_picture(opened):
                     south + (north - south) * (bottom - at("cy")) / (bottom - top)];
         })""")  # fmt: skip
 
+    page.get_by_role("radio", name="transmission").check()
     transmission = page.locator("#kinematics .pictures svg[aria-label=transmission]")
     box = transmission.bounding_box()
     transmission.hover(position={"x": 0.6 * box["width"], "y": 0.4 * box["height"]})
@@ -426,7 +434,8 @@ def test_on_a_phone_letters_can_be_read_and_what_is_at_the_side_is_said(opened):
     page = opened("four_bar", 390)
     chart = page.locator(".moving-beside")
     assert (
-        page.evaluate("""() => Math.min(...[...document.querySelectorAll(".pictures svg text")].map(text =>
+        page.evaluate("""() => Math.min(...[...document.querySelectorAll(".pictures svg text")].filter(text =>
+        text.ownerSVGElement.clientWidth).map(text =>
         parseFloat(text.getAttribute("font-size") || 10) * text.ownerSVGElement.clientWidth
         / text.ownerSVGElement.viewBox.baseVal.width))""")
         > 6.5
@@ -488,10 +497,131 @@ def test_a_click_on_a_front_shows_that_linkage_moving(opened, answers):
     k = 0
     look()
     page.get_by_role("button", name="Play").click()
-    before = slider.input_value()
-    page.wait_for_timeout(150)
-    assert slider.input_value() != before
+    expect(slider).not_to_have_value(slider.input_value())
     page.get_by_role("button", name="Pause").click()
+
+
+def test_of_several_pictures_the_chosen_one_is_on_the_screen_and_all_are_on_paper(opened):
+    page = opened("four_bar")
+    figures = page.locator("#kinematics .pictures figure:not([hidden])")
+    count = figures.count()
+    assert count == 4
+    names = page.get_by_role("radio").all()
+    assert [name.is_checked() for name in names] == [True, False, False, False]
+
+    def seen():
+        return [k for k in range(count) if figures.nth(k).is_visible()]
+
+    assert seen() == [0]
+    names[0].press("ArrowRight")
+    assert seen() == [1]
+    page.emulate_media(media="print")
+    # A chart that the reader did not ask for is not printed.
+    assert seen() == [0, 1, 2]
+
+
+def test_any_number_is_drawn_over_any_other_and_its_dot_follows_the_pose(opened, answers):
+    page, rows, poses = opened("four_bar"), rows_of(answers, "four_bar"), poses_of(answers, "four_bar")
+    page.get_by_role("radio", name="any over any").check()
+    page.get_by_label("output upwards").select_option(label="velocity of rocker.angle [deg/s]")
+    page.get_by_label("output across").select_option(label="C.y [cm]")
+    chart = page.locator(".moving-chart svg")
+    assert chart.get_attribute("aria-label") == "velocity of rocker.angle [deg/s] over C.y [cm]"
+
+    def dot():
+        # The place of the dot by the numbers along the axes.
+        return chart.evaluate("""svg => {
+            const texts = [...svg.querySelectorAll("text")], dot = svg.querySelector(".moving-here");
+            const number = text => Number(text.textContent.replace("\u2212", "-"));
+            const along = (anchor, key) => {
+                const marks = texts.filter(text =>
+                    text.getAttribute("text-anchor") === anchor && isFinite(number(text)));
+                const a = marks[0], b = marks.at(-1), [at, to] = [a, b].map(mark => Number(mark.getAttribute(key)));
+                const place = Number(dot.getAttribute(key === "x" ? "cx" : "cy")) + (key === "y" ? 3.5 : 0);
+                return number(a) + (number(b) - number(a)) * (place - at) / (to - at);
+            };
+            return [along("middle", "x"), along("end", "y")];
+        }""")
+
+    slider = page.locator(".stage").get_by_role("slider")
+    for row in (0, 3, 6):
+        slider.fill(str(poses.index(row)))
+        x, y = dot()
+        assert x == pytest.approx(rows[row]["C.y"], abs=0.01)
+        assert y == pytest.approx(rows[row]["rocker.angle_velocity"], abs=0.2)
+    # A click on the curve brings the mechanism to that pose.
+    slider.fill("0")
+    chart.scroll_into_view_if_needed()
+    circle = chart.locator(".moving-here").bounding_box()
+    slider.fill(str(poses.index(4)))
+    page.mouse.click(circle["x"] + circle["width"] / 2, circle["y"] + circle["height"] / 2)
+    assert abs(float(slider.input_value())) <= 1
+
+
+def test_the_best_case_of_a_sweep_moves_and_says_which_it_is(opened, answers):
+    page, table = opened("best_case"), answers["best_case"][1].main
+    best = int(np.flatnonzero(table["rank"] == 1)[0])
+    assert best == 2
+    assert words(page).startswith("case 3 (l 6): crank = ")
+    length = pin_to_pin(page, "A", "B")
+    page.locator(".stage").get_by_role("slider").fill("20")
+    assert length == pytest.approx(6, abs=0.01)
+    assert pin_to_pin(page, "A", "B") == pytest.approx(6, abs=0.01)
+
+
+def pin_to_pin(page, one, other):
+    return abs(complex(*place(page, one)[:2]) - complex(*place(page, other)[:2]))
+
+
+def test_before_and_after_move_together(opened, reports):
+    path = CONFIGS / "gallery" / "four_bar.yaml"
+    study, earlier = load(path, ["mechanism.links.rocker.2=3.5"]), load(path)
+    result = kinematics(study)
+    before = Before.of(study, result, earlier, kinematics(earlier))
+    part, warnings = section(study, result, {}, "", (), before, plots=True)
+    assert warnings == ()
+    (reports / "changed.html").write_bytes(
+        report(study, [AnsweredQuestion("kinematics", "done", 0, section=part)], below=False)
+    )
+    page = opened("changed")
+    rows, then = ([*asked.tables["motion"]] for asked in (result, before.result))
+    scale = part["moving"]["data"]["scale"]
+
+    def pin(layer):
+        found = page.locator(f".moving {layer}[data-at=C]:has(circle)").first.get_attribute("transform")
+        return complex(*map(float, re.match(r"translate\((\S+) (\S+)\)", found).groups()))
+
+    slider = page.locator(".stage").get_by_role("slider")
+    for share in (0.0, 0.3, 0.8):
+        slider.fill(str(round(share * float(slider.get_attribute("max")))))
+        angle = float(re.search(r"crank = (\S+) deg", words(page))[1])
+        places = [complex(np.interp(angle, [row["crank"] for row in table], [row["C.x"] for row in table]),
+                          np.interp(angle, [row["crank"] for row in table], [row["C.y"] for row in table]))
+                  for table in (rows, then)]  # fmt: skip
+        apart = (pin("svg > ") - pin(".moving-before > ")) / scale
+        assert abs(apart.conjugate() - (places[0] - places[1])) < 0.02
+        assert abs(apart) > 0.05
+    page.get_by_label("Before").uncheck()
+    assert page.locator(".moving-before [data-at=C]:has(circle)").first.is_hidden()
+
+
+@pytest.mark.nightly
+def test_five_questions_are_printed_on_six_pages_and_half_as_long_as_with_all_pictures(opened, reports, tmp_path):
+    study = load(CONFIGS / "five_bar.yaml", ["reliability.samples=2000"])
+    told = []
+    for ask in (kinematics, workspace, optimize, reliability, stiffness):
+        result = ask(study)
+        with style.context():
+            names = [*figures(study, result)]
+        part, _ = section(study, result, drawn(study, result, names), "", (), plots=True)
+        told.append(AnsweredQuestion(result.command, "done", 0, verdicts=requirements(study, result), section=part))
+    (reports / "five.html").write_bytes(report(study, told, below=True))
+    assert 4 <= len(re.findall(rb"/Type\s*/Page\b", pdf(reports / "five.html"))) <= 6
+    page = opened("five")
+    assert page.locator(".choice").count() == 5
+    tall = page.evaluate("document.documentElement.scrollHeight")
+    page.evaluate("document.querySelectorAll('.away').forEach(figure => figure.classList.remove('away'))")
+    assert tall < 0.6 * page.evaluate("document.documentElement.scrollHeight")
 
 
 def test_a_column_sorts_a_table_by_a_click_and_by_a_key(opened):

@@ -33,7 +33,7 @@ def five_bar(coupling: str) -> Any:
         ("{set: g2}", "one of to: expression, ratio: number, table: file"),
         ("{set: g2, to: g1, ratio: 2}", "to and ratio are given"),
         ("{set: g2, ratio: 2}", "needs 'of'"),
-        ("{set: g2, to: 2*g1, of: g1}", "'of' belongs to a 'ratio' or a 'table'"),
+        ("{set: g2, to: 2*g1, of: g1}", "'of' belongs to a 'ratio', a 'table' or a 'law'"),
         ("{set: g2, to: 2*g1, phase: 3}", "'phase' belongs to a 'ratio'"),
         ("{set: g3, of: g1, ratio: 2}", "there is no coordinate 'g3'"),
         ("{set: B.x, of: g1, ratio: 2}", "'B.x' cannot follow others"),

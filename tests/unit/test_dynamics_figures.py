@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,9 @@ import mechdesign
 from mechdesign.drawing import style
 from mechdesign.drawing.pictures import figures
 from mechdesign.questions.dynamics.analysis import DrawnForces
-from mechdesign.questions.dynamics.free_bodies import actions_on
+from mechdesign.questions.dynamics.figures.free_bodies import FreeBody, free_bodies_picture
+from mechdesign.questions.dynamics.figures.view import DynamicsView
+from mechdesign.questions.dynamics.free_bodies import Action, actions_on
 
 SPRUNG = """
 units: {length: mm}
@@ -76,14 +79,107 @@ def drawn(study: mechdesign.Study) -> dict[str, object]:
     return dict(gallery)
 
 
+# A force on a pin of three links and on one of the ground; a cylinder; a controller that moves a slide; a driven slot.
+PINNED = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0], G: [0, 90]}
+    crank: [O, A, 40]
+    rod: [A, B, 90]
+    rocker: [D, B, 60]
+    strut: {from: B, to: C, length: 50}
+    table: {C: [0, 0], E: [30, 0]}
+  joints: {guide: {prismatic: [ground, table], point: C, through: G}}
+  drives: [crank]
+  sketch: {A: [0, 40], B: [85, 55], C: [60, 90]}
+dynamics:
+  poses: [{crank: 80}]
+  loads: [{at: B, force: [10, -30]}, {at: D, force: [0, 5]}, {at: C, force: [-4, 0]}]
+"""
+CONTROLLED = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [0, 50]}
+    arm: [O, P, 60]
+    cart: {C: [0, 0], E: [30, 0]}
+    lid: {from: E, to: F, length: 40}
+  joints: {rail: {prismatic: [ground, cart], point: C, through: G}}
+  drives: {arm: {angle: arm}, lid: {angle: lid}}
+  couplings: {follow: {set: rail.slide, to: "2*arm.angle + 10"}}
+  sketch: {P: [50, 30], C: [80, 50], F: [120, 80]}
+dynamics:
+  poses: [{arm: 30, lid: 40}]
+  loads: [{at: E, force: [-12, -5]}, {at: P, force: [0, -3]}]
+"""
+SHIPPED = ("balanced_arm", "cam_arm", "excavator_lift", "flywheel_press", "one_tooth_difference",
+           "planetary", "rise_dwell_return", "twin_cylinder", "wedge_press", "wiper_motor")  # fmt: skip
+SWINGING = ("braked_pendulum", "pendulum")  # motions in time, which take seconds
+
+
+def bodies(text: str) -> dict[str, list[Action]]:
+    """What is drawn on each body, by the title of its panel, with the sizes as they are written."""
+    study, result = answered(text)
+    picture = free_bodies_picture(DynamicsView(study, result))
+    assert picture is not None
+    shown = {}
+    for panel in picture.panels:
+        (free,) = (mark for mark in panel.marks if isinstance(mark, FreeBody))
+        shown[panel.title] = [
+            replace(own, force=own.force and float(free.words(own).split()[-1]) * own.force / own.size)
+            for own in free.acting
+        ]
+    return shown
+
+
+@pytest.mark.parametrize(
+    "text", [SPRUNG, HELD, PINNED, CONTROLLED, *(pytest.param(name, marks=pytest.mark.slow) for name in SHIPPED),
+             *(pytest.param(name, marks=pytest.mark.nightly) for name in SWINGING)],
+)  # fmt: skip
+def test_the_forces_that_are_drawn_on_each_body_balance(text: str) -> None:
+    for title, acting in bodies(text).items():
+        # A number is written with three digits; what is below half a percent of the largest on a body is left out.
+        largest = max((action.size for action in acting), default=0.0)
+        assert abs(sum(action.force for action in acting)) <= 1.2e-2 * largest, title
+        if not any(action.undetermined for action in acting):
+            about = acting[0].place
+            arms = [((action.place - about).conjugate() * action.force).imag for action in acting]
+            size = max([*map(abs, arms), *(abs(action.moment) for action in acting)])
+            reach = max(abs(action.place - about) for action in acting)
+            assert abs(sum(arms) + sum(action.moment for action in acting)) <= 1.2e-2 * max(size, largest * reach), (
+                title
+            )
+
+
+def test_a_driven_slide_shows_the_push_of_its_drive_beside_what_it_bears() -> None:
+    # W tan(alpha + 2 phi), and on the floor the weight with the friction of its pressure.
+    shown = {own.name: own for own in bodies("wedge_press")["wedge; open: moments of floor, face"]}
+    push = 1000 * np.tan(np.radians(8) + 2 * np.arctan(0.1))
+    assert shown["push"].force == pytest.approx(-push, rel=2e-3)
+    assert shown["floor"].force.real == pytest.approx(0.1 * shown["floor"].force.imag, rel=5e-3)
+
+
+def test_a_load_on_the_pin_of_several_links_is_drawn_on_the_pin_and_one_on_the_ground_there() -> None:
+    shown = bodies(PINNED)
+    assert [own.kind for own in shown["pin B"]] == ["joint", "joint", "joint", "load"]
+    assert 5j in [own.force for own in shown["ground"] if own.kind == "load"]
+
+
+def test_a_cylinder_says_how_hard_it_pushes_or_pulls() -> None:
+    titles = [*bodies("excavator_lift")]
+    assert any(title.startswith("boom_cylinder, pushes 607") for title in titles)
+    assert any(title.startswith("stick_cylinder, pulls 56.5") for title in titles)
+
+
 @pytest.mark.parametrize("text", [SPRUNG, HELD, "flywheel_press", "excavator_lift", "twin_cylinder"])
 def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
     study, result = answered(text)
     record = DrawnForces.of(result)
     for index in (0, 7, 19):
         acting = [each.at(0) for each in actions_on(record.motion, record.shown.take(np.array([index])))]
-        links = {action.link for action in acting} - {"ground", ""}
-        assert links == set(study.mechanism.description.links) - {"ground"}
+        links = {action.link for action in acting} - {"ground"}
+        assert {link for link in links if not link.startswith("pin:")} == set(study.mechanism.description.links) - {
+            "ground"
+        }
         largest = max(action.size for action in acting)
         for link in links:
             own = [action for action in acting if action.link == link]

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import mechdesign
 from mechdesign.door.report.page import vector
 from mechdesign.door.report.page.headlines import headlines, shown
 from mechdesign.door.report.requirements import verdict_on
@@ -149,10 +150,43 @@ def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None
     )
     poses = GIVEN.column([0.0, 5.0, 0.0, 5.0], "deg", coordinate="theta")
     result = Result("reliability", {"reliability": RELIABILITY.table([poses, *columns])})
-    one, other = headlines(result)
-    assert (one.label, one.value) == ("failure probability, analytic", "0.03")
-    assert (other.label, other.value) == ("failure probability, auto", "0.02")
-    assert other.note.startswith("99.7 % between 0.015 and 0.025; at theta")
+    best, other = headlines(result)
+    assert (best.label, best.value) == ("failure probability, auto", "0.02")
+    assert best.note.startswith("99.7 % between 0.015 and 0.025; at theta")
+    assert (other.label, other.value) == ("failure probability, analytic", "0.03")
+
+
+def asked(extra: str = "") -> mechdesign.Study:
+    """A slider-crank that turns a weight of 2 kg, and its answers."""
+    return mechdesign.load(
+        text=f"""
+mechanism:
+  links:
+    ground: {{O: [0, 0]}}
+    crank: [O, A, 40]
+    rod: [A, B, 120]
+    slider: {{points: {{B: [0, 0]}}, mass: 2}}
+  joints: {{guide: {{prismatic: [ground, slider], through: O}}}}
+  drives: {{theta: {{angle: crank}}}}
+  sketch: {{A: [0, 40], B: [110, 0]}}
+{extra}"""
+    )
+
+
+def test_the_first_key_numbers_are_peaks_of_effort_the_flywheel_and_what_was_asked() -> None:
+    study = asked("kinematics: {outputs: [B.x], loads: [{at: B, force: [-100, 0]}], rates: {theta: 60 rpm}}")
+    told = headlines(mechdesign.kinematics(study))
+    assert [number.label for number in told[:3]] == [
+        "largest effort of theta",
+        "range of B.x",
+        "largest velocity of B.x",
+    ]
+    assert told[0].note.replace("\N{NO-BREAK SPACE}", " ").startswith("at theta = ")
+    assert told[0].note.endswith("deg")
+    study = asked("dynamics: {rates: {theta: 600 rpm}, flywheel: {fluctuation: 0.02}}")
+    told = headlines(mechdesign.dynamics(study))
+    assert told[0].label == "moment of inertia that the flywheel adds on theta"
+    assert told[1].label == "peak effort of theta"
 
 
 def test_headlines_know_a_column_by_its_kind_whatever_its_name_and_its_meaning() -> None:

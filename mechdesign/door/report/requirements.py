@@ -85,12 +85,15 @@ class DrawnCases(Drawn):
         Columns of goals: 1 where one is to be small, -1 where it is to be large.
     verdicts : tuple of Verdict
         The worst over the cases, a requirement each.
+    case : callable
+        The study of a case by its number, from 1.
     """
 
     entries: Sequence[str]
     results: Mapping[str, Limits]
     goals: Mapping[str, int]
     verdicts: tuple[Verdict, ...]
+    case: Callable[[int], Study]
 
 
 def named(kind: str) -> str:
@@ -271,12 +274,12 @@ def _judged(result: Result, requirement: Requirement, freedom: int, fewer: Colle
             raise UnknownColumnError(missing)
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
     judged = along(worst or own, chosen, bounds, absolute=requirement.abs)
-    if np.isfinite(judged.at[0]):
-        words, course = [*chosen.courses.items()][judged.strand[0]]
+    words, course = [*chosen.courses.items()][judged.strand[0]] if judged.strand[0] >= 0 else ("", None)
+    if course is not None and np.isfinite(judged.at[0]):
         place = ", ".join(filter(None, (course.shown(float(judged.at[0])), words)))
     elif judged.row[0] < 0:
         # Of no row, between which the motion has no place either.
-        place = _OUTSIDE if worst is None else ""
+        place = _OUTSIDE if worst is None else words
     return _verdict(requirement, judged, place, chosen)
 
 
@@ -303,8 +306,8 @@ def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str
     most, place = float(values[row]), place_of(chosen.table, row, chosen.column, freedom)
     for words, course in chosen.courses.items():
         end, at = (float(part[0]) for part in course.worst(sign, absolute=statistic.absolute))
-        if abs(most) <= course.rounding and np.isnan(at):
-            return ""
+        if np.isfinite(end) and np.isnan(at):
+            return words
         if np.isfinite(at) and sign * end >= most - AT_END * abs(most):
             most, place = sign * end, ", ".join(filter(None, (course.shown(at), words)))
     return place

@@ -16,6 +16,13 @@ def cleared(values: Floats, still: Floats | float) -> Floats:
         return np.where(np.abs(values) <= still, 0.0, values)
 
 
+def unchanging(low: Floats | float, high: Floats | float, size: Floats | float = 0.0) -> Flags:
+    """Whether values between these ends are the same up to `STILL` of theirs, or of a size: they have no extreme."""
+    with np.errstate(invalid="ignore"):
+        still = STILL * np.maximum(np.maximum(np.abs(low), np.abs(high)), size)
+        return np.asarray(np.isfinite(still) & (high - low <= still))
+
+
 def larger(low: Floats, high: Floats, low_at: Floats, high_at: Floats, still: Floats | float) -> Flags:
     """Whether the largest absolute value is `high` and not `low`; of equal ones the first along the motion."""
     with np.errstate(invalid="ignore"):

@@ -12,6 +12,7 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.elements import declared
 from mechdesign.mechanism.elements.declared import Element
 from mechdesign.mechanism.elements.joints import LinkLine, Points
+from mechdesign.mechanism.elements.segments import LawSegment, segments_faults
 
 # Prefix of places that are not dimensions of a part: parameters that measures use, and the play of couplings. No name
 # in a study has a colon.
@@ -29,6 +30,8 @@ _SIDES = {
     "inner": "its follower runs inside of the cam, a ring",
     "groove": "its roller runs in a groove, which has both sides and holds it",
 }
+# Fewest and most steps of a cam's profile.
+STEPS = 8, 100_000
 
 
 def play(coupling: str) -> str:
@@ -59,8 +62,11 @@ class Cam(Element):
     """First and last value of the coordinate that is followed, of the profile. Left out: the range of the ``table``, of
     an angle a turn from 0. Example: [0, 120]
     """
-    steps: Annotated[int, declared.Whole(8, 100_000)] = 360
+    steps: Annotated[int, declared.Whole(*STEPS)] = 360
     """Steps of the profile in cam.csv, equal in the coordinate that is followed. Example: 720"""
+    step: Annotated[float, declared.Size(None, 0.0, exclusive=True, fixed=True)] | None = None
+    """Step of the profile in cam.csv, in place of ``steps``; smaller where it does not divide the range. Example: 0.5
+    """
     face: LinkLine = field(kw_only=True)  # of the follower; of a roller only the point counts
 
     @classmethod
@@ -76,16 +82,19 @@ class Cam(Element):
             yield "'flat' with two points gives the direction; leave 'direction' out"
         if given.range is not None and not given.range[0] < given.range[1]:
             yield "a range rises from its first value to its last"
+        if given.step is not None and "steps" in given.model_fields_set:
+            yield "'steps' is how many there are, 'step' how long each is: give one"
 
 
 @dataclass(frozen=True)
 class Coupling(Element):
     """A coordinate that follows others, by gears, a rack, a belt, a cam or a controller: ``set`` and one of ``to``,
-    ``ratio`` and ``table``.
+    ``ratio``, ``table`` and ``law``.
     """
 
     one_of = (
-        "a coupling gives what it sets by one of to: expression, ratio: number, table: file", "to", "ratio", "table",
+        "a coupling gives what it sets by one of to: expression, ratio: number, table: file, law: [segments]",
+        "to", "ratio", "table", "law",
     )  # fmt: skip
 
     set_: declared.CoordinateName
@@ -99,7 +108,7 @@ class Coupling(Element):
     coordinate. Example: -2.5*sun + 3.5*arm
     """
     of: declared.CoordinateName | None = None
-    """Coordinate that is followed, of a ``ratio`` or a ``table``. Example: sun.angle"""
+    """Coordinate that is followed, of a ``ratio``, a ``table`` or a ``law``. Example: sun.angle"""
     ratio: declared.AnySize | None = None
     """What the coordinate that follows changes by for each unit of the other, in the study's units. Example: -2.5"""
     phase: declared.AnySize | None = None
@@ -109,6 +118,11 @@ class Coupling(Element):
     table: Annotated[Any, declared.Notation("table")] | None = None
     """Rows of the coordinate that is followed and the one that follows, or a file of two such columns; between them a
     cubic spline. It repeats if it spans a turn and ends as it begins. Example: lift.csv
+    """
+    law: tuple[Annotated[LawSegment, declared.Notation("part")], ...] | None = None
+    """Moves and dwells one after another, from the value 0 of the coordinate that is followed on, again and again over
+    their sum. With a ``from`` that is not where they end they are passed once, and what follows stands before and
+    behind them. Example: [{to: 30, over: 120, law: cycloidal}, {dwell: 60}, {to: 0, over: 120}, {dwell: 60}]
     """
 
     wheels: Annotated[str, declared.Choice(_WHEELS, "kind of wheels")] = "gears"
@@ -126,9 +140,12 @@ class Coupling(Element):
     def faults(cls, given: Any) -> Iterator[str]:
         """Sentences about keys that do not go together."""
         if given.to is not None and given.of is not None:
-            yield "'of' belongs to a 'ratio' or a 'table'; an expression names its coordinates itself"
+            yield "'of' belongs to a 'ratio', a 'table' or a 'law'; an expression names its coordinates itself"
         if given.to is None and given.of is None:
-            yield "a coupling by 'ratio' or 'table' needs 'of', the coordinate that is followed"
+            yield "a coupling by 'ratio', 'table' or 'law' needs 'of', the coordinate that is followed"
+        if given.law == ():
+            yield "an empty law; give its segments, [{to: 30, over: 180}, {to: 0, over: 180}]"
+        yield from segments_faults(given.law or (), "{to: 30, over: 180}", "{to: 0, over: 180}")
         if given.radius is not None and given.wheels != "belt":
             yield "the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out"
         if given.phase is not None and given.ratio is None:

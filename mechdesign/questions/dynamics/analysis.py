@@ -27,7 +27,7 @@ from mechdesign.motion.solving import solve_rows
 from mechdesign.questions.dynamics import lift_off
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.forward import forward
-from mechdesign.questions.dynamics.free_bodies import actions_on
+from mechdesign.questions.dynamics.free_bodies import actions_on, body_in_words
 from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import DynamicQuestion, ForceQuestion
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table
@@ -70,7 +70,7 @@ class DrawnForces(DrawnPoses):
         unit, forces = motion.question.study.units.label("force"), dict[str, list[Vector]]()
         for action in actions_on(motion, shown):
             if not action.reaction and np.nan_to_num(action.force).any():
-                words = action.name if action.kind == action.name else f"{action.name} on {action.link or 'the pin'}"
+                words = action.name if action.kind == action.name else f"{action.name} on {body_in_words(action.link)}"
                 forces.setdefault(action.kind, []).append((words, action.place, action.force))
         x, y = (motion.arrays[f"shaking.{axis}"][shown.rows] for axis in "xy")
         frame = [point for owner, point in shown.configuration.graph.points if owner == GROUND and ":" not in point]

@@ -22,7 +22,7 @@ JOINT_FORCES = TableKind.of("joint_forces", "what joints and couplings without w
     ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
     ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies; of a "
      "coupling without wheels, whose moment is that of a controller or a hidden gear, the coupling itself"),
-    ("fx, fy", "force on the one by the other, axes of the world", "force"),
+    ("fx, fy", "force on the one by the other, axes of the world; of a slide with the push of its drive", "force"),
     ("moment", "moment likewise, about the joint's point; nan where equilibrium leaves it open", "moment"),
     ("magnitude", "size of the force", "force"), ("angle", "its direction from the world's x axis", "angle"),
     ("normal", "of a slide the force across its line, to the left positive; of a cam the contact force, negative where "
@@ -36,6 +36,8 @@ EXTREMES = TableKind.of("extremes", f"extremes and means of efforts, forces and 
     ("peak", "largest absolute value, in `unit`"), ("peak_at", "<swept> at the peak", "as what is swept"),
     ("mean", "mean over the way of the motion, in `unit`"),
     ("rms", "root of the mean square over the way of the motion, in `unit`"),
+    ("cubic_mean", "of a joint's force the constant one of the same life of a ball bearing, over the same way, in "
+     "`unit`; nan of others", "", "cube root of the mean of F^3 (ISO 281)"),
     ("unit", "unit of its numbers"))  # fmt: skip
 FORWARD = TableKind.of("forward", "the motion that given efforts bring about, a row an instant",
     TIMED, DRIVE, ("<drive>_velocity", "velocity of <drive>", "as the drive, per time"),
@@ -68,10 +70,10 @@ MODES = TableKind.of("modes", "natural frequencies of small motion about each po
      "or without inertia", "1/time", "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
     ("<drive>_shape", "share of <drive> in the mode, the largest 1; lengths in sizes of the mechanism"))  # fmt: skip
 KEY_NUMBERS = (
-    KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
-    KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),
+    KeyNumber(FLYWHEEL, "added_inertia", "moment of inertia that the flywheel adds on {drive}", "first"),
+    KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name} with weights and inertia", "size"),
+    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
+    KeyNumber(DYNAMICS, "<drive>_power", "peak power of {name}", "size"),
     KeyNumber(DYNAMICS, "efficiency", "smallest efficiency", "smallest"),
     KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
-    KeyNumber(FLYWHEEL, "added_inertia", "moment of inertia that the flywheel adds on {drive}", "first"),
-    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
 )  # fmt: skip

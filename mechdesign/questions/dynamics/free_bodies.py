@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Vector
+from mechdesign.mechanism.algebra import Value, Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
-from mechdesign.mechanism.graph import rod_of
+from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.joint_contacts import PIN, Contact
+from mechdesign.mechanism.outputs import pulled
 from mechdesign.mechanism.wheels import Mesh
 from mechdesign.motion.question import PoseValues
+from mechdesign.questions.dynamics.question import COUPLING
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
@@ -24,10 +26,10 @@ from mechdesign.study import Study
 
 @dataclass(frozen=True, eq=False)
 class Acting:
-    """A force (x + iy) at a place and a moment about it in n poses, on a link or on the pin of several ('').
+    """A force (x + iy) at a place and a moment about it in n poses, on a link or on the pin of several (``pin:A``).
 
-    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring``, ``effort`` or ``coupling``, its `name` that
-    of what acts.
+    Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring``, ``effort``, ``coupling`` or ``foundation``,
+    its `name` that of what acts.
     What a joint does to its second body is a `reaction` to what it does to its first.
     """
 
@@ -38,11 +40,13 @@ class Acting:
     force: Complexes
     moment: Floats
     reaction: bool = False
+    joint: str = ""  # along whose slide it pushes
 
     def at(self, index: int) -> Action:
         """The action in one of the poses; what is not known is 0 there."""
-        force, moment = np.nan_to_num(self.force[index]), np.nan_to_num(self.moment[index])
-        return Action(self.kind, self.name, self.link, complex(self.place[index]), complex(force), float(moment))
+        force, moment = np.nan_to_num(self.force[index]), float(self.moment[index])
+        whole, undetermined = float(np.nan_to_num(moment)), bool(np.isnan(moment))
+        return Action(self.kind, self.name, self.link, complex(self.place[index]), complex(force), whole, undetermined)
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,7 @@ class Action:
     place: complex
     force: complex = 0j
     moment: float = 0.0
+    undetermined: bool = False  # whether equilibrium leaves its moment open
 
     @property
     def size(self) -> float:
@@ -71,7 +76,11 @@ def mass_centers(study: Study, configuration: Configuration, index: int) -> dict
 
 
 def actions_on(motion: PoseValues, shown: Shown) -> list[Acting]:
-    """All that acts on the links in the poses shown; of a joint what it does to both sides, unless it is one link."""
+    """All that acts on the links in the poses shown; of a joint what it does to both sides, unless it is one link.
+
+    What drives and couplings push along a slide stands apart from what the slide bears across it and by friction, which
+    ``joint_forces.csv`` has together.
+    """
     return list(_Poses(motion, shown).acting())
 
 
@@ -82,19 +91,21 @@ class _Poses:
         self.motion, self.question = motion, question_of(motion)
         self.study, self.poses = self.question.study, shown.solved.poses
         self.rows, self.configuration = shown.rows, shown.configuration
-        linear = self.study.mechanism.linearize(self.configuration)
-        self.moving = moving_at(motion.question.section, shown.solved, linear)
+        self.linear = self.study.mechanism.linearize(self.configuration)
+        self.moving = moving_at(motion.question.section, shown.solved, self.linear)
 
     def acting(self) -> Iterator[Acting]:
         """Those of joints first."""
-        yield from self._joints()
+        pushes = list(self._efforts())
+        yield from self._joints(pushes)
         yield from self._masses()
         yield from self._loads()
         yield from self._springs()
-        yield from self._efforts()
-        for coupling, body in self.question.turned:
-            moment = self.motion.arrays[f"{coupling}_moment_on_{body}.moment"][self.rows]
-            yield self._acting("coupling", coupling, _link(body), self._base(body), 0j, moment)
+        yield from pushes
+        shaking = [self.motion.arrays[name][self.rows] for name in ("shaking.x", "shaking.y", "shaking_moment")]
+        force, place = -shaking[0] - 1j * shaking[1], self._base(GROUND)
+        moment = -shaking[2] - (np.conj(place) * force).imag
+        yield self._acting("foundation", "foundation", GROUND, place, force, moment, reaction=True)
 
     def _acting(
         self, kind: str, name: str, link: str, place: Vector, force: Vector = 0j, moment: Vector = 0.0,
@@ -104,7 +115,9 @@ class _Poses:
         at, way, turning = (_all(self.configuration, values) for values in (place, force, moment))
         return Acting(kind, name, link, at, way, turning.real, reaction)
 
-    def _joints(self) -> Iterator[Acting]:
+    def _joints(self, pushes: Sequence[Acting]) -> Iterator[Acting]:
+        """Contact forces: without what is pushed along their slides."""
+        pushed = {push.joint: push.force for push in pushes if push.joint and not push.reaction}
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
             place, sides = contact.place(self.configuration), _sides(contact)
@@ -112,7 +125,7 @@ class _Poses:
                 place = self.motion.arrays[f"{name}.x"][self.rows] + 1j * self.motion.arrays[f"{name}.y"][self.rows]
             if sides[0] != sides[1]:
                 for k, (side, sign) in enumerate(zip(sides, (1, -1), strict=True)):
-                    force = sign * (x + 1j * y)
+                    force = sign * (x + 1j * y - pushed.get(contact.joint, 0.0))
                     pair, at = contact.engaged, place
                     if isinstance(pair, Mesh) and pair.belt:
                         # Where the belt leaves this wheel: nearest to its axis.
@@ -160,16 +173,45 @@ class _Poses:
             node, link = graph.node(end), end.rpartition(".")[0]
             body = link if link in forces.bodies or not link else rod_of(link)
             force = forces.bodies[body][0] if link else forces.nodes[node]
-            owner = _link(body) if link else _link(self.question.joints.sole.get(node, ""))
-            yield self._acting(kind, name, owner, self.configuration.nodes[node], force)
+            yield self._acting(kind, name, _link(body) if link else self._holder(node), self._node(node), force)
 
     def _efforts(self) -> Iterator[Acting]:
-        mechanism = self.study.mechanism
-        for drive in mechanism.drives:
-            coordinate, effort = mechanism.coordinate(drive), self.motion.arrays[f"{drive}_effort"][self.rows]
-            if coordinate.kind == "angle":
-                for body, sign in ((coordinate.body, 1), (coordinate.reference, -1)):
-                    yield self._acting("effort", drive, _link(body), self._base(body), 0j, sign * effort)
+        """What drives do, and couplings that no wheels make: moments on links, pushes along slides, forces on pins."""
+        mechanism, arrays = self.study.mechanism, self.motion.arrays
+        pulls = [("effort", name, mechanism.coordinate(name), arrays[f"{name}_effort"]) for name in mechanism.drives]
+        pulls += [("coupling", name, gap, arrays[f"{COUPLING} {name}"])
+                  for name, (_, gap) in self.question.without_wheels.items()]  # fmt: skip
+        for kind, name, coordinate, effort in pulls:
+            pull = pulled(self.configuration, coordinate, effort[self.rows])
+            for body, moment in pull.bodies.items():
+                yield self._acting(kind, name, _link(body), self._base(body), 0j, moment)
+            for node, force in pull.nodes.items():
+                yield self._acting(kind, name, self._holder(node), self._node(node), force)
+            for slide, push in pull.slides.items():
+                yield from self._along(kind, name, slide, push)
+
+    def _along(self, kind: str, name: str, slide: int, push: Value) -> Iterator[Acting]:
+        """A push along a slide: on what slides, and against it on the guide; none where both are one link."""
+        graph = self.configuration.graph
+        joint = graph.slides[slide]
+        contact = next(contact for contact in self.question.joints.contacts if contact.joint == joint)
+        (number,) = (k for k, edge in enumerate(graph.edges) if edge.slide == slide)
+        sides = _sides(contact)
+        for side, sign in zip(sides, (1, -1), strict=True) if sides[0] != sides[1] else ():
+            force = sign * push * self.linear.direction(number)
+            acting = self._acting(kind, name, side, self._node(contact.node), force, reaction=sign < 0)
+            yield replace(acting, joint=joint)
+
+    def _holder(self, node: int) -> str:
+        """What bears a force at a node: the pin of several links, the one link there, or the ground."""
+        pin = f"{PIN}{self.configuration.graph.nodes[node]}"
+        joints = self.question.joints
+        if any(pin in (contact.on, contact.by) for contact in joints.contacts):
+            return pin
+        return _link(joints.sole.get(node, GROUND))
+
+    def _node(self, node: int) -> Vector:
+        return self.configuration.nodes[node]
 
     def _base(self, link: str) -> Vector:
         bases = self.configuration.graph.bases
@@ -186,6 +228,11 @@ def _link(body: str) -> str:
 
 
 def _sides(contact: Contact) -> tuple[str, str]:
-    """The links on both sides of a joint; '' is the pin of several."""
-    one, other = ("" if body.startswith(PIN) else _link(body) for body in (contact.on, contact.by))
+    """The links, or the pin of several, on both sides of a joint."""
+    one, other = (body if body.startswith(PIN) else _link(body) for body in (contact.on, contact.by))
     return one, other
+
+
+def body_in_words(link: str) -> str:
+    """A link by its name; the pin of several as one."""
+    return link.replace(PIN, "pin ", 1) if link.startswith(PIN) else link

@@ -44,6 +44,8 @@ from mechdesign.study.schema.poses import MotionSection
 
 # Parts of what a joint bears, as columns of its own.
 PARTS = ("fx", "fy", "moment", "magnitude", "angle", "normal")
+# Before the name of a coupling that no wheels make: its effort, which pictures show.
+COUPLING = "effort of"
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +181,12 @@ class ForceQuestion:
     @cached_property
     def turned(self) -> list[tuple[str, str]]:
         """Couplings that no wheels make, a controller or a hidden gear, with each link that they turn."""
-        drawn, couplings = self.study.mechanism.sketch_configuration, self._without_wheels
+        drawn, couplings = self.study.mechanism.sketch_configuration, self.without_wheels
         return [(name, body) for name, (_, gap) in couplings.items() for body in pulled(drawn, gap, 1.0).bodies
                 if body != GROUND]  # fmt: skip
 
     @cached_property
-    def _without_wheels(self) -> dict[str, tuple[int, Coordinate]]:
+    def without_wheels(self) -> dict[str, tuple[int, Coordinate]]:
         """By such a coupling its number and its gap."""
         wheels = {pair.coupling for pair in self.study.mechanism.engaged}
         names = zip(self.study.mechanism.description.couplings, self.joints.couplings, strict=True)
@@ -192,9 +194,10 @@ class ForceQuestion:
 
     def _turned(self, configuration: Configuration, held: Balance) -> dict[str, Value]:
         """Moments of these couplings, and no forces."""
-        columns: dict[str, Value] = {}
+        efforts = {} if self.subset is not None else self.without_wheels
+        columns: dict[str, Value] = {f"{COUPLING} {name}": held.couplings[k] for name, (k, _) in efforts.items()}
         pulling = {name for name, body in self.turned if self._counts(_moment_on(name, body))}
-        for name, (number, gap) in self._without_wheels.items() if pulling else ():
+        for name, (number, gap) in self.without_wheels.items() if pulling else ():
             for body, moment in pulled(configuration, gap, held.couplings[number]).bodies.items():
                 columns |= self._parts(_moment_on(name, body), Reaction(0.0, moment, np.nan))
         return columns

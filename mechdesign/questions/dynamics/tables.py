@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.ground.numerics.rounding import STILL, cleared, larger
+from mechdesign.ground.numerics.rounding import STILL, cleared, larger, unchanging
 from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.motion.along import of_swept
@@ -23,7 +23,7 @@ from mechdesign.questions.kinematics.extremes import gaps_in_words
 from mechdesign.questions.kinematics.tables import pose_columns
 
 # Places among the numbers of an extreme that are values.
-VALUES = [0, 2, 4, 6, 7]
+VALUES = [0, 2, 4, 6, 7, 8]
 
 
 def question_of(motion: PoseValues) -> ForceQuestion:
@@ -75,7 +75,8 @@ def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Coll
     statics, swept = [static for static in question_of(motion).statics if static.name in names], poses.swept
     at = poses.abscissa.reshape(poses.designs, -1)
     valid = motion.valid.reshape(poses.designs, -1)
-    numbers = np.full((len(statics), poses.designs, 8), np.nan)
+    numbers = np.full((len(statics), poses.designs, 9), np.nan)
+    bearings = question_of(motion).forces
     for k, static in enumerate(statics):
         values = motion.arrays[static.name].reshape(poses.designs, -1)
         numbers[k] = _of_poses(np.where(valid, values, np.nan), at)
@@ -83,16 +84,18 @@ def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Coll
             numbers[k] = np.where(
                 along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k], static.size)
             )
+        numbers[k][:, 8] = numbers[k][:, 8] if static.name in bearings else np.nan
         peak = numbers[k][:, [4]]
         values = cleared(numbers[k][:, VALUES], STILL * np.fmax(np.where(np.isfinite(peak), peak, 0.0), static.size))
         numbers[k][:, VALUES] = values
-        # What is rounding everywhere has no place.
-        numbers[k][(values[:, :3] == 0).all(axis=1), 1:6:2] = np.nan
-    low, low_at, high, high_at, peak, peak_at, mean, rms = numbers.transpose(2, 1, 0).reshape(8, -1)
+        # What is the same everywhere has no place.
+        numbers[k][unchanging(values[:, 0], values[:, 1], static.size), 1:6:2] = np.nan
+    low, low_at, high, high_at, peak, peak_at, mean, rms, cubic = numbers.transpose(2, 1, 0).reshape(9, -1)
     names, units = ([getattr(static, key) for static in statics] * poses.designs for key in ("name", "unit"))
     columns = EXTREMES.columns(
         of_swept(question.motion, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
-        max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, unit=np.array(units, dtype=str),
+        max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, cubic_mean=cubic,
+        unit=np.array(units, dtype=str),
     )  # fmt: skip
     lacking = np.array([gaps_in_words(motion, along, static.name) for static in statics]).reshape(len(statics), -1)
     table = EXTREMES.table(columns, **over(along, [static.name for static in statics]))
@@ -100,13 +103,14 @@ def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Coll
 
 
 def _of_poses(values: Floats, at: Floats) -> Floats:
-    """Numbers of each design's valid poses, shape (designs, 8)."""
+    """Numbers of each design's valid poses, shape (designs, 9)."""
     lanes, finite = np.arange(len(values)), np.isfinite(values)
     low, high, peak = (np.where(finite, judged, -np.inf).argmax(axis=1) for judged in (-values, values, np.abs(values)))
     count, safe = np.maximum(finite.sum(axis=1), 1), np.where(finite, values, 0.0)
     numbers = [
         values[lanes, low], at[lanes, low], values[lanes, high], at[lanes, high], np.abs(values[lanes, peak]),
         at[lanes, peak], safe.sum(axis=1) / count, np.sqrt((safe**2).sum(axis=1) / count),
+        np.cbrt((np.abs(safe) ** 3).sum(axis=1) / count),
     ]  # fmt: skip
     some = np.asarray(finite.any(axis=1))
     return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
@@ -118,12 +122,9 @@ def _between(along: KinematicAlong, name: str, poses: Floats, size: float) -> Fl
     still = STILL * np.fmax(np.nan_to_num(poses[:, 4]), size)
     peaks = along.functions.extremes([name], still[None])
     (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
-    constant = np.logical_not(high - low > still)
     upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
     peak, peak_at = np.where(upper, high, -low), np.where(upper, high_at, low_at)
     ends = [low, along.shown(lines, low_at), high, along.shown(lines, high_at), peak, along.shown(lines, peak_at)]
-    square = along.mean(name, 2)
-    whole = np.stack([*ends, along.mean(name), np.sqrt(np.maximum(square, 0.0))], axis=1)
-    # What stands still keeps the place of the first pose.
-    whole[constant, 1:6:2] = poses[constant, 1:6:2]
+    square, cube = (np.maximum(along.mean(name, power), 0.0) for power in (2, 3))
+    whole = np.stack([*ends, along.mean(name), np.sqrt(square), np.cbrt(cube)], axis=1)
     return np.where(np.isnan(low)[:, None], poses, whole)

@@ -19,7 +19,7 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
      "sigma_min/sigma_max"),
     ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle between "
      "two links that meet"),
-    ("<drive>_effort", "drive effort that balances the loads", "force or moment",
+    ("<drive>_effort", "static drive effort, which balances the loads without weights and inertia", "force or moment",
      "-sum over the loads of F d(place)/d(drive)"), *EFFICIENCY[1:],
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
      "as the input's length over the output's", "rate of the input/rate of the output"),
@@ -83,10 +83,10 @@ MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
 KEY_NUMBERS = (
+    KeyNumber(MOTION, "<drive>_effort", "largest static effort of {name}", "size"),
+    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
     KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
-    KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(MOTION, "<coupling>_curvature_radius", "smallest {meaning}", "least"),
-    KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
-    KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
+    KeyNumber(MOTION, "conditioning", "smallest {name} (0 singular, 1 best)", "smallest"),
 )  # fmt: skip

@@ -89,8 +89,8 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
         for k, new in enumerate((peaks.value, shown)):
             ends[:, k, followed] = np.where(better, new, ends[:, k, followed])
     values = cleared(ends[:, 0], STILL * np.maximum(finite, size))
-    # What is rounding everywhere has no place.
-    ends = np.stack([values, np.where((values == 0).all(axis=0), np.nan, ends[:, 1])], axis=1)
+    # What is the same everywhere has no place.
+    ends = np.stack([values, np.where(moving & (values != 0).any(axis=0), ends[:, 1], np.nan)], axis=1)
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":

@@ -79,7 +79,10 @@ def loops_table(
                        excess=[loop.excess for loop in every]),
     ]  # fmt: skip
     both = _at_poses(question.motion, loops) if along is None else _between(along, len(loops))
+    # What is the same everywhere has no place.
+    moves = both[1][0] - both[0][0] > SAME_ANGLE
     for (values, places), end in zip(both, ("min", "max"), strict=True):
+        places = np.where(moves, places, np.nan)
         columns += LOOPS.columns(words, **{f"transmission_{end}": values.T.ravel() / study.units.angle_factor})
         columns += LOOPS.columns(words, **{f"transmission_{end}_at": places.T.ravel()})
     return LOOPS.table(columns, **over(along, ()))

@@ -74,7 +74,11 @@ def motion_columns(motion: PoseValues) -> list[Column]:
     words = {"outputs": rows, "as its outputs over the drives, multiplied": area}
     names = ("det_J", "inverse_condition", "conditioning")
     columns += MOTION.columns(words, **{name: arrays[name] for name in names if name in arrays})
-    columns += [MOTION[s.kind].column(arrays[s.name], s.unit, **s.words) for s in question.statics]
+    rubs = "though its joints have some" if question.study.mechanism.description.friction else ""
+    for static in question.statics:
+        column = MOTION[static.kind].column(arrays[static.name], static.unit, **static.words)
+        lossless = static.kind == "<output>_advantage"
+        columns.append(replace(column, meaning=f"{column.meaning} {rubs}".rstrip()) if lossless else column)
     gap = MOTION["<a>.<b>.clearance"]
     columns += [gap.column(arrays[name], label("length"), a=pair.one.name, b=pair.other.name)
                 for name, pair in question.pairs.items()]  # fmt: skip

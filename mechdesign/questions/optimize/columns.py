@@ -47,8 +47,8 @@ NEAREST = TableKind.of("nearest", "conditions of the design that is nearest to a
     ("missing", "by how much the bound is missed, in `unit`; 0 where it is met"),
     ("unit", "unit of the three columns before"))  # fmt: skip
 KEY_NUMBERS = (
-    KeyNumber(OPTIMUM, "<variable>", "best {name}", "first"),
     KeyNumber(OPTIMUM, "", "{name} of the best", "first"),
+    KeyNumber(OPTIMUM, "<variable>", "best {name}", "first"),
 )  # fmt: skip
 # Studies that it writes, and copies of the files that they read.
 STUDIES = "optimum.yaml optimum_*.yaml knee.yaml nearest.yaml *input_*"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mechdesign.ground.columns import ColumnKind
 from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import GIVEN, TIMED, VALID
+from mechdesign.questions.reliability.schema.methods import METHODS
 
 METHOD = ColumnKind("method", "how it was computed")
 OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")
@@ -100,6 +101,7 @@ CONFIRMATION = TableKind.of("confirmation", "reliability, or Cpk, of the allocat
     ("met", "1 where the interval holds what is asked, or all of it is above"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(RELIABILITY, "failure", "failure probability, {method}", "largest", by=("method",),
+          rank=lambda method: METHODS[method].accuracy,
           bounds=("failure_low", "failure_high"), interval="99.7 % between {low} and {high}"),
     KeyNumber(MOMENTS, "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
     KeyNumber(CAPABILITY, "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),

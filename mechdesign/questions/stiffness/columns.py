@@ -53,6 +53,6 @@ FORCES = TableKind.of("forces", "what the joints bear under the study's loads",
     ("mz", "moment likewise, about the joint's point", "moment"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(STIFFNESS, "k_min", "smallest stiffness", "smallest"),
-    KeyNumber(STIFFNESS, "k_max", "largest stiffness", "largest"),
     KeyNumber(DEFLECTIONS, "dx", "largest deflection {name}", "size"),
+    KeyNumber(STIFFNESS, "k_max", "largest stiffness", "largest"),
 )  # fmt: skip

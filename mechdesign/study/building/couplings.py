@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from dataclasses import replace
 from decimal import Decimal
 
@@ -13,7 +14,7 @@ from mechdesign.ground.expressions import Expression
 from mechdesign.ground.functions import Tabulated
 from mechdesign.ground.notation import Step
 from mechdesign.mechanism.coordinates import coupled
-from mechdesign.mechanism.elements.couplings import Cam, Coupling, play
+from mechdesign.mechanism.elements.couplings import STEPS, Cam, Coupling, play
 from mechdesign.mechanism.elements.declared import Quantity
 from mechdesign.mechanism.elements.joints import LinkLine
 from mechdesign.mechanism.geometry import Geometry
@@ -22,6 +23,7 @@ from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
+from mechdesign.study.building.cam_laws import law_of, span_of
 from mechdesign.study.building.elements import Written
 from mechdesign.study.building.joints import WrongJoint, check_named, line_of, refuse
 from mechdesign.study.text.csv_files import read_table
@@ -33,6 +35,8 @@ FEWEST_ROWS = 4
 # A table spans a turn where it misses one by less than this in its last decimal, and by less than this part of a turn:
 # 2 pi is written 6.283, or cut off as 6.2831.
 LAST_DIGIT, LIKE_A_TURN = 0.9, 1e-3
+# A step divides a range that it misses by this part of it.
+ROUNDING = 1e-9
 
 
 def build_couplings(builder: Builder) -> dict[str, Coupling]:
@@ -74,7 +78,7 @@ def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, fu
     """The cam of a coupling; `sets` is the coordinate that follows."""
     section, given, path = builder.section, coupling.cam, ("couplings", name, "cam")
     check_named(builder, "link", [given.link], (*path, "link"))
-    followed = sorted(function.names - builder.parameter_values.keys() - {f"{name}.ratio", f"{name}.phase"})
+    followed = sorted(function.names & section.coordinates.keys())
     if len(followed) != 1:
         refuse(builder, path, f"a cam follows one coordinate, not {', '.join(followed) or 'none'}")
     through = given.flat or (given.roller or "",)
@@ -91,14 +95,20 @@ def _cam(builder: Builder, name: str, coupling: Written[Coupling], sets: str, fu
         face, radius = line_of(builder, through, given.direction, link, key), None
     span, kind = given.range, section.coordinates[followed[0]]
     builder.reporter.kind((*ROOT, *path, "range"), kind)
+    builder.reporter.kind((*ROOT, *path, "step"), kind)
+    if span is None and coupling.law is not None:
+        span = span_of(builder, ("couplings", name, "law"), coupling, followed[0], profile=True)
     if span is None:
         table = function.table
         if table is None and kind != "angle":
             refuse(builder, path, f"the profile needs the 'range' of {followed[0]!r}, [first, last]")
         span = (0.0, 2 * np.pi / builder.units.angle_factor) if table is None else (table.rows[0][0], table.rows[-1][0])
+    steps = given.steps if given.step is None else math.ceil((span[1] - span[0]) / given.step * (1 - ROUNDING))
+    if not STEPS[0] <= steps <= STEPS[1]:
+        refuse(builder, (*path, "step"), f"makes {steps} steps of the range; {STEPS[0]} to {STEPS[1]} are possible")
     factor = builder.units.angle_factor if kind == "angle" else 1.0
     span = span[0] * factor, span[1] * factor
-    return Cam(name, given.link, radius=radius, side=given.side, range=span, steps=given.steps, face=face)
+    return Cam(name, given.link, radius=radius, side=given.side, range=span, steps=steps, face=face)
 
 
 def _moved(section: models.MechanismSection, name: str) -> tuple[str, ...]:
@@ -128,6 +138,10 @@ def _function(
     if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
         return None
     of = section.coordinate_named(given.of)
+    if given.law is not None:
+        if given.cam is None:
+            span_of(builder, (*path, "law"), given, of, profile=False)
+        return law_of(builder, name, given.law, of, kind)
     if given.table is not None:
         table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
         return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)

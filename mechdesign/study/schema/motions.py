@@ -9,8 +9,9 @@ from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validat
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from mechdesign.ground.motion_laws import LAWS
+from mechdesign.mechanism.elements.segments import segment_faults, segments_faults
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.motion_laws import LAWS
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.inputs import file_of
@@ -41,11 +42,7 @@ class Segment(fields.Model):
     """How long the coordinate stands still. Example: 0.1"""
 
     def faults(self) -> Iterator[str]:
-        if self.to is not None and self.time is None:
-            yield f"the move to {self.to:g} needs a time: {{to: {self.to:g}, time: 0.3}}"
-        beside = [key for key in ("time", "law") if key in self.model_fields_set]
-        if self.dwell is not None and beside:
-            yield f"a dwell has no {beside[0]!r}: write {{dwell: {self.dwell:g}}}"
+        return segment_faults(self, "time", "a time", 0.3)
 
     @property
     def duration(self) -> float:
@@ -89,17 +86,7 @@ class CourseText(fields.Model):
         return {"segments" if isinstance(raw, list) else "file" if file_of(raw) is not None else "held": raw}
 
     def faults(self) -> Iterator[str]:
-        if self.segments is None:
-            return
-        for number, segment in enumerate(self.segments[1:], start=2):
-            if segment.from_ is not None:
-                yield f"segment {number} begins where the one before it ends: 'from' is for the first one"
-        moves = [segment.to for segment in self.segments if segment.to is not None]
-        if self.segments[0].from_ is None and len(moves) < 2:
-            yield (
-                "without 'from' a motion is a cycle that begins where it ends, and so needs two moves or more, "
-                f"[{{to: 90, time: 0.3}}, {{to: 0, time: 0.4}}]; else say where it begins, {_RIGHT}"
-            )
+        return segments_faults(self.segments or (), "{to: 90, time: 0.3}", "{to: 0, time: 0.4}")
 
     def checked(self, checker: Checker, name: str, path: KeyPath) -> None:
         """Check the name of the coordinate, and the units of its values."""

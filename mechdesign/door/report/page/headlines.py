@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.drawing.style import printed, raised
 from mechdesign.ground.columns import VARIED, Column
 from mechdesign.ground.errors import counted
+from mechdesign.ground.numerics.rounding import STILL, cleared, unchanging
 from mechdesign.ground.results import KeyNumber, Result, Table
 from mechdesign.ground.rows import choose, unit_of
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
@@ -34,8 +36,6 @@ _RATES_AND_FORCES = [
 ]  # fmt: skip
 # Kinds of columns that say which pose a row is of.
 _POSE = (TIMED, DRIVE, GIVEN, HELD)
-# A number below this part of the others in its unit is zero up to rounding.
-_NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
 # Rows of key numbers that are told by absolute values, and by the smallest.
@@ -158,7 +158,7 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
     valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
     finite = np.flatnonzero(np.isfinite(values) & valid)
-    if rule.row == "size" and values[finite].max(initial=0.0) <= _NOISE * _scale(table, column.unit, finite):
+    if rule.row == "size" and values[finite].max(initial=0.0) <= STILL * _scale(table, column.unit, finite):
         return
     if rule.row in ("first", "each"):
         rows = finite[: 1 if rule.row == "first" else None].tolist()
@@ -167,14 +167,17 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
         best: dict[tuple[Any, ...], int] = {}
         for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
-        rows = [best[group] for group in dict.fromkeys(groups) if group in best]
+        order = [group for group in dict.fromkeys(groups) if group in best]
+        if (rank := rule.rank) is not None:
+            order.sort(key=lambda group: -rank(group[0]))
+        rows = [best[group] for group in order]
     between = _between(rule, result, column)
     for row in [between[0]] if between and rows else rows:
         words = {other.name: str(other.values[row]) for other in table.columns if not other.numeric}
         if rule.table is EXTREMES and result.tables["motion"].column(words["output"]).kind in _RATES_AND_FORCES:
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
-        name = column.name.removesuffix("_effort").removesuffix("_mean")
+        name = re.sub("_(effort|power|mean)$", "", column.name)
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[bound][row]) for bound in rule.bounds or (column.name, column.name))
         if rule.table is EXTREMES and low == high:
@@ -182,14 +185,17 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            own = row, values[row], _Pose() if rule.row in ("first", "each") else _pose(table, row)
+            alike = [other for other in finite.tolist() if groups[other] == groups[row]]
+            constant = bool(unchanging(values[alike].min(), values[alike].max()))
+            own = row, values[row], _Pose() if rule.row in ("first", "each") or constant else _pose(table, row)
             _, value, pose = between or own
             at = f"at {pose.words}" if pose.words else ""
             notes += [at] * bool(at)
             if rule.several and len(finite) > 1:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
-            said = unit or rule.table is EXTREMES or column.meaning in label
+            # What a label calls by the words of the field needs no other words.
+            said = unit or rule.table is EXTREMES or "{name}" not in rule.label
             meaning = "" if said else column.meaning
             yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.coordinates, pose.place, meaning)
 
@@ -205,12 +211,21 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
     sign, absolute = -1 if rule.row in _LOWEST else 1, rule.row in _ABSOLUTE
     courses = [*choose(result, f"{rule.table.name}.{column.name}", {}).courses.values()]
     ends = [tuple(float(end[0]) for end in course.worst(sign, absolute=absolute)) for course in courses]
-    present = [row for row, (_, place) in enumerate(ends) if np.isfinite(place)]
+    present = [row for row, (value, _) in enumerate(ends) if np.isfinite(value)]
     if not present:
         return None
     row = max(present, key=lambda number: sign * ends[number][0])
     value, at = ends[row]
-    return row, value, _Pose(courses[row].shown(at), courses[row].pose(at), at)
+    if np.isnan(at):
+        return row, value, _Pose()
+    poses, pose = courses[row].along.curve.poses, courses[row].pose(at)
+    units = {column.name: column.unit for other in result.tables.values() for column in other.columns}
+    # A place that should be zero is rounding beside the others of its coordinate.
+    coordinates = [
+        Column(name, cleared(np.array([pose[name]]), STILL * np.nanmax(np.abs(poses.named[name]))), units.get(name, ""))
+        for name in ([*pose] if poses.swept is None else [poses.swept])
+    ]
+    return row, value, _Pose(_in_words(coordinates, 0), pose, at)
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
@@ -225,6 +240,4 @@ def _pose(table: Table, row: int) -> _Pose:
     leading = [column for column in table.columns if column.kind in _POSE]
     if all(len(np.unique(column.values)) == 1 for column in leading):
         return _Pose()
-    values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)
-    words = ", ".join(value.strip().replace(" ", _TOGETHER) for value in values)
-    return _Pose(words, {column.name: float(column.values[row]) for column in leading})
+    return _Pose(_in_words(leading, row), {column.name: float(column.values[row]) for column in leading})

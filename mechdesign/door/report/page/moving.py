@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import tostring
 
@@ -11,9 +13,10 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from mechdesign.door.report.cases import best_of
 from mechdesign.door.report.page.axes import box
 from mechdesign.door.report.page.frames import frames, largest
-from mechdesign.door.report.page.linkage import Canvas, Sketcher
+from mechdesign.door.report.page.linkage import Canvas, Sketcher, add, dashed
 from mechdesign.door.report.page.roaming import roaming
 from mechdesign.door.report.page.tracks import (
     PLACES,
@@ -27,30 +30,38 @@ from mechdesign.door.report.page.tracks import (
     places,
 )
 from mechdesign.door.report.page.vector import described, inline
+from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
 from mechdesign.drawing.layout import draw
+from mechdesign.drawing.overlay import COLOR, DASHES
 from mechdesign.drawing.panels import abscissa, round_down
 from mechdesign.drawing.scene import Scene, Still
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Reason
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
 from mechdesign.questions.kinematics.figures.curves import motion_curves
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.study import Study
+from mechdesign.study.schema.loads import EFFICIENCIES
 from mechdesign.study.schema.poses import MotionSection
 
 _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
 # Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
+_DASHED = 1.8  # width of a line whose dashes the mechanism before has
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
 _ARROW, _SHARE = 90.0, 0.3  # length of the longest arrow, and the part of a low drawing's height that it has at most
 # What vectors are called, and the colours of their arrows.
@@ -61,6 +72,8 @@ _ARROWS = {
     "inertia": ("Inertia", LOOKS["inertia"].color),
     "load": ("Loads", LOOKS["load"].color),
     "spring": ("Springs", LOOKS["spring"].color),
+    "effort": ("Drives", LOOKS["effort"].color),
+    "coupling": ("Couplings", LOOKS["coupling"].color),
     "shaking": ("Shaking force", style.PURPLE),
 }
 _WHY = {
@@ -79,7 +92,8 @@ def moving(
 ) -> MovingPicture | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
-    Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
+    Of an optimisation it is that of the best design, of a sweep that of the best case. Beside a motion, and in its
+    curves, stands that of the study before.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
     linkage with its paths, without names, ruler and curves.
     """
@@ -90,10 +104,30 @@ def moving(
         if judged is None:
             return None
         study, result = best.study, judged
+    title = ""
+    if isinstance(result.drawn, DrawnCases):
+        if (case := _best_case(result.drawn, result.main)) is None:
+            return None
+        title, study, result = case
     with style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
-            return _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
+            part = _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
+            return part and part.titled(title)
         return roaming(study, result, command) if "local" in result.tables else None
+
+
+def _best_case(drawn: DrawnCases, table: Table) -> tuple[str, Study, Result] | None:
+    """The best case of a sweep in words, its study and how that moves, or where it works; None without any."""
+    if (best := best_of(table)) is None:
+        return None
+    study = drawn.case(best.case)
+    for ask in (kinematics, *([workspace] if study.workspace is not None else [])):
+        # A study of poses without a motion, or of several drives, does not say how it moves.
+        with suppress(MechdesignError):
+            result = ask(study)
+            if not isinstance(result.drawn, DrawnPoses) or result.drawn.shown.poses.followed:
+                return best.words, study, result
+    return None
 
 
 def _motion(
@@ -116,7 +150,8 @@ def _motion(
     scenes = Scene(sweep.mechanism, sweep.configuration, whole.scene.travel).some(few.tolist())
     # Guides reach farther than points.
     ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
-    sheet = Canvas.around(np.append(whole.extent, ends))
+    earlier = None if before is None else _earlier(DrawnMotion.of(before.result), sweep)
+    sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
     numbers = ShownNumbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
@@ -125,6 +160,9 @@ def _motion(
     data |= {"gaps": gaps(sweep), **_time(study, section, sweep, table, whole.returns)}
     data |= {"arrows": _arrows(drawn, motion, sweep, sheet), "rows": deltas(sweep.poses.numbers[sweep.rows], ROWS)}
     data["course"] = _course(whole.poses)
+    if before is not None and earlier is not None:
+        data["before"] = {"title": f"Before: {before.names[1]}"}
+        data["before"] |= places(sheet, earlier.configuration, earlier.mechanism.description.links)
     data["given"] = []
     for column in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(column).unit
@@ -147,15 +185,49 @@ def _motion(
         beside = inline(figure, name, described(figure))
         data["dots"] = _dots(figure, table, numbers)
     data["numbers"] = numbers.tracks
-    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), plain=plain)
+    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), earlier, plain=plain)
     replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
     return MovingPicture(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
-def _drawing(study: Study, whole: Sweep, sheet: Canvas, scenes: Sequence[Still], words: str, *, plain: bool) -> str:
-    """The first of some valid poses, with the paths of the points."""
+def _earlier(drawn: DrawnMotion, sweep: Sweep) -> Sweep | None:
+    """The motion before where what is given is as at the poses of a sweep; None where it is not known between poses.
+
+    Of one coordinate that goes one way it is its value, else the part of the way.
+    """
+    if drawn.along is None or drawn.along.curve.spent.any():
+        return None
+    poses, rows = drawn.shown.poses, sweep.poses.numbers[sweep.rows]
+    begin, end = 0.0, float(poses.end)
+    places = rows * end / sweep.poses.end
+    if len(sweep.poses.values) == 1:
+        ((name, values),) = sweep.poses.values.items()
+        then, numbers = poses.values[name], poses.numbers
+        if (steps := np.diff(then)).all() and (np.sign(steps) == np.sign(steps[0])).all():
+            order = np.argsort(then)
+            places = np.interp(values[sweep.rows], then[order], numbers[order], left=np.nan, right=np.nan)
+    gone = ~((places >= begin) & (places <= end))
+    there = drawn.along.curve.solve(np.zeros(len(places), dtype=np.intp), np.where(gone, begin, places))
+    reason = np.where(gone, np.int8(Reason.NO_VALUE), there.configuration.reason)
+    configuration = replace(there.configuration, reason=reason)
+    earlier = Sweep(drawn.shown.study, there.poses, there.rows, configuration)
+    return earlier if len(earlier.valid) else None
+
+
+def _drawing(
+    study: Study, whole: Sweep, sheet: Canvas, scenes: Sequence[Still], words: str, earlier: Sweep | None, *,
+    plain: bool,
+) -> str:  # fmt: skip
+    """The first of some valid poses, with the paths of the points, over the mechanism before."""
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
+    if earlier is not None and earlier.first is not None:
+        under = add(root, "g", **{"class": "moving-part moving-before"}, opacity=0.6, stroke_linecap="butt")
+        dashed(under, DASHES, _DASHED)
+        before = Sketcher(under, sheet, earlier.first)
+        for look in path_looks(earlier):
+            before.trace(look.path, COLOR, look.width, look.share)
+        before.draw()
     sketcher = Sketcher(root, sheet, scene)
     for look in path_looks(whole):
         sketcher.trace(look.path, look.color, look.width, look.share)
@@ -190,7 +262,10 @@ def _rows(table: Table, numbers: ShownNumbers) -> tuple[list[str], list[tuple[st
     rows = []
     for name in dict.fromkeys(names):
         cells = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
-        rows.append((name, [None if column is None else numbers.cell(column) for column in cells]))
+        # Those of dynamics have the same names.
+        static = table.name == MOTION.name and (name.endswith("_effort") or name in EFFICIENCIES)
+        shown = [None if column is None else numbers.cell(column) for column in cells]
+        rows.append((f"{name} (static)" if static else name, shown))
     return ["value", *kinds[1:]], rows
 
 

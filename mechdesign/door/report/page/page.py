@@ -151,10 +151,16 @@ def _together(moving: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str,
     return parts
 
 
-def _mover(moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None) -> str:
-    """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one."""
+def _mover(
+    moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None, words: str = ""
+) -> str:
+    """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one.
+
+    `words` say where the pose is: of the cases of a sweep one moves.
+    """
     for name in dict.fromkeys((command, "kinematics")):
-        keys = moving[name]["data"].get("keys", ()) if name in moving else ()
+        data = moving[name]["data"] if name in moving else {}
+        keys = data.get("keys", ()) if pose is None or words.startswith(data.get("title", "")) else ()
         if any(pose is None or {coordinate for coordinate, *_ in key} <= pose.keys() for key in keys):
             return name
     return ""
@@ -229,7 +235,7 @@ def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] =
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
     styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
-    script = "".join(_text(f"{part}.js") for part in ("page", *parts))
+    script = "".join(_text(f"{part}.js") for part in (*parts, "page"))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
     policy += [f"script-src {_hash(script)}"]
     text = environment.get_template(template).render(

@@ -57,7 +57,9 @@ def pdf(page: Path) -> bytes:
     free = ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     with TemporaryDirectory(prefix="mechdesign-") as folder:
         printed = Path(folder) / "report.pdf"
-        options = ["--headless", "--disable-gpu", *free, f"--user-data-dir={folder}", "--no-pdf-header-footer"]
+        # A page that moves is printed as it opens.
+        still = ["--force-prefers-reduced-motion", "--no-pdf-header-footer"]
+        options = ["--headless", "--disable-gpu", *free, f"--user-data-dir={folder}", *still]
         command = [program, *options, f"--print-to-pdf={printed}", page.resolve().as_uri()]
         try:
             done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)

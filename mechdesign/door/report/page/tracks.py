@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,11 @@ class MovingPicture:
     meanings: Mapping[str, str]  # of these rows, where no unit tells what they are
     replaces: Sequence[str] = ()  # pictures of the question that show the same
     maps: Sequence[tuple[str, Sequence[Map]]] = ()  # maps to choose from, by what the orientation is
+
+    def titled(self, title: str) -> MovingPicture:
+        """The same with words before those of each pose, such as which case it is."""
+        words = f"{title}: {self.words}"
+        return replace(self, words=words, data={**self.data, "title": title}) if title else self
 
 
 class ShownNumbers:

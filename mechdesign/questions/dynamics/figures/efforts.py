@@ -59,6 +59,8 @@ def _panel(view: DynamicsView, name: str, over: Along) -> Panel:
         usual = _BEYOND * float(np.nanmedian(np.abs(values)))
         ends = max(np.nanmin(values, initial=0.0), -usual), min(np.nanmax(values, initial=0.0), usual)
         return Panel(marks, over.axis, Axis(kind, unit, ends=ends), f"{drive}: without bound")
+    if np.isnan(at):
+        return Panel(marks, over.axis, Axis(kind, unit), f"{drive}: {quantity(high, unit)} everywhere")
     place, value = at if over.name else at + 1, high if high >= -low else low
     mean = 0.0 if abs(mean) < NOTHING * size else mean
     marks.append(Dots([place], [value], label="peak", look=PEAK))

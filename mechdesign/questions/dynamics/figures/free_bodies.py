@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,19 +17,22 @@ from mechdesign.drawing.drawing import draw, write
 from mechdesign.drawing.framing import extent, fitting_windows
 from mechdesign.drawing.joints import NOTHING
 from mechdesign.drawing.labels import Label
-from mechdesign.drawing.marks import Late, Panel, PanelMark, Picture, Trace
+from mechdesign.drawing.marks import LateMark, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.panels import quantity, round_down
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Still, pose
 from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut
+from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.joint_contacts import PIN
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
+from mechdesign.questions.dynamics.free_bodies import Action, actions_on, body_in_words, mass_centers
 from mechdesign.questions.poses import pose_in_words
 
 MAX_LINKS = 11
 LEAST = 5e-3  # part of the largest force, and of the largest moment, below which nothing is drawn
 _LONGEST = 45.0  # arrow, points
+_OF_MASS = ("weight", "inertia")
 _ARC = 19.0  # radius of a moment's arrow, points
 _NOWHERE = np.empty(0, dtype=complex)
 
@@ -49,6 +53,7 @@ LOOKS = {
     "spring": _Look("spring", shapes.SPRING_COLOR, (0, (4, 1, 1, 1))),
     "effort": _Look("drive", style.PURPLE),
     "coupling": _Look("coupling", style.INK),
+    "foundation": _Look("foundation", style.FAINT),
 }
 
 
@@ -56,74 +61,91 @@ LOOKS = {
 def free_bodies_picture(view: DynamicsView) -> Picture | None:
     """The mechanism with what acts on it from outside, and each link with all that acts on it; None without forces."""
     drawn, mechanism = view.drawn, view.study.mechanism
-    index = _worst(view)
+    index, everywhere = _worst(view)
     scene = None if index is None else pose(mechanism, drawn.shown.configuration, index)
     if index is None or scene is None:
         return None
     acting = [own.at(0) for own in actions_on(drawn.motion, drawn.shown.take(np.array([index])))]
     largest = max(action.size for action in acting)
-    turning = max(abs(action.moment) for action in acting)
-    least = max(LEAST * turning, NOTHING * largest * mechanism.size)
-    acting = [action for action in acting if action.size > LEAST * largest or abs(action.moment) > least]
-    moving = [name for name in mechanism.description.links if name != GROUND]
-    sizes = {name: max((a.size for a in acting if a.link == name), default=0.0) for name in moving}
-    bearing = sorted(filter(sizes.get, moving), key=lambda name: -sizes[name])
+    rounding = NOTHING * largest, NOTHING * largest * mechanism.size
+    bodies = {name: _telling([action for action in acting if action.link == name], rounding)
+              for name in dict.fromkeys([*mechanism.description.links, *(action.link for action in acting)])
+              if _alone_drawn(name, acting)}  # fmt: skip
+    bodies = {name: mine for name, mine in bodies.items() if mine}
     # A page of paper holds the mechanism and so many links below it.
-    shown = sorted(bearing[: fitting_windows(MAX_LINKS + 1) - 1], key=moving.index)
+    bearing = sorted(bodies, key=lambda name: -max(action.size for action in bodies[name]))
+    held = bearing[: fitting_windows(MAX_LINKS + 1) - 1]
+    shown = {name: mine for name, mine in bodies.items() if name in held}
     unit, row = view.study.units.label("force"), int(drawn.shown.rows[index])
     where = pose_in_words(view.study, view.poses, row, 4)
-    words = f"Forces on the links [{style.printed(unit)}] at {where}, where a joint bears most"
-    words += f"; of {len(bearing)} links those {len(shown)} with the largest forces" * (len(shown) < len(bearing))
+    words = f"Forces on the links [{style.printed(unit)}] at {where}" + ", where a joint bears most" * (not everywhere)
+    words += f"; of {len(bodies)} links those {len(shown)} with the largest forces" * (len(shown) < len(bodies))
     whole, centers = shapes.mechanism_shapes(scene), mass_centers(view.study, drawn.shown.configuration, index)
-    outside = [action for action in acting if action.link != GROUND and _outside(action, acting)]
+    outside = _telling([action for action in acting if action.link != GROUND and _outside(action, acting)], rounding)
     reached = np.concatenate([[*scene.points.values()], *(outline.places for outline in scene.outlines)])
     parts = [("Mechanism", whole, reached, outside, [*centers.values()])]
-    for name in shown:
-        body, mine = _alone(scene, name, whole), [action for action in acting if action.link == name]
+    for name, mine in shown.items():
+        body, points = _alone(scene, name, whole), _points(scene, name)
         outlines = [place for shape in body if isinstance(shape, Line) for place in shape.places]
-        own = [*(scene.points[point] for point in scene.link_points(name)), *outlines, *(a.place for a in mine)]
+        own = [*(scene.points[point] for point in points), *outlines, *(a.place for a in mine)]
         marked = [place for body, place in centers.items() if body.partition(":")[0] == name]
-        parts.append((name, body, np.array(own), mine, marked))
+        parts.append((_title(view, name, row, mine), body, np.array(own), mine, marked))
     key = Arrows(_NOWHERE, _NOWHERE, 72 * largest / _LONGEST, unit, True, label="force", look=RATES[0])
     kinds: list[PanelMark] = [
         Trace([], [], label=look.words, look={"color": look.color, "linestyle": look.dashes, "linewidth": 1.8})
-        for kind, look in LOOKS.items() if any(action.kind == kind for action in acting)
+        for kind, look in LOOKS.items() if any(action.kind == kind for _, _, _, mine, _ in parts for action in mine)
     ]  # fmt: skip
     panels = []
     for name, body, places, mine, marked in parts:
         most = max((action.size for action in mine), default=0.0) / largest
         longer = max(round_down(1 / most), 1.0) if most else 1.0
-        tile = _Tile(view, longer * _LONGEST / largest, least, body, mine, marked)
+        free = FreeBody(view.study.units.label("moment"), longer * _LONGEST / largest, body, mine, marked)
         shows = np.array([*places, *marked])
         middle, *sides = extent(shows)
         if max(sides) < 1e-3 * mechanism.size:
             shows = middle + 1e-3 * mechanism.size * np.array([-1, 1, 1j, -1j])
         title = f"{name}, arrows \N{MULTIPLICATION SIGN}{longer:g}" if longer > 1 else name
-        panels.append(Panel([Late(tile.draw), *kinds, key], title=title, equal=1.0, shows=shows, bare=True))
+        panels.append(Panel([free, *kinds, key], title=title, equal=1.0, shows=shows, bare=True))
     return Picture(words, panels, across=1 if style.narrow() else 3)
 
 
-def _worst(view: DynamicsView) -> int | None:
-    """Which of the shown poses has the largest joint force; None where no joint bears any."""
+def _worst(view: DynamicsView) -> tuple[int | None, bool]:
+    """The first of the shown poses with the largest joint force, None where no joint bears any; whether all have it."""
     rows = view.drawn.shown.rows
     forces = [np.nan_to_num(view.column(name)[rows]) for name in view.question.forces]
     if not forces or not np.any(forces):
-        return None
-    return int(np.max(forces, axis=0).argmax())
+        return None, False
+    largest = np.max(forces, axis=0)
+    most = largest >= (1 - STILL) * largest.max()
+    return int(most.argmax()), bool(most.all() and len(rows) > 1)
+
+
+def _alone_drawn(name: str, acting: Sequence[Action]) -> bool:
+    """Whether a body has a panel: a moving link, and a pin or the ground on which more than links and springs act."""
+    own = {action.kind for action in acting if action.link == name}
+    return bool(own) and (name != GROUND or "load" in own) and (not name.startswith(PIN) or own != {"joint"})
+
+
+def _telling(actions: Sequence[Action], rounding: tuple[float, float]) -> list[Action]:
+    """Actions on a body beside whose largest force or moment, and beside rounding, they are something."""
+    force = max(LEAST * max((action.size for action in actions), default=0.0), rounding[0])
+    moment = max(LEAST * max((abs(action.moment) for action in actions), default=0.0), rounding[1])
+    kept = [replace(own, force=own.force * (own.size > force), moment=own.moment * (abs(own.moment) > moment))
+            for own in actions]  # fmt: skip
+    return [action for action in kept if action.force or action.moment]
 
 
 def _outside(action: Action, acting: Sequence[Action]) -> bool:
-    """Whether it comes from outside of the moving links: not from a joint or spring between two of them."""
+    """Whether it comes from outside of the moving links: not from what acts between them alone."""
     if action.kind not in ("joint", "spring", "effort", "coupling"):
         return True
-    same = [other for other in acting if other.kind == action.kind and other.name == action.name]
-    return any(other.link == GROUND and abs(other.force + action.force) <= LEAST * action.size
-               and abs(other.moment + action.moment) <= LEAST * abs(action.moment) for other in same)  # fmt: skip
+    return any(other.link == GROUND and (other.kind, other.name) == (action.kind, action.name) for other in acting)
 
 
 def _alone(scene: Still, name: str, whole: Sequence[Shape]) -> list[Shape]:
     """The shapes of one link, with its pins and without springs."""
-    points, ends = scene.link_points(name), scene.description.links[name].ends
+    points, links = _points(scene, name), scene.description.links
+    ends = links[name].ends if name in links else None
     alone: list[Shape] = []
     for shape in whole:
         if isinstance(shape, Strut):
@@ -131,18 +153,35 @@ def _alone(scene: Still, name: str, whole: Sequence[Shape]) -> list[Shape]:
         elif isinstance(shape, Line):
             own = shape.link == name
         else:
-            own = (shape.link == name or shape.point in points) and shape.edge != shapes.SPRING_COLOR
+            of_body = shape.point in points if shape.point else shape.link == name
+            own = of_body and shape.edge != shapes.SPRING_COLOR
         if own:
             alone.append(shape)
     return alone
 
 
-class _Tile(NamedTuple):
-    """A link and what acts on it, forces to a scale of points."""
+def _points(scene: Still, name: str) -> tuple[str, ...]:
+    """Points of a link, or the one of a pin."""
+    return (name.removeprefix(PIN),) if name.startswith(PIN) else scene.link_points(name)
 
-    view: DynamicsView
+
+def _title(view: DynamicsView, name: str, row: int, acting: Sequence[Action]) -> str:
+    """A body by its name, the effort within a telescopic leg, and whose moments equilibrium leaves open."""
+    words = body_in_words(name)
+    for drive, own in view.study.mechanism.description.drives.items():
+        if own.kind == "length" and own.target == name:
+            effort = float(view.column(f"{drive}_effort")[row])
+            words += f", {'pushes' if effort > 0 else 'pulls'} {quantity(abs(effort), '')}".rstrip()
+    open_moments = ", ".join(action.name for action in acting if action.undetermined)
+    return words + f"; open: moments of {open_moments}" * bool(open_moments)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeBody(LateMark):
+    """A body and what acts on it, forces to a scale of points."""
+
+    unit: str  # of moments
     scale: float
-    least: float
     body: Sequence[Shape]
     acting: Sequence[Action]
     centers: Sequence[complex]
@@ -155,19 +194,22 @@ class _Tile(NamedTuple):
         labels = []
         for action in sorted(self.acting, key=lambda action: -action.size):
             look, way = LOOKS[action.kind], self.scale * action.force
-            if abs(way) > _LONGEST * LEAST:
+            if way:
                 # A push ends at its place, a pull begins there.
-                inertial = action.kind in ("weight", "inertia")
-                push = not inertial and ((middle - action.place).conjugate() * way).real > 0
+                push = action.kind not in _OF_MASS and ((middle - action.place).conjugate() * way).real > 0
                 tail, tip = (-way, 0j) if push else (0j, way)
                 draw(axes, arrow(action.place, tail, tip, look.color, look.dashes))
                 end = action.place + length * (tail if push else tip)
-                words = f"{'' if inertial else action.name} {quantity(action.size, '')}".strip()
-                labels.append(Label(words, (end, (2 * end + action.place) / 3), look.color, 3.0,
+                labels.append(Label(self.words(action), (end, (2 * end + action.place) / 3), look.color, 3.0,
                                     cmath.phase(end - action.place), 8.5))  # fmt: skip
-            if abs(action.moment) > self.least:
+            if action.moment:
                 sweep = np.copysign(1.4 * np.pi, action.moment)
                 draw(axes, arc(action.place, -0.2 * np.pi, sweep, _ARC, look.color))
-                words = quantity(abs(action.moment), self.view.study.units.label("moment"))
+                words = quantity(abs(action.moment), self.unit)
                 labels.append(Label(words, (action.place,), look.color, _ARC + 3, None, 8.5))
         write(axes, labels)
+
+    @staticmethod
+    def words(action: Action) -> str:
+        """What exerts a force, and its size; weight and inertia are told by their look."""
+        return f"{'' if action.kind in _OF_MASS else action.name} {quantity(action.size, '')}".strip()

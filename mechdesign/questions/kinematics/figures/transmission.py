@@ -17,6 +17,7 @@ from mechdesign.ground.results import Table
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
 from mechdesign.questions.kinematics.figures.view import MotionView
+from mechdesign.questions.kinematics.loops import SAME_ANGLE
 from mechdesign.study import Study
 
 # Transmission angles that textbooks call good, degrees.
@@ -71,6 +72,7 @@ def transmission_picture(view: MotionView) -> Picture | None:
         column = motion.column(f"{output}_advantage")
         forces = ["moment" if study.mechanism.quantity(name) == "angle" else "force" for name in (output, source)]
         title = f"{forces[0]} of {output} over {forces[1]} put in at {source}"
+        title += ", without the friction of the joints" * bool(study.mechanism.description.friction)
         panels.append(_advantage(over, column.values, column.unit, places, title))
     return Picture(heading, panels, ("; ".join(notes),), share="x")
 
@@ -108,7 +110,9 @@ def _off(angle: float) -> float:
 def _angles(x: Floats, loops: list[Transmission], over: Along) -> Panel:
     """The transmission angles of loops, the worst first, with the band that is good."""
     worst, green = loops[0], {"color": style.GREEN, "zorder": 1}
-    words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {over.value(worst.at)}" if over.name else "")
+    constant = np.ptp(worst.angle[np.isfinite(worst.angle)]) <= np.degrees(SAME_ANGLE)
+    words = f"worst: {worst.worst:.4g} deg"
+    words += " everywhere" if constant else f" at {over.name} = {over.value(worst.at)}" if over.name else ""
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION
     marks: list[PanelMark] = [
         Zone(*GOOD, label=GOOD_WORDS, look={"color": _BAND, "zorder": 0}),

@@ -70,19 +70,24 @@
     drawing.addEventListener("pointermove", report);
   }
 
-  // The drawing of a mechanism: shows it at a pose, or between two.
+  // Whether a mechanism moves when its page opens: the one beside the answers, unless the reader prefers less motion.
+  const opening = figure => !calm.matches && figure.closest(".stage") !== null;
+
+  // The drawing of a mechanism: shows it at a pose, or between two. A part of a drawing, such as the mechanism before a
+  // change, is moved by its own data alone.
   function linkage(drawing, data) {
+    const own = part => part.closest(".moving-part, svg") === drawing;
     const track = (group, unit) => {
       const tracks = {};
       for (const name in group) tracks[name] = decode(group[name], data.poses, unit);
       return tracks;
     };
     const x = track(data.x, PLACES), y = track(data.y, PLACES), turn = track(data.turn, TURNS);
-    const parts = [...drawing.querySelectorAll("[data-at]")].map(group => {
+    const parts = [...drawing.querySelectorAll("[data-at]")].filter(own).map(group => {
       const {at, turn: link, offset} = group.dataset;
       return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number)];
     });
-    const struts = [...drawing.querySelectorAll("[data-from]")].map(path => {
+    const struts = [...drawing.querySelectorAll("[data-from]")].filter(own).map(path => {
       const {from, to, way} = path.dataset;
       return [path, x[from], y[from], x[to], y[to], way.split(",").map(line => line.match(/\S+ \S+/g).map(corner => corner.split(" ").map(Number)))];
     });
@@ -237,6 +242,99 @@
     return {marks, inStudy};
   }
 
+  // Round numbers between two, at most some eight.
+  function ticks(low, high) {
+    const raw = (high - low) / 6, power = 10 ** Math.floor(Math.log10(raw));
+    const step = power * [1, 2, 5, 10].find(factor => factor * power >= raw), marks = [];
+    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) marks.push(Number((k * step).toPrecision(12)));
+    return marks;
+  }
+
+  // Any number of the motion over any other, which the reader picks, as a curve with a dot at the pose. Returns what
+  // moves the dot.
+  function chart(figure, data, readout, choose) {
+    const room = document.querySelector(`[data-chart="${figure.id}"]`);
+    const table = document.querySelector(`[data-numbers="${figure.id}"] .moving-numbers`);
+    if (!room || !table) return () => {};
+    const heads = [...table.tHead.rows[0].cells].map(cell => cell.textContent), tracks = [];
+    for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, k) => {
+      const number = cell.querySelector("[data-number]"), name = row.cells[0].firstChild.textContent;
+      if (!number) return;
+      const unit = cell.textContent.slice(number.textContent.length).trim();
+      const title = k > 1 ? `${heads[k]} of ${name}` : name;
+      tracks.push({values: readout.tracks[number.dataset.number][1], title, label: unit ? `${title} [${unit}]` : title});
+    });
+    if (tracks.length < 2) return () => {};
+    const given = new Set(data.given.map(([name]) => name)), free = tracks.filter(({title}) => !given.has(title));
+    const drawing = make("svg", {viewBox: "0 0 576 330", role: "img", "font-family": "'DejaVu Sans',Verdana,Geneva,sans-serif",
+      "font-size": 10, class: "moving-curves"}, room.querySelector("div"));
+    const pick = (text, name, chosen) => {
+      const select = html("select", {}, ...tracks.map((track, k) => html("option", {value: k, textContent: track.label, selected: track === chosen})));
+      select.setAttribute("aria-label", name);
+      select.addEventListener("change", draw);
+      return [select, html("label", {}, text, select)];
+    };
+    const [x, over] = pick("over", "output across", free[0] || tracks[0]), [y, show] = pick("Show", "output upwards", free[1] || tracks[1]);
+    room.querySelector("p").append(show, over);
+    const LEFT = 70, RIGHT = 562, TOP = 14, BOTTOM = 284;
+    let place = () => null, at = data.first, dot;
+
+    function axis(values) {
+      const known = values.filter(isFinite), low = Math.min(...known), high = Math.max(...known);
+      const room = 0.04 * (high - low) || 0.05 * Math.abs(high) || 1;
+      return known.length ? [low - room, high + room] : [0, 1];
+    }
+
+    function draw() {
+      const across = tracks[x.value], up = tracks[y.value];
+      const [west, east] = axis(across.values), [south, north] = axis(up.values);
+      const px = value => LEFT + (RIGHT - LEFT) * (value - west) / (east - west);
+      const py = value => BOTTOM - (BOTTOM - TOP) * (value - south) / (north - south);
+      drawing.replaceChildren();
+      drawing.setAttribute("aria-label", `${up.label} over ${across.label}`);
+      const text = (words, looks) => { make("text", looks, drawing).textContent = words; };
+      for (const value of ticks(west, east)) {
+        make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, stroke: "#dddddd"}, drawing);
+        text(String(value).replace("-", "\u2212"), {x: px(value).toFixed(1), y: BOTTOM + 17, "text-anchor": "middle"});
+      }
+      for (const value of ticks(south, north)) {
+        make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, stroke: "#dddddd"}, drawing);
+        text(String(value).replace("-", "\u2212"), {x: LEFT - 8, y: (py(value) + 3.5).toFixed(1), "text-anchor": "end"});
+      }
+      text(across.label, {x: (LEFT + RIGHT) / 2, y: BOTTOM + 36, "text-anchor": "middle"});
+      text(up.label, {transform: `translate(14 ${(TOP + BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle"});
+      const poses = across.values.map((value, k) => [px(value), py(up.values[k])]);
+      // A closed motion ends where it begins; an angle that went round does not.
+      const far = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]), steps = poses.slice(1).map((pose, k) => far(pose, poses[k]));
+      if (far(poses.at(-1), poses[0]) <= 2 * Math.max(...steps.filter(isFinite))) poses.push(poses[0]);
+      let pen = "M";
+      const way = poses.map(([a, b]) => {
+        const step = isFinite(a + b) ? `${pen}${a.toFixed(1)} ${b.toFixed(1)}` : "";
+        pen = step ? "L" : "M";
+        return step;
+      });
+      make("path", {d: way.join(""), fill: "none", stroke: "#0072B2", "stroke-width": 1.8, "stroke-linejoin": "round"}, drawing);
+      dot = make("circle", {r: 4.5, fill: "#D55E00", stroke: "white", class: "moving-here"}, drawing);
+      place = (a, b) => least(poses.slice(0, data.poses).map(([c, d]) => Math.hypot(a - c, b - d)));
+      mark(at);
+    }
+
+    function mark(pose) {
+      at = pose;
+      const across = tracks[x.value].values, up = tracks[y.value].values;
+      const [west, east] = axis(across), [south, north] = axis(up), a = between(across, at), b = between(up, at);
+      dot.classList.toggle("moving-gone", !isFinite(a + b));
+      if (!isFinite(a + b)) return;
+      dot.setAttribute("cx", (LEFT + (RIGHT - LEFT) * (a - west) / (east - west)).toFixed(2));
+      dot.setAttribute("cy", (BOTTOM - (BOTTOM - TOP) * (b - south) / (north - south)).toFixed(2));
+    }
+
+    follow(drawing, false, (a, b) => choose(place(a, b)));
+    room.hidden = false;
+    draw();
+    return mark;
+  }
+
   // A box that shows or hides some layers, with a mark of their colour, and calls back then.
   function check(text, layers, on, call = () => {}, color = "") {
     const box = html("input", {type: "checkbox", checked: on});
@@ -256,7 +354,9 @@
     const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), readout = numbers(figure, data);
     const vectors = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
     const choose = pose => { stop(); show(pose); };
-    const {marks, inStudy} = pictures(figure, data, readout, moved, choose);
+    const {marks, inStudy} = pictures(figure, data, readout, moved, choose), other = drawing.querySelector(".moving-before");
+    const before = other && linkage(other, {...data.before, poses: data.poses});
+    marks.push(chart(figure, data, readout, choose));
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
     slider.setAttribute("aria-label", "pose of the motion");
     const button = html("button", {type: "button", textContent: "Play"});
@@ -267,6 +367,7 @@
       check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
       check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
       ...vectors.boxes,
+      ...other ? [check(data.before.title, [other], true)] : [],
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
 
@@ -281,8 +382,10 @@
       // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
       const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
       moved.show(pose); readout.show(counted); vectors.show(pose);
+      if (before) before.show(pose);
       marks.forEach(mark => mark(Math.min(pose, last)));
-      const text = data.given.map(([name, unit, which]) => said(name, readout.text(which, counted), unit)).join(", ") +
+      const text = (data.title ? `${data.title}: ` : "") +
+        data.given.map(([name, unit, which]) => said(name, readout.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
@@ -360,7 +463,7 @@
       });
     }
     button.addEventListener("click", () => playing ? stop() : play());
-    slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+    slider.addEventListener("input", () => choose(Number(slider.value)));
     figure.addEventListener("keydown", event => {
       if (event.key === " " && !event.target.matches("button, select, input[type=checkbox]")) {
         event.preventDefault();
@@ -375,6 +478,7 @@
       if (held) choose(least(moved.x[held].map((_, k) => far(held, k))));
     });
     show(data.first);
+    if (opening(figure)) play();
     return {marks, inStudy, points: moved.x, at: () => at};
   }
 
@@ -578,6 +682,7 @@
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
     choose(data.first);
+    if (opening(figure)) button.click();
   }
 
   function start() {
