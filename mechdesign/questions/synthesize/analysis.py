@@ -36,17 +36,17 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     own = study.seed if seed is None else seed
     random = np.random.default_rng(own if section.seed is None or seed is not None else section.seed)
     task = task_of(study, section)
-    conditions, told = Conditions(section, task.centre, task.size, task.factor), list[str]()
+    conditions = Conditions(section, task.centre, task.size, task.factor)
     with np.errstate(all="ignore"):
-        pools = [*task.pools(random, told.append)]
+        pools = [*task.pools(random, conditions)]
         solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
         if section.judge is not None:
             solutions = _judged(study, task, solutions[: section.judge.best])
         solutions, scores = ranked(solutions, section.rank, task.size)
-    told += _told(pools, solutions, conditions)
+    told = [*conditions.told, *_told(pools, solutions, conditions)]
     warnings = tuple(Caution("incomplete", words) for words in told)
     if not solutions:
-        raise _none(study, task, conditions, warnings)
+        raise _none(study, task, pools, conditions, told)
     solutions, scores = solutions[: section.solutions], scores[: section.solutions]
     files = {
         f"solution_{number}.yaml": study_text(
@@ -73,21 +73,21 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
     """How many linkages there were, and what became of them."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
     words = [f"{count} linkages, {len(solutions)} of them keep the conditions, {whole} without a defect"]
-    return words + [f"{lost} dropped: {reason}" for reason, lost in conditions.dropped.most_common()]
+    return words + [f"{lost} dropped: {reason}" for reason, lost in conditions.dropped.most_common() if lost]
 
 
-def _none(study: Study, task: Task, conditions: Conditions, warnings: Sequence[Caution]) -> AssemblyError:
-    """Why there is no solution, with the nearest linkage."""
-    if conditions.nearest is None:
-        return AssemblyError("no linkage does it: " + "; ".join(caution.message for caution in warnings))
-    _, pool, row, missed = conditions.nearest
-    solution = pool.solution(row)
-    message = f"no linkage keeps the conditions; of the nearest {', '.join(missed)}; see nearest.yaml"
-    text = study_text(study_data(study, task, solution, f"{study.name}, nearest"), f"Nearest to {study.name}: {', '.join(missed)}")
+def _none(study: Study, task: Task, pools: Sequence[Pool], conditions: Conditions, told: Sequence[str]) -> AssemblyError:
+    """Why there is no solution, with the linkage that comes nearest where there is one."""
+    words = "no linkage does it: " + "; ".join(told)
+    best = min((pool for pool in pools if len(pool.way)), key=lambda pool: pool.rms().min(), default=None)
+    if best is None:
+        return AssemblyError(words)
+    solution, missed = best.solution(int(best.rms().argmin())), "; ".join(conditions.missed(best, int(best.rms().argmin())))
+    message = f"{words}; the nearest is in nearest.yaml: {missed}"
+    data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])
-    return AssemblyError(
-        message, Result("synthesize", {table.name: table}, warnings, failed=message, files={"nearest.yaml": text})
-    )
+    files = {"nearest.yaml": study_text(data, f"Nearest to {study.name}: {missed}")}
+    return AssemblyError(message, Result("synthesize", {table.name: table}, failed=message, files=files))
 
 
 def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], scores: Sequence[float]) -> Table:

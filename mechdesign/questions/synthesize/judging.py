@@ -12,7 +12,9 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses on the way through the task; where a linkage comes nearest to a dead centre, so many more between two of them.
-POSES, FINER = 361, 33
+POSES, FINER = 181, 17
+# Linkages that are followed at once: their poses stay in the processor's cache.
+_AT_ONCE = 100
 _TURN = 2 * np.pi
 
 
@@ -69,6 +71,14 @@ def margins(kind: Kind, poses: Configuration) -> tuple[Floats, Floats]:
 
 def along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
     """Whether a dead centre lies on the way of the drive, and the smallest transmission angle there (radians)."""
+    dead, worst = np.zeros(len(values), dtype=bool), np.zeros(len(values))
+    for first in range(0, len(values), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        dead[some], worst[some] = _along(kind, modes, values[some], begin[some], end[some])
+    return dead, worst
+
+
+def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
     parts = np.linspace(0, 1, POSES)
     poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
     _, sine = margins(kind, poses)
@@ -78,7 +88,7 @@ def along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end
                             sine[:, :1] >= np.inf], axis=1)  # fmt: skip
     lane, place = np.nonzero(inner & ~dead[:, None])
     low, high = parts[place - 1], parts[place + 1]
-    for _ in range(4):
+    for _ in range(5):
         if not len(lane):
             break
         fine = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, FINER)

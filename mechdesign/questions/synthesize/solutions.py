@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.mechanism import Variant
@@ -20,6 +20,8 @@ from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 
 # Two linkages whose values differ by less than this part of the task are one.
 _SAME = 1e-5
+# Most linkages of a kind and assembly that are compared one by one.
+_MOST = 200
 # An error below this part of the task's size is none.
 EXACT = 1e-9
 
@@ -101,32 +103,42 @@ class Conditions:
     def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
         self.section, self.centre, self.size, self.factor = section, centre, size, factor
         self.dropped: Counter[str] = Counter()
-        #: Of those that keep not all the one that misses fewest: how many it misses, the pool, its row, and which.
-        self.nearest: tuple[int, Pool, int, list[str]] | None = None
+        self.told: list[str] = []  #: what is found, in words
+
+    def begun(self, kind: Kind, values: Floats, errors: Floats, most: int) -> Ints:
+        """Linkages, at most so many, that keep what their dimensions alone tell; best first by their errors."""
+        kept = self._counted(self._of_dimensions(kind, values), len(values))
+        rows = np.flatnonzero(kept)
+        return rows[np.argsort(errors[rows], kind="stable")][:most]
 
     def kept(self, pool: Pool) -> Flags:
-        """Which linkages keep all conditions; the others are counted by the first that they miss."""
-        judged = [*self._judged(pool.way)]
-        kept, missed = np.ones(len(pool.way), dtype=bool), np.zeros(len(pool.way), dtype=int)
+        """Which linkages keep all other conditions."""
+        return self._counted(self._of_way(pool.way), len(pool.way))
+
+    def missed(self, pool: Pool, row: int) -> list[str]:
+        """The conditions that one linkage of a pool does not keep."""
+        return [reason for reason, good in self._of_way(pool.way) if not good[row]]
+
+    def _counted(self, judged: Iterator[tuple[str, Flags]], count: int) -> Flags:
+        """Which linkages keep conditions; the others are counted by the first that they miss."""
+        kept = np.ones(count, dtype=bool)
         for reason, good in judged:
-            lost = kept & ~good
-            if lost.any():
-                self.dropped[reason] += int(lost.sum())
+            self.dropped[reason] += int((kept & ~good).sum())
             kept &= good
-            missed += ~good
-        fewest = np.where(kept, 10**6, missed)
-        row = int(np.lexsort((pool.rms(), fewest))[0])
-        if not kept[row] and (self.nearest is None or fewest[row] < self.nearest[0]):
-            self.nearest = int(fewest[row]), pool, row, [reason for reason, good in judged if not good[row]]
         return kept
 
     def solutions(self, pool: Pool) -> Iterator[Solution]:
-        """The linkages of a pool that keep all conditions."""
-        if len(pool.way):
-            yield from (pool.solution(int(row)) for row in np.flatnonzero(self.kept(pool)))
+        """The best linkages of a pool that keep all conditions."""
+        if not len(pool.way):
+            return
+        rows = np.flatnonzero(self.kept(pool))
+        faulty = np.array([words != "" for words in pool.way.defects])[rows]
+        errors = np.where(pool.rms() < EXACT * self.size, 0.0, pool.rms())[rows]
+        best = rows[np.lexsort((-pool.way.transmission[rows], errors, faulty))][: _MOST]
+        yield from (pool.solution(int(row)) for row in best)
 
-    def _judged(self, way: Way) -> Iterator[tuple[str, Flags]]:
-        kind, values, section = way.kind, way.values, self.section
+    def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
+        section = self.section
         pivots = np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1)
         held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
         links = kind.links(values)
@@ -156,6 +168,9 @@ class Conditions:
             ordered = np.sort(lengths, axis=0)
             good = ordered[0] + ordered[-1] <= ordered[1:-1].sum(axis=0)
             yield "no link can turn fully (grashof)", good
+
+    def _of_way(self, way: Way) -> Iterator[tuple[str, Flags]]:
+        section = self.section
         if section.needs_turn:
             yield "the drive cannot turn fully (full_turn)", way.full_turn
         if section.transmission is not None:

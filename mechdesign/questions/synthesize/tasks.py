@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -16,12 +16,14 @@ from mechdesign.questions.synthesize.dyads import LINK, Dyads
 from mechdesign.questions.synthesize.judging import passed
 from mechdesign.questions.synthesize.kinds import BODY, FOUR_BAR, POINT, Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
-from mechdesign.questions.synthesize.solutions import EXACT, Pool, Solution
+from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
 from mechdesign.study import Study
 from mechdesign.study.text.csv_files import read_table
 
+# Most linkages of a kind whose ways are followed.
+MOST = 400
 # Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
-PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 4_000
+PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 1_500
 # An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
 _OTHER = 1e-6
 
@@ -44,12 +46,12 @@ class BodyTask:
         """The extent of the places."""
         return self.positions.size
 
-    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
-        """Linkages of every kind and assembly; what is found is told in words."""
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+        """Linkages of every kind and assembly."""
         found, words = body.choices(self.positions, self.section, random)
-        tell(words)
+        conditions.told.append(words)
         for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
-            yield from assembled(part, self.gaps(part), self.section, self.size)
+            yield from assembled(part, self.gaps(part), conditions, self.size)
 
     @property
     def error_factor(self) -> float:
@@ -95,20 +97,20 @@ class FunctionTask:
         """The middle of the mechanism."""
         return complex(self.outputs.mean(), 0.0) if self.slides else self.size / 2 + 0j
 
-    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
-        """Linkages of every assembly; what is found is told in words."""
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+        """Linkages of every assembly."""
         # The output link, or the slider, as it is seen from the input link.
         back = np.exp(-1j * self.inputs)
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
         found, words = body.choices(seen, self.section, random, zeros=self.section.zeros == "fixed", slides=self.slides)
-        tell(words)
+        conditions.told.append(words)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
         links = links.take((np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size)))
         if len(links):
             part = self._linkage(links)
-            yield from assembled(part, self.gaps(part, links), self.section, self.size if self.slides else 1.0)
+            yield from assembled(part, self.gaps(part, links), conditions, self.size if self.slides else 1.0)
 
     @property
     def error_factor(self) -> float:
@@ -180,7 +182,7 @@ class PathTask:
         """The output that is judged, and where it should be at each position."""
         return POINT, {POINT: _pairs(self.path.points)}
 
-    def pools(self, random: np.random.Generator, tell: Callable[[str], None]) -> Iterator[Pool]:
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
         section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         for name in section.kinds or (FOUR_BAR,):
@@ -191,9 +193,10 @@ class PathTask:
                 fits = paths.fits(kind, modes, self.path, samples, bound)
                 if not len(fits.costs):
                     continue
-                gaps = np.abs(kind.points(kind.solve(fits.values, fits.angles, modes)) - self.path.points)
-                way = passed(kind, modes, fits.values, fits.angles, full_turn=section.needs_turn)
-                yield Pool(way, gaps)
+                rows = conditions.begun(kind, fits.values, fits.costs, MOST)
+                values, angles = fits.values[rows], fits.angles[rows]
+                gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
+                yield Pool(passed(kind, modes, values, angles, full_turn=section.needs_turn), gaps)
 
 
 Task = BodyTask | FunctionTask | PathTask
@@ -251,9 +254,11 @@ def _ends(ends: Any) -> tuple[float, float]:
     return ends if isinstance(ends, tuple) else (-np.inf, np.inf) if ends is None else (ends, ends)
 
 
-def assembled(part: Candidates, gaps: Sequence[Floats], section: SynthesisSection, size: float) -> Iterator[Pool]:
+def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
     """Linkages by the assembly in which they are at the first position, with how they pass the others."""
     stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
+    rows = conditions.begun(part.kind, part.values, stack.min(axis=0).max(axis=1), MOST)
+    part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
     nearest = stack.min(axis=0)
     first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
     for number, modes in enumerate(part.kind.modes):
@@ -261,7 +266,7 @@ def assembled(part: Candidates, gaps: Sequence[Floats], section: SynthesisSectio
         if len(some):
             other = stack[number, some] > nearest[some] + _OTHER * size
             way = passed(part.kind, modes, part.values[some], part.angles[some], other.any(axis=1),
-                         full_turn=section.needs_turn)  # fmt: skip
+                         full_turn=conditions.section.needs_turn)  # fmt: skip
             yield Pool(way, nearest[some])
 
 
