@@ -8,25 +8,21 @@ import math
 
 def entities(text):
     """Entities of a DXF file as mappings of codes to values; the vertices of a polyline are listed in it."""
+    words = (1, 5, 8, 100, 330)
     lines = text.split("\n")
     pairs = [(int(code), value) for code, value in zip(lines[0:-1:2], lines[1::2], strict=True)]
     begin = next(k for k, pair in enumerate(pairs) if pair == (2, "ENTITIES")) + 1
-    found, polyline = [], None
-    for code, value in pairs[begin:]:
+    found = []
+    for code, value in pairs[begin : pairs.index((0, "ENDSEC"), begin)]:
         if code == 0:
-            kind = value
-            if kind in ("ENDSEC", "SEQEND", "EOF"):
-                continue
-            current = {"kind": kind}
-            if kind == "VERTEX":
-                polyline["vertices"].append(current)
-            else:
-                found.append(current)
-            if kind == "POLYLINE":
-                polyline = current
-                polyline["vertices"] = []
+            current = {"kind": value, **({"vertices": []} if value == "LWPOLYLINE" else {})}
+            found.append(current)
+        elif current["kind"] == "LWPOLYLINE" and code in (10, 20, 42):
+            if code == 10:
+                current["vertices"].append({})
+            current["vertices"][-1][code] = float(value)
         else:
-            current[code] = value if code in (1, 8) else float(value)
+            current[code] = value if code in words else float(value)
     return found
 
 
@@ -55,13 +51,13 @@ def parts(text):
     cut = [entity for entity in found if entity[8] == "cut"]
     outlines = {}
     for name in (entity for entity in found if entity["kind"] == "TEXT" and entity[8] == "engrave"):
-        around = [e for e in cut if e["kind"] == "POLYLINE" and _holds(e, complex(name[11], name[21]))]
+        around = [e for e in cut if e["kind"] == "LWPOLYLINE" and _holds(e, complex(name[11], name[21]))]
         outlines[name[1]] = max(around, key=area)
     result = {}
     for name, outline in outlines.items():
         holes = [(at(e), 2 * e[40]) for e in cut if e["kind"] == "CIRCLE" and _holds(outline, at(e))]
         slots = [
-            e for e in cut if e["kind"] == "POLYLINE" and e is not outline and _holds(outline, at(e["vertices"][0]))
+            e for e in cut if e["kind"] == "LWPOLYLINE" and e is not outline and _holds(outline, at(e["vertices"][0]))
         ]
         result[name] = outline, holes, slots
     return result

@@ -219,7 +219,112 @@ def test_dxf_passes_the_audit_of_ezdxf():
     for name, text in itertools.product(("parts.dxf", "mechanism.dxf"), (FOUR_BAR, QUICK_RETURN)):
         document = ezdxf.read(io.StringIO(text_of(text, name)))
         report = document.audit()
-        assert (document.dxfversion, report.errors, report.fixes) == ("AC1009", [], [])
+        assert (document.dxfversion, document.units, report.errors, report.fixes) == ("AC1015", 4, [], [])
+
+
+def header(text):
+    """Variables of a DXF's header: the first value of each."""
+    lines = text.split("\n")
+    return {name: lines[k + 2] for k, name in enumerate(lines) if name.startswith("$")}
+
+
+@pytest.mark.parametrize("name", ["parts.dxf", "mechanism.dxf"])
+def test_a_dxf_says_that_its_unit_is_the_millimetre_and_all_in_it_has_a_handle_of_its_own(name):
+    text = text_of(FOUR_BAR, name)
+    said = header(text)
+    assert (said["$ACADVER"], said["$INSUNITS"]) == ("AC1015", "4")
+    lines = text.split("\n")
+    pairs = [*zip(lines[0:-1:2], lines[1::2], strict=True)]
+    handles = [int(value, 16) for code, value in pairs if code in ("5", "105")][1:]
+    assert len({*handles}) == len(handles)
+    assert int(said["$HANDSEED"], 16) > max(handles)
+    # Owners are among them; those of tables and of the root dictionary are none.
+    owners = {int(value, 16) for code, value in pairs if code == "330"}
+    assert owners <= {0, *handles}
+    kinds = [value for code, value in pairs if code == "0"]
+    for kind in ("SECTION", "TABLE", "BLOCK"):
+        assert kinds.count(kind) == kinds.count({"SECTION": "ENDSEC", "TABLE": "ENDTAB", "BLOCK": "ENDBLK"}[kind])
+    if name == "parts.dxf":
+        words = " ".join(e[1] for e in entities(text) if e["kind"] == "TEXT" and e[8] == "notes")
+        assert "one unit is 1 mm; thickness 4 mm; kerf 0.2 mm is counted" in words
+
+
+def test_a_hole_that_is_cut_along_its_line_has_the_diameter_of_the_study():
+    study = FOUR_BAR.replace("width: 16, pin: 6, pins: {A: 8}, kerf: 0.2", "width: 16, pin: 3, kerf: 0.15")
+    text = text_of(study, "parts.dxf")
+    for name, width in (("crank", 16), ("coupler", 12)):
+        outline, holes, _ = parts(text)[name]
+        # The cut takes half of the kerf on both sides of its line.
+        assert [diameter + 0.15 for _, diameter in holes] == pytest.approx([3, 3], abs=1e-9)
+        low = min(at(vertex).imag for vertex in outline["vertices"])
+        assert min(centre.imag for centre, _ in holes) - low - 0.075 == pytest.approx(width / 2, abs=1e-9)
+    assert "crank: O A 30 mm, hole O 3 mm, drawn 2.85 mm, hole A 3 mm, drawn 2.85 mm\n" in text
+
+
+GEARS = """
+mechanism:
+  links:
+    ground: {O: [0, 0], C: [60, 0]}
+    one: {points: {O: [0, 0], S: [10, 0]}}
+    two: {points: {C: [0, 0], P: [%s, 0]}}
+  drives: [one]
+  couplings: {gears: {set: two, of: one, %s}}
+  sketch: {S: [10, 0], P: [85, 0]}
+  plates: {width: 12, pin: 3, kerf: 0.15}
+kinematics: {sweep: {one: {from: 0, to: 360, step: 10}}, outputs: [P]}
+"""
+
+
+def circles(text, layer):
+    """Centres and radii of circles."""
+    return [(at(e), e[40]) for e in entities(text) if e["kind"] == "CIRCLE" and e[8] == layer]
+
+
+def test_wheels_are_cut_as_discs_to_the_tips_of_their_teeth_with_the_pitch_circle_engraved():
+    data, warnings = exported("parts.dxf", GEARS % (25, "ratio: -0.5, module: 2 mm"))
+    text = data.decode()
+    assert [("teeth are not drawn" in warning) for warning in warnings] == [True]
+    cut, engraved = circles(text, "cut"), circles(text, "engrave")
+    for pitch in (20, 40):
+        (middle,) = [place for place, radius in engraved if radius == pytest.approx(pitch, abs=1e-9)]
+        around = sorted(radius for place, radius in cut if abs(place - middle) < 1e-9)
+        assert around == pytest.approx([1.5 - 0.075, pitch + 2 + 0.075], abs=1e-9)
+    assert "wheel C: pitch circle 80 mm, 40 teeth of module 2 mm, tip circle 84 mm, without its teeth" in text
+    names = {e[1] for e in entities(text) if e["kind"] == "TEXT" and e[8] == "notes"}
+    assert {"one", "two", "ground"} <= names
+    # Without a module they end at their pitch circles.
+    plain = circles(text_of(GEARS % (25, "ratio: -0.5"), "parts.dxf"), "cut")
+    assert sorted(radius for _, radius in plain if radius > 10) == pytest.approx([20.075, 40.075], abs=1e-9)
+
+
+def test_a_wheel_with_a_crank_beyond_its_rim_is_a_disc_beside_a_plate():
+    text = text_of(GEARS % (70, "ratio: -0.5, module: 2 mm"), "parts.dxf")
+    names = {e[1] for e in entities(text) if e["kind"] == "TEXT" and e[8] == "notes"}
+    assert {"one", "two", "two gears"} <= names
+    # The plate of the crank goes to P.
+    sides = [e["vertices"] for e in entities(text) if e["kind"] == "LWPOLYLINE" and e[8] == "cut"]
+    assert max(abs(at(b) - at(a)) for side in sides for a, b in itertools.pairwise(side)) == pytest.approx(70, abs=1e-9)
+
+
+def test_a_ring_is_cut_with_its_rim_and_pulleys_without_a_radius_are_named():
+    cut = circles(text_of(GEARS % (25, "ratio: 0.25, module: 2 mm"), "parts.dxf"), "cut")
+    # 60 apart: 80 and 20 radius; the ring's tips are inside, its rim as wide as its link beyond the feet of the teeth.
+    assert sorted(radius for _, radius in cut if radius > 10) == pytest.approx([22.075, 78 - 0.075, 80 + 2.5 + 12.075])
+    _, warnings = exported("parts.dxf", GEARS % (25, "ratio: 0.5, wheels: belt"))
+    assert "gears: pulleys are not cut, as the study gives no 'radius'" in " ".join(warnings)
+    data, warnings = exported("parts.dxf", GEARS % (25, "ratio: 0.5, wheels: belt, radius: 30"))
+    assert not warnings
+    assert sorted(radius for _, radius in circles(data.decode(), "cut") if radius > 10) == pytest.approx(
+        [15.075, 30.075]
+    )
+
+
+def test_a_number_of_teeth_that_is_no_whole_one_is_doubted():
+    words = " ".join(map(str, mechdesign.load(text=GEARS % (25, "ratio: -0.5, module: 3 mm")).warnings))
+    assert "a wheel of 40 pitch diameter has 13.3333 teeth of the module 3" in words
+    for law, sentence in (("wheels: belt, radius: 30", "a 'module' is that of teeth"), ("wheels: none", "of teeth")):
+        with pytest.raises(mechdesign.StudyError, match=sentence):
+            mechdesign.load(text=GEARS % (25, f"ratio: -0.5, module: 2, {law}"))
 
 
 def met(study, layers, poses):

@@ -1,4 +1,4 @@
-"""Cams as they are cut: along their profiles, as exactly as a cutter can follow."""
+"""Cams and wheels as they are cut: cams along their profiles, as exactly as a cutter can follow."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.door.exporting.drawing import DrawnCircle, Path, Shape, around
 from mechdesign.door.exporting.view import PosedStudy
+from mechdesign.door.exporting.wheels import link_wheels, uncut
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.mechanism.algebra import cross
@@ -22,19 +23,35 @@ SIDES = 360
 
 
 @dataclass(frozen=True)
-class CamDisc:
-    """A cam in the frame of its link, in millimetres: the closed curves that bound it, the outermost first.
+class LinkDisc:
+    """A cam or a wheel in the frame of its link, in millimetres: the closed curves that bound it, the outermost first.
 
-    Between the first and the second there is material, between the second and the third a groove.
+    Between the first and the second there is material, between the second and the third a groove. `remark` says in
+    words what it is, and `carried` are places of the link that it has to hold where it is all of it, beside the holes.
     """
 
     coupling: str
-    curves: Sequence[Path]
+    curves: Sequence[Path | DrawnCircle]
+    remark: str
+    engraved: Sequence[Shape] = ()
+    carried: Sequence[complex] = ()
+
+    @property
+    def outline(self) -> tuple[complex, ...]:
+        """Places of the innermost curve."""
+        curve = self.curves[-1]
+        return tuple(curve.ends) if isinstance(curve, DrawnCircle) else curve.corners
 
     def holds(self, place: complex, radius: float) -> bool:
         """Whether there is material all around a hole."""
         around_it = 0
         for curve in self.curves:
+            if isinstance(curve, DrawnCircle):
+                away = abs(place - curve.place)
+                if abs(away - curve.radius) < radius:
+                    return False
+                around_it += away < curve.radius
+                continue
             ways = np.array(curve.corners) - place
             if np.abs(ways).min() < radius:
                 return False
@@ -42,15 +59,25 @@ class CamDisc:
         return around_it % 2 == 1
 
 
-def discs_of(view: PosedStudy, link: str, kerf: float) -> list[CamDisc]:
-    """The cams of a link, with half of a kerf (mm) around the material; see `_disc`."""
-    discs = (_disc(view, cam, kerf) for cam in _cams(view, link))
-    return [disc for disc in discs if disc is not None]
+def discs_of(view: PosedStudy, link: str, kerf: float) -> list[LinkDisc]:
+    """The cams and wheels of a link, with half of a kerf (mm) around the material; see `_disc`."""
+    rim, points = 2 * view.millimetres * float(view.sizes.radius(link)), view.points(link).values()
+    wheels = [
+        LinkDisc(
+            wheel.coupling, wheel.circles(rim, kerf), str(wheel), [DrawnCircle("engrave", wheel.centre, wheel.pitch)],
+            [view.millimetres * point for point in points],
+        )
+        for wheel in link_wheels(view, link)
+    ]  # fmt: skip
+    cams = (_disc(view, cam, kerf) for cam in _cams(view, link))
+    return [*(cam for cam in cams if cam is not None), *wheels]
 
 
-def replace_plate(discs: Sequence[CamDisc], holes: Iterable[tuple[complex, float]]) -> bool:
-    """Whether the cams of a link are all of it: every hole, by centre and radius, lies in each of them."""
-    return bool(discs) and all(disc.holds(*hole) for hole in holes for disc in discs)
+def replace_plate(discs: Sequence[LinkDisc], holes: Iterable[tuple[complex, float]]) -> bool:
+    """Whether cams and wheels are all of their link: every hole, by centre and radius, lies in each of them."""
+    return bool(discs) and all(
+        disc.holds(*place) for disc in discs for place in (*holes, *((place, 0.0) for place in disc.carried))
+    )
 
 
 def open_profiles(view: PosedStudy, link: str) -> list[Path]:
@@ -75,7 +102,8 @@ def followers(view: PosedStudy) -> dict[str, list[Shape]]:
 
 
 def cautions(view: PosedStudy) -> Iterator[Caution]:
-    """Warnings of cams that cannot be cut as they should."""
+    """Warnings of cams and wheels that cannot be cut as they should."""
+    yield from uncut(view)
     for cam in view.mechanism.cams:
         if _disc(view, cam, 0.0) is None:
             message = f"cam {cam.coupling}: its profile bounds no part: it is engraved on '{cam.links[1]}', and not cut"
@@ -88,13 +116,14 @@ def _cams(view: PosedStudy, link: str) -> list[CamFollower]:
     return [cam for cam in view.mechanism.cams if cam.links[1] == link]
 
 
-def _disc(view: PosedStudy, cam: CamFollower, kerf: float) -> CamDisc | None:
+def _disc(view: PosedStudy, cam: CamFollower, kerf: float) -> LinkDisc | None:
     """A cam to cut; None where its profile bounds no part.
 
     A ring and a cam with a groove have a rim as wide as the link. The ends of a profile of a part of a turn are joined
     to the plate around the pins of the link.
     """
     link, scale = cam.links[1], view.millimetres
+    remark = f"profile of cam {cam.coupling}, within {DEVIATION:g} mm"
     layer, radius = "pocket" if len(cam.sides) > 1 else "cut", scale * float(view.sizes.radius(link))
     outer, *inner = [_profile(view, cam, side, kerf).tolist() for side in cam.sides[::-1]]
     if not np.isfinite([outer, *inner]).all():
@@ -102,14 +131,13 @@ def _disc(view: PosedStudy, cam: CamFollower, kerf: float) -> CamDisc | None:
     if cam.closed:
         curves = [Path.line(layer, profile[:-1]).close() for profile in (outer, *inner)]
         rim = around("cut", outer, 2 * radius + kerf)
-        return CamDisc(
-            cam.coupling, curves if cam.sides == ("outer",) or isinstance(rim, DrawnCircle) else [rim, *curves]
-        )
+        ringed = cam.sides != ("outer",) and isinstance(rim, Path)
+        return LinkDisc(cam.coupling, [rim, *curves] if ringed else curves, remark)
     points, pins = view.points(link), joined(view.mechanism.description)
     holes = [(scale * points[point], scale * float(view.sizes.pin(point))) for point in points if point in pins]
     for places in ([scale * place for place in points.values()], [place for place, _ in holes]):
         for outline in _joined_to_plate(outer, places, radius + kerf / 2):
-            disc = CamDisc(cam.coupling, [Path.line("cut", outline).close()])
+            disc = LinkDisc(cam.coupling, [Path.line("cut", outline).close()], remark)
             if layer == "cut" and holes and replace_plate([disc], holes):
                 return disc
     return None

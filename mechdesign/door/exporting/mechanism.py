@@ -30,8 +30,10 @@ def mechanism_drawing(view: PosedStudy) -> Drawing:
         discs, place = discs_of(view, link, 0.0), scale * view.in_world(link, [0j])[0]
         profiles = [curve for disc in discs for curve in disc.curves] + open_profiles(view, link)
         holes = [(scale * view.points(link)[p], scale * float(sizes.pin(p))) for p in pinned if p in view.points(link)]
+        turn = complex(view.pose.rotation(link))
         shapes: list[Shape] = [] if replace_plate(discs, holes) else [around("links", outline, radius)]
-        shapes += [replace(curve, layer="links").moved(place, complex(view.pose.rotation(link))) for curve in profiles]
+        shapes += [replace(curve, layer="links").moved(place, turn) for curve in profiles]
+        shapes += [shape.moved(place, turn) for disc in discs for shape in disc.engraved]
         for slot in view.slots:
             if slot.link == link:
                 ends = [scale * place for place in view.in_world(link, slot.ends)]

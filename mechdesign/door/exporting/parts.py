@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from textwrap import wrap
 
 import numpy as np
 
-from mechdesign.door.exporting.discs import DEVIATION, CamDisc, cautions, discs_of, open_profiles, replace_plate
-from mechdesign.door.exporting.drawing import CentreMark, Drawing, DrawnCircle, Shape, Text, around, box, roomiest
+from mechdesign.door.exporting.discs import LinkDisc, cautions, discs_of, open_profiles, replace_plate
+from mechdesign.door.exporting.drawing import CentreMark, Drawing, Path, Shape, Text, around, box, roomiest
 from mechdesign.door.exporting.exports import drawings
 from mechdesign.door.exporting.view import PosedStudy, several
 from mechdesign.ground.cautions import Caution
@@ -19,6 +20,7 @@ from mechdesign.questions.reliability.schema.section import in_words
 
 SHEET = 600.0  # width of the sheet where the study gives none
 SPACING, HEIGHT = 6.0, 4.0  # between parts, and of the names under them
+NOTES = 64  # letters of a line of notes
 ENGRAVED = (0.35, 2.0, 10.0)  # height of an engraved name: as a part of the width, least and greatest
 
 
@@ -38,8 +40,8 @@ class Hole:
 class FlatPart:
     """A part in a frame of its own, in millimetres: places that its outline goes around, and its holes.
 
-    `marks` are places without a hole, and `engraved` pitch circles and profiles. A cam has the outline of its `disc`
-    instead, with the kerf in it.
+    `marks` are places without a hole, and `engraved` pitch circles and profiles. A cam or a wheel has the outline of
+    its `disc` instead, with the kerf in it.
     """
 
     name: str
@@ -48,7 +50,7 @@ class FlatPart:
     holes: Sequence[Hole]
     marks: dict[str, complex]
     engraved: Sequence[Shape] = ()
-    disc: CamDisc | None = None
+    disc: LinkDisc | None = None
 
     def faults(self) -> Iterator[str]:
         """What cannot be cut, in words: holes of different points that overlap, and one that leaves no rim."""
@@ -83,7 +85,8 @@ class FlatPart:
         """Its name, where most room is between the holes."""
         holes = [(turn * end, hole.radius) for hole in self.holes for end in _along(hole.ends)]
         if self.disc is not None:
-            sides = [(a, b) for curve in self.disc.curves for a, b, _ in curve.pieces()]
+            lines = [curve for curve in self.disc.curves if isinstance(curve, Path)]
+            sides = [(a, b) for curve in lines for a, b, _ in curve.pieces()]
             ends = [end for a, b in sides for end in (_along((a, b)) if abs(b - a) > self.radius / 2 else [a])]
             holes += [(turn * end, 0.0) for end in ends]
         place, room = roomiest([turn * place for place in self.places], holes, self.radius)
@@ -102,7 +105,7 @@ def _along(ends: tuple[complex, ...]) -> list[complex]:
 def parts_of(view: PosedStudy) -> list[FlatPart]:
     """Every link as a part, the ground too; of a telescopic link its body, and its rod.
 
-    A cam in which all holes of its link lie is the link, others are parts of their own.
+    A cam or a wheel in which all holes of its link lie is the link, others are parts of their own.
     """
     scale, sizes, pins = view.millimetres, view.sizes, joined(view.mechanism.description)
     parts = []
@@ -118,39 +121,26 @@ def parts_of(view: PosedStudy) -> list[FlatPart]:
                 holes.append(Hole(slot.point, ends, scale * float(sizes.pin(slot.point))))
         marks = {point: place for point, place in points.items() if point not in pins}
         places = [scale * place for place in view.outline(name)]
-        engraved: list[Shape] = [*_pitch_circles(view, name), *open_profiles(view, name)]
-        plate = FlatPart(name, places, radius, holes, marks, engraved)
+        plate = FlatPart(name, places, radius, holes, marks, open_profiles(view, name))
         discs = discs_of(view, name, scale * float(sizes.kerf))
         whole = replace_plate(discs, [(end, hole.radius) for hole in holes for end in hole.ends])
         parts += [] if whole else [plate]
         for disc in discs:
             title = name if whole and len(discs) == 1 else f"{name} {disc.coupling}"
-            parts.append(_cam_part(title, plate, disc))
+            parts.append(_disc_part(title, plate, disc))
         if link.tip is not None:
             tip = Hole(link.tip, (0j,), scale * float(sizes.pin(link.tip)))
             parts.append(FlatPart(rod_of(name).replace(":", " "), [0j], radius, [tip], {}))
     return parts
 
 
-def _cam_part(name: str, plate: FlatPart, disc: CamDisc) -> FlatPart:
-    """A cam of a link, with those of its holes and marks that lie in it."""
+def _disc_part(name: str, plate: FlatPart, disc: LinkDisc) -> FlatPart:
+    """A cam or a wheel of a link, with those of its holes and marks that lie in it."""
     holes = [hole for hole in plate.holes if all(disc.holds(end, hole.radius) for end in hole.ends)]
     marks = {point: place for point, place in plate.marks.items() if disc.holds(place, 0.0)}
-    profile = disc.curves[-1].corners
+    profile = disc.outline
     places = [*(end for hole in holes for end in hole.ends), *profile[:: max(len(profile) // 12, 1)]]
-    return FlatPart(name, places, plate.radius, holes, marks, disc=disc)
-
-
-def _pitch_circles(view: PosedStudy, link: str) -> list[DrawnCircle]:
-    """The pitch circles of a link's wheels, in its frame."""
-    mechanism, circles = view.mechanism, []
-    for mesh in mechanism.meshes:
-        for k, radius in enumerate(mesh.radii(view.pose)):
-            size, point = float(radius), mechanism.graph.nodes[mesh.axes[k]]
-            if mesh.links[k] == link and size > 0 and point in view.points(link):
-                center = view.millimetres * view.points(link)[point]
-                circles.append(DrawnCircle("engrave", center, round(view.millimetres * size, 9)))
-    return [*dict.fromkeys(circles)]
+    return FlatPart(name, places, plate.radius, holes, marks, disc.engraved, disc)
 
 
 def parts_drawing(view: PosedStudy) -> Drawing:
@@ -159,7 +149,22 @@ def parts_drawing(view: PosedStudy) -> Drawing:
     parts, kerf = parts_of(view), scale * float(sizes.kerf)
     width = SHEET if sizes.sheet is None else scale * float(sizes.sheet)
     groups = nested([(part.name, part.shapes(kerf)) for part in parts], width)
+    low, _ = box(shape for group in groups.values() for shape in group)
+    said = f"one unit is 1 mm; thickness {scale * float(sizes.thickness):.6g} mm; {_kerf(kerf)}"
+    words = wrap(said, NOTES)
+    under = [low - 1.5j * (k + 1) * HEIGHT for k in range(len(words))]
+    groups["notes"] = [Text("notes", place, HEIGHT, line) for place, line in zip(under, words, strict=True)]
     return Drawing(f"{view.study.name}: parts", groups, remarks(view, parts))
+
+
+def _kerf(kerf: float) -> str:
+    """What the drawing has of the kerf, in words."""
+    if not kerf:
+        return "no kerf is counted: parts are drawn as finished"
+    return (
+        f"kerf {kerf:.6g} mm is counted: cut along the lines, which lie {kerf / 2:.6g} mm outside of the finished "
+        f"parts, and holes are drawn {kerf:.6g} mm smaller in diameter"
+    )
 
 
 def nested(parts: Iterable[tuple[str, Sequence[Shape]]], width: float) -> dict[str, list[Shape]]:
@@ -185,14 +190,20 @@ def nested(parts: Iterable[tuple[str, Sequence[Shape]]], width: float) -> dict[s
 def remarks(view: PosedStudy, parts: Sequence[FlatPart]) -> list[str]:
     """What stands in the file in words: each part with its points, and the tolerances and fits of the study."""
     study, sizes, scale = view.study, view.sizes, view.millimetres
-    lines = [f"thickness {scale * float(sizes.thickness):.6g} mm, kerf {scale * float(sizes.kerf):.6g} mm"]
+    kerf = scale * float(sizes.kerf)
+    lines = [f"thickness {scale * float(sizes.thickness):.6g} mm, kerf {kerf:.6g} mm", _kerf(kerf)]
     for part in parts:
         ends = [(hole.point, hole.ends[0]) for hole in part.holes if len(hole.ends) == 1] + [*part.marks.items()]
         apart = [f"{one} {other} {abs(b - a):.9g} mm" for (one, a), (other, b) in combinations(ends, 2)]
         slots = [f"slot of {hole.point} {abs(hole.ends[1] - hole.ends[0]):.6g} mm long between centres"
                  for hole in part.holes if len(hole.ends) > 1]  # fmt: skip
-        holes = [f"hole {hole.point} {2 * hole.radius:.6g} mm" for hole in part.holes if len(hole.ends) == 1]
-        shaped = [] if part.disc is None else [f"profile of cam {part.disc.coupling}, within {DEVIATION:g} mm"]
+        drawn = "" if not kerf else ", drawn {:.6g} mm"
+        holes = [
+            f"hole {hole.point} {2 * hole.radius:.6g} mm{drawn.format(2 * hole.radius - kerf)}"
+            for hole in part.holes
+            if len(hole.ends) == 1
+        ]
+        shaped = [] if part.disc is None else [part.disc.remark]
         lines.append(f"{part.name}: {', '.join([*apart, *holes, *slots, *shaped])}")
     if study.reliability is not None:
         for name, dimension in study.reliability.dimensions.items():

@@ -129,6 +129,10 @@ class Coupling(Element):
     """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
     radius: Annotated[float, declared.Size("length", 0.0, exclusive=True, fixed=True)] = 0.0
     """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
+    module: declared.PositiveLength | None = None
+    """Module of the teeth of gears, pitch diameter over number of teeth, for drawings. Left out: not known. Example: 2
+    mm
+    """
     pressure_angle: Annotated[float, declared.Size("angle", fixed=True)] = PRESSURE_ANGLE
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
     cam: Annotated[Cam, declared.Notation("part")] | None = None
@@ -150,7 +154,9 @@ class Coupling(Element):
             yield "the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out"
         if given.phase is not None and given.ratio is None:
             yield "'phase' belongs to a 'ratio'"
-        for foreign in given.given("radius", "pressure_angle") if given.cam is not None else ():
+        if given.module is not None and given.wheels != "gears":
+            yield "a 'module' is that of teeth; leave it out"
+        for foreign in given.given("radius", "pressure_angle", "module") if given.cam is not None else ():
             yield f"{foreign!r} belongs to wheels; a cam has its own, in 'cam'"
 
     @property

@@ -68,9 +68,11 @@ def build_couplings(builder: Builder) -> dict[str, Coupling]:
         if given.cam is not None:
             with contextlib.suppress(WrongJoint):
                 cam = _cam(builder, name, given, sets, function)
+        module = None if given.module is None else builder.place((*path, "module"), given.module)
         couplings[name] = Coupling(
-            name, sets, function, wheels=given.wheels, pressure_angle=pressure, radius=given.radius or 0.0, cam=cam
-        )
+            name, sets, function, wheels=given.wheels, pressure_angle=pressure, radius=given.radius or 0.0, cam=cam,
+            module=module,
+        )  # fmt: skip
     return couplings
 
 

@@ -29,6 +29,8 @@ EARTH, ON_EARTH = "9.80665 m/s^2", 0.01
 ACCELERATIONS = ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2")
 # Pitch radii of a wheel that differ by this part or less are one; by more than the second no profile shift makes both.
 ONE_CIRCLE, SHIFTED = 1e-3, 0.05
+# A number of teeth that is so near a whole one is whole, as sizes are written with few digits.
+WHOLE_TEETH = 1e-2
 # Ratio of the largest link to the smallest from which their units likely differ.
 APART = 1000
 
@@ -44,6 +46,7 @@ def note(checker: Checker, parts: Mapping[str, Any], mechanism: Mechanism) -> No
     _pivots(checker, mechanism)
     _wheels(checker, mechanism)
     _planets(checker, mechanism)
+    _teeth(checker, mechanism)
     data = checker.reporter.document.data
     if data.get("requirements", ()) is None:
         checker.doubt(("requirements",), "lists nothing, so that no result is judged", at_key=True)
@@ -131,11 +134,25 @@ def _pivots(checker: Checker, mechanism: Mechanism) -> None:
             )
 
 
+def _teeth(checker: Checker, mechanism: Mechanism) -> None:
+    """Warn of wheels that have no whole number of teeth of their module."""
+    for mesh in mechanism.meshes:
+        module = mechanism.description.couplings[mesh.coupling].module
+        if module is None:
+            continue
+        size = float(mechanism.geometry.term(module, {}))
+        for radius in map(float, mesh.radii(mechanism.sketch_configuration)):
+            teeth = 2 * radius / size
+            if abs(teeth - round(teeth)) > WHOLE_TEETH:
+                message = f"a wheel of {2 * radius:.6g} pitch diameter has {teeth:.6g} teeth of the module {size:g}"
+                checker.doubt(("mechanism", "couplings", mesh.coupling, "module"), message)
+
+
 def _wheels(checker: Checker, mechanism: Mechanism) -> None:
     """Warn of wheels that are described, and that cannot make what their coupling says."""
     for coupling in mechanism.couplings:
         given = checker.mechanism.couplings[coupling.name]
-        described = [key for key in ("wheels", "radius", "pressure_angle") if key in given.model_fields_set]
+        described = [key for key in ("wheels", "radius", "pressure_angle", "module") if key in given.model_fields_set]
         made = {mesh.coupling for mesh in mechanism.meshes}
         if not described or given.wheels == "none" or given.cam is not None or coupling.name in made:
             continue
