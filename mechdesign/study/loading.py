@@ -41,7 +41,6 @@ from mechdesign.study.text.reading import LOST, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 
-
 # Keys of the sections of questions.
 _ASKED = tuple(command.key for command in COMMANDS.values())
 

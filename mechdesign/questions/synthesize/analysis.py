@@ -76,13 +76,18 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
     return words + [f"{lost} dropped: {reason}" for reason, lost in conditions.dropped.most_common() if lost]
 
 
-def _none(study: Study, task: Task, pools: Sequence[Pool], conditions: Conditions, told: Sequence[str]) -> AssemblyError:
+def _none(
+    study: Study, task: Task, pools: Sequence[Pool], conditions: Conditions, told: Sequence[str]
+) -> AssemblyError:
     """Why there is no solution, with the linkage that comes nearest where there is one."""
     words = "no linkage does it: " + "; ".join(told)
     best = min((pool for pool in pools if len(pool.way)), key=lambda pool: pool.rms().min(), default=None)
     if best is None:
         return AssemblyError(words)
-    solution, missed = best.solution(int(best.rms().argmin())), "; ".join(conditions.missed(best, int(best.rms().argmin())))
+    solution, missed = (
+        best.solution(int(best.rms().argmin())),
+        "; ".join(conditions.missed(best, int(best.rms().argmin()))),
+    )
     message = f"{words}; the nearest is in nearest.yaml: {missed}"
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])

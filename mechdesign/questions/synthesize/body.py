@@ -5,14 +5,13 @@ A function is a body too: the output link, as one sees it from the input link, m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.ground.errors import AssemblyError
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import dyads
 from mechdesign.questions.synthesize.dyads import GUIDE, LINK, SLIDE, Dyads
 from mechdesign.questions.synthesize.kinds import (
@@ -91,7 +90,8 @@ def choices(
         real, whole = sum(map(len, found)), count + len(fixed) == 5
         words = f"{real} real dyads of at most 4" if whole else f"{real} dyads from {WISHES} samples of each choice"
     placed = [
-        replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size) for part in found
+        replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size)
+        for part in found
     ]
     # The line of a slide of the frame is told by its point next to the task.
     return [
@@ -100,9 +100,7 @@ def choices(
     ], words  # fmt: skip
 
 
-def _wishes(
-    count: int, section: SynthesisSection, task: Positions, random: np.random.Generator
-) -> Iterator[Floats]:
+def _wishes(count: int, section: SynthesisSection, task: Positions, random: np.random.Generator) -> Iterator[Floats]:
     """Rows of wishes that leave no choice, each of shape (samples, rows, 8)."""
     if count == 5:
         yield np.empty((0, 8))
@@ -130,7 +128,9 @@ def _wishes(
         ])  # fmt: skip
 
 
-def _sampled(places: Sequence[tuple[float, float]] | Region | None, random: np.random.Generator, reach: float) -> Complexes:
+def _sampled(
+    places: Sequence[tuple[float, float]] | Region | None, random: np.random.Generator, reach: float
+) -> Complexes:
     """Places in a region, each given one equally often; without a region within `reach` of the origin."""
     if places is None:
         return reach * np.sqrt(random.uniform(size=WISHES)) * np.exp(1j * random.uniform(-np.pi, np.pi, WISHES))
@@ -202,7 +202,9 @@ def _refined(start: Dyads, task: Positions, held: Sequence[int] = ()) -> Dyads:
             size = np.maximum(np.abs(reach), np.finfo(float).tiny)
             along = np.conj(reach) / size
             wrong = size - length[:, None]
-            matrix = np.stack([(along * r).real, (along * 1j * r).real, -along.real, -along.imag, -np.ones_like(size)], 2)
+            matrix = np.stack(
+                [(along * r).real, (along * 1j * r).real, -along.real, -along.imag, -np.ones_like(size)], 2
+            )
         else:
             along = np.conj(normal)[:, None] * np.ones_like(reach)
             wrong = (along * reach).real
@@ -236,7 +238,9 @@ def pairs(
             continue
         a, b = np.divmod(np.arange(len(one) * len(other)), len(other))
         # A pair of links may be driven by either; two slides are the same pair in both orders.
-        a, b = (a[a != b], b[a != b]) if first == second == LINK else (a[a < b], b[a < b]) if first == second else (a, b)
+        a, b = (
+            (a[a != b], b[a != b]) if first == second == LINK else (a[a < b], b[a < b]) if first == second else (a, b)
+        )
         if len(a) > most:
             some = np.sort(random.choice(len(a), most, replace=False))
             a, b = a[some], b[some]

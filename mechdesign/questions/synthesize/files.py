@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from mechdesign.ground.errors import MechdesignError, StudyError
 from mechdesign.questions.look import ask
-from mechdesign.questions.synthesize.kinds import BODY, DRIVE, POINT
+from mechdesign.questions.synthesize.kinds import DRIVE, POINT
 from mechdesign.questions.synthesize.solutions import Solution
-from mechdesign.questions.synthesize.tasks import BodyTask, FunctionTask, Task
+from mechdesign.questions.synthesize.tasks import Task
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
 from mechdesign.study.schema.variable import plainly
@@ -28,7 +27,9 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
     """The study of a solution as data: its mechanism, the task as targets, and its errors as a requirement."""
     factor, kind = study.units.angle_factor, solution.kind
     mechanism: dict[str, Any] = copy.deepcopy(dict(kind.data))
-    for (place, declared), value in zip(kind.mechanism.description.places.items(), solution.values.tolist(), strict=True):
+    for (place, declared), value in zip(
+        kind.mechanism.description.places.items(), solution.values.tolist(), strict=True
+    ):
         _put(mechanism, place, plainly(value / factor if declared.quantity == "angle" else value))
     first = solution.poses.take((0, 0))
     mechanism["sketch"] = {point: _pair(complex(first.point(point))) for point in mechanism["sketch"]}
@@ -37,7 +38,10 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
     positions = [{DRIVE: plainly(angle / factor)} for angle in solution.angles.tolist()]
     most = max(float(solution.errors.max()) * (1 + _SLACK), _ROUNDING * task.size) / task.error_factor
     data: dict[str, Any] = {
-        "name": name, "units": study.resolved["units"], "seed": study.seed, "mechanism": mechanism,
+        "name": name,
+        "units": study.resolved["units"],
+        "seed": study.seed,
+        "mechanism": mechanism,
         "kinematics": {"poses": positions, "outputs": [*targets]},
         "requirements": [{"result": f"kinematics.{output}_error", "at_most": float(f"{most:.4g}"), "abs": True}],
     }

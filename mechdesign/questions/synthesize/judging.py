@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.questions.synthesize.kinds import Kind
 

@@ -6,19 +6,19 @@ projected out of the errors, whose components along the curve's tangent do not c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses of a curve, and points at equal arc length by which forms are compared.
 POSES = 64
 # Most linkages of a kind and an assembly whose curves are polished, and how many go on after so many rounds.
 POLISHED = 500
-_KEPT = {6: 400, 12: 150, 20: 60, 30: 24}
+_KEPT = {6: 400, 12: 150, 20: 80, 30: 60}
 ROUNDS = 60
 # Largest change of a crank angle in a round, radians.
 _LARGEST_TURN = 0.3
@@ -58,13 +58,21 @@ class Fits:
     costs: Floats  # sum of the squared distances
 
 
-Bound = Callable[[Floats], Floats]
+class Bound(Protocol):
+    """What keeps linkages within their conditions while they are polished."""
+
+    def __call__(self, values: Floats) -> Floats:
+        """The nearest values within the limits of each."""
+
+    def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
+        """Which linkages keep what their motion is asked for."""
 
 
 def fits(
     kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: Bound, polished: int = POLISHED
 ) -> Fits:
     """The linkages among samples whose curves have the form of the task, polished; `bound` keeps their values."""
+    samples = samples[bound.accepts(modes, samples)]
     values, angles = _alike(kind, modes, task, samples, polished)
     return polish(kind, modes, task, bound(values), angles, bound)
 
@@ -153,9 +161,7 @@ def _centred(curves: Complexes) -> tuple[Complexes, Complexes, Floats]:
     return about / size[:, None], middle, size
 
 
-def _alike(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int
-) -> tuple[Floats, Floats]:
+def _alike(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int) -> tuple[Floats, Floats]:
     """The linkages whose curves, turned, scaled and shifted, come nearest to the task, there; and their crank angles.
 
     |<w, q>| of curve and task, both of size 1, is the best fit over all similar curves.
@@ -184,9 +190,7 @@ def _alike(
     return kind.moved(values[best], scale, middle - scale * middles[best]), angles + np.angle(scale)[:, None]
 
 
-def _alike_open(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int
-) -> tuple[Floats, Floats]:
+def _alike_open(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int) -> tuple[Floats, Floats]:
     """The same for a path that is not closed, which a part of the curve resembles."""
     grid = 2 * np.pi * np.arange(2 * POSES) / POSES
     curves = kind.points(kind.solve(values, grid[None, :POSES], modes))
@@ -285,7 +289,7 @@ def polish(
         else:
             turned = angles + step[:, count:]
         new = cost(moved, turned)
-        better = new < costs
+        better = (new < costs) & bound.accepts(modes, moved)
         values, angles = np.where(better[:, None], moved, values), np.where(better[:, None], turned, angles)
         costs, damping = np.where(better, new, costs), np.where(better, np.maximum(damping / 4, 1e-12), 5 * damping)
     best = np.argsort(costs, kind="stable")

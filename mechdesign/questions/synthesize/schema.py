@@ -10,8 +10,7 @@ from pydantic import BeforeValidator, Field
 from mechdesign.questions.synthesize.kinds import BODIES, FOUR_BAR, FUNCTIONS, PATHS, starting
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.reading import failure, shown
+from mechdesign.study.text.reading import failure
 
 _KINDS = {
     "four_bar": "two links hold the coupler",

@@ -134,7 +134,7 @@ class Conditions:
         rows = np.flatnonzero(self.kept(pool))
         faulty = np.array([words != "" for words in pool.way.defects])[rows]
         errors = np.where(pool.rms() < EXACT * self.size, 0.0, pool.rms())[rows]
-        best = rows[np.lexsort((-pool.way.transmission[rows], errors, faulty))][: _MOST]
+        best = rows[np.lexsort((-pool.way.transmission[rows], errors, faulty))][:_MOST]
         yield from (pool.solution(int(row)) for row in best)
 
     def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
@@ -143,8 +143,9 @@ class Conditions:
         held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
         links = kind.links(values)
         lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
-        yield "a pivot is too far away (limits.reach)", (
-            np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size
+        yield (
+            "a pivot is too far away (limits.reach)",
+            (np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size),
         )
         with np.errstate(all="ignore"):
             ratio = lengths.max(axis=0) / lengths.min(axis=0)
@@ -157,7 +158,10 @@ class Conditions:
             yield "a pivot is none of those given (pivots)", (gap <= 1e-6 * self.size).all(axis=1)
         for box in section.keep_out:
             wrong = (
-                (pivots.real > box.x[0]) & (pivots.real < box.x[1]) & (pivots.imag > box.y[0]) & (pivots.imag < box.y[1])
+                (pivots.real > box.x[0])
+                & (pivots.real < box.x[1])
+                & (pivots.imag > box.y[0])
+                & (pivots.imag < box.y[1])
             )
             yield "a pivot lies where none may (keep_out)", ~wrong.any(axis=1)
         for name, (low, high) in section.lengths.items():
@@ -183,7 +187,9 @@ class Conditions:
     def _on_slide(kind: Kind, column: int) -> bool:
         """Whether a point of the frame only tells where a slide runs."""
         point = kind.places[column].split(".")[1]
-        return any(joint["slot"] == "ground" and joint["through"] == point for joint in kind.data.get("joints", {}).values())
+        return any(
+            joint["slot"] == "ground" and joint["through"] == point for joint in kind.data.get("joints", {}).values()
+        )
 
 
 def inside(region: Region, places: Any, size: float) -> Any:
@@ -219,7 +225,9 @@ def rounded(error: float, size: float) -> float:
     return 0.0 if error < EXACT * size else float(f"{error:.4g}")
 
 
-def ranked(solutions: Sequence[Solution], weights: Mapping[str, float], size: float) -> tuple[list[Solution], list[float]]:
+def ranked(
+    solutions: Sequence[Solution], weights: Mapping[str, float], size: float
+) -> tuple[list[Solution], list[float]]:
     """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
     measures = {
         "error": [-rounded(one.error, size) for one in solutions], "yield": [one.share[0] for one in solutions],

@@ -9,19 +9,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
-from mechdesign.questions.synthesize.judging import passed
+from mechdesign.questions.synthesize.judging import margins, passed
 from mechdesign.questions.synthesize.kinds import BODY, FOUR_BAR, POINT, Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
 from mechdesign.study import Study
 from mechdesign.study.text.csv_files import read_table
 
+# Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
+_AROUND, _AT_ONCE = 32, 1000
 # Most linkages of a kind whose ways are followed.
-MOST = 400
+MOST = 200
 # Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
 PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 1_500
 # An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
@@ -58,7 +60,10 @@ class BodyTask:
         """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
         return 1.0
 
-    apart: ClassVar[tuple[str, ...]] = (f"{BODY}.{POINT}.x", f"{BODY}.{POINT}.y")  #: places that are no dimensions of the linkage
+    apart: ClassVar[tuple[str, ...]] = (
+        f"{BODY}.{POINT}.x",
+        f"{BODY}.{POINT}.y",
+    )  #: places that are no dimensions of the linkage
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what the outputs should be at each position, in the study's units."""
@@ -107,7 +112,9 @@ class FunctionTask:
         conditions.told.append(words)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
-        links = links.take((np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size)))
+        links = links.take(
+            (np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size))
+        )
         if len(links):
             part = self._linkage(links)
             yield from assembled(part, self.gaps(part, links), conditions, self.size if self.slides else 1.0)
@@ -131,7 +138,12 @@ class FunctionTask:
         """The linkages with these couplers; the crank stands at the input plus the angle of its pin."""
         kind = kind_of("function", self.section.output_kind)
         values = np.tile(kind.nominal, (len(links), 1))
-        numbers = {"ground.O.x": 0.0, "ground.O.y": 0.0, "crank.length": np.abs(links.pivot), "coupler.length": links.length}
+        numbers = {
+            "ground.O.x": 0.0,
+            "ground.O.y": 0.0,
+            "crank.length": np.abs(links.pivot),
+            "coupler.length": links.length,
+        }
         if self.slides:
             numbers |= {"ground.D.x": 0.0, "ground.D.y": links.pin.imag, "rail.direction": 0.0}
         else:
@@ -244,6 +256,19 @@ class Bound:
             values[:, column] = np.clip(values[:, column], low, high)
         return values
 
+    def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
+        """Which linkages have the transmission angle that is asked for over a turn of the crank."""
+        least = self.task.section.transmission
+        if least is None or not self.task.section.needs_turn:
+            return np.ones(len(values), dtype=bool)
+        good = np.zeros(len(values), dtype=bool)
+        turn = 2 * np.pi * np.arange(_AROUND)[None] / _AROUND
+        for first in range(0, len(values), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            poses = self.kind.solve(values[some], turn, modes)
+            good[some] = margins(self.kind, poses)[1].min(axis=1) >= np.sin(float(least.at_least) * self.task.factor)
+        return good
+
     def _order(self, column: int) -> int:
         names = sorted(self.kind.places[x].split(".")[1] for x, _ in self.kind.pivots)
         names.sort(key="ODF".index)
@@ -286,7 +311,9 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     points = section.path.points
     table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
     if table.shape[1] != 2 or len(table) < 2:
-        raise StudyError([study.problem("a path has two points or more, a row [x, y] each", "synthesis", "path", "points")])
+        raise StudyError(
+            [study.problem("a path has two points or more, a row [x, y] each", "synthesis", "path", "points")]
+        )
     timing = None if section.path.timing is None else factor * np.array(section.path.timing)
     if timing is not None and len(timing) != len(table):
         message = f"{len(timing)} crank angles for {len(table)} points"
