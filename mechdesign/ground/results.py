@@ -78,6 +78,7 @@ class KeyNumber:
     bounds: tuple[str, str] | None = None  #: columns of the ends between which it lies
     interval: str = "from {low} to {high}"
     several: str = ""  #: what the rows are, where the smallest of several stands beside the largest
+    nearest: bool = False  #: of several such columns that with the most extreme number alone
 
 
 class Strands(NamedTuple):

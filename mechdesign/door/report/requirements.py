@@ -19,6 +19,7 @@ from mechdesign.ground.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.ground.statistics import AT_END, STATISTICS
 from mechdesign.ground.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.ground.terms import command_of as command_named
+from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
@@ -329,6 +330,8 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     ends = [scope.until for scope in scopes if scope is not None and scope.until]
     lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(value) else []
+    least = [chosen.column.rpartition(".")[2] for chosen in terms.parts if chosen.statistic in ("", "min")]
+    notes += [f"an overlap of {-value:.6g} {terms.unit}".rstrip()] * (value < 0 and CLEARANCE in least)
     note = "; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))])
     return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
 
