@@ -374,6 +374,7 @@ class Result:
     drawn: Drawn | None = None  #: what pictures need besides the tables
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
     reached: bool = True  #: else `failed` says why a reliability is not reached, where all poses assemble
+    allocated: Mapping[str, Table] = field(default_factory=dict)  #: those with allocated tolerances, which are judged
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())

@@ -240,7 +240,14 @@ def verdict_on(result: Result, requirement: Requirement, freedom: int = 1, *, fe
     UnknownColumnError
         See `requirements`.
     """
-    return _with_unit_of_limit(_judged(result, requirement, freedom, fewer), requirement)
+    judged, named = result, requirement.result.split(".")[1:2]
+    allocated = bool(result.allocated) and not {*named} & (result.tables.keys() - result.allocated.keys())
+    if allocated:
+        judged = replace(result, tables={**result.tables, **result.allocated})
+    verdict = _judged(judged, requirement, freedom, fewer)
+    if allocated:
+        verdict = replace(verdict, note="; ".join(filter(None, ("with the allocated tolerances", verdict.note))))
+    return _with_unit_of_limit(verdict, requirement)
 
 
 def _with_unit_of_limit(verdict: Verdict, requirement: Requirement) -> Verdict:
