@@ -71,7 +71,7 @@ def test_a_chart_of_a_page_has_the_same_curves_and_its_key_number_their_peak() -
     assert part is not None
     assert part.data["poses"] > 40
     (peak,) = (float(number.value.replace("\N{NARROW NO-BREAK SPACE}", "")) for number in headlines(result)
-               if number.label == "largest effort of theta")  # fmt: skip
+               if number.label.endswith("effort of theta"))  # fmt: skip
     with style.context():
         figure = figure_of(rough, result, "motion")
     effort = next(axes for axes in figure.axes if axes.get_ylabel().startswith("effort"))
@@ -142,7 +142,7 @@ def test_places_that_fall_together_leave_the_crank_angle_on_the_axis() -> None:
         study = study_of(SLIDER_CRANK.replace("[O, A, 30]", f"[O, A, {radius}]"))
         result = mechdesign.kinematics(study)
         marked = [number.place for number in headlines(result) if number.place is not None]
-        assert abs(marked[0] - marked[1]) < 1e-9
+        assert np.diff(np.sort(marked)).min() < 1e-9
         part = moving(study, result, marked=marked)
         assert part is not None
         assert part.data["over"][0] == "theta [deg]"
