@@ -15,7 +15,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.panels import Along, quantity
 from mechdesign.ground.numerics.arrays import Complexes, Floats
-from mechdesign.ground.numerics.rounding import unchanging
+from mechdesign.ground.numerics.rounding import STILL, unchanging
 from mechdesign.motion.rules import TIME
 from mechdesign.study import Study
 
@@ -33,6 +33,7 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 PEAK: dict[str, Any] = {"color": style.INK, "markersize": 7, "markerfacecolor": "none", "markeredgewidth": 1.6,
                         "clip_on": False, "zorder": 5}  # fmt: skip
 _ARROWS = 3  # on a hodograph
+_SHAFT = 0.01  # of its way, the part that gives an arrow its direction
 _EDGE = 0.06  # of the largest component, about hodographs
 
 
@@ -57,6 +58,11 @@ class JointLoad:
 def peak(joints: Sequence[JointLoad]) -> float:
     """Largest magnitude of any of some joints."""
     return max((joint.peak for joint in joints), default=0.0)
+
+
+def largest(sizes: Floats) -> int:
+    """Index of the largest of some sizes along a motion, flat; of those that differ by rounding the first."""
+    return int(np.argmax(sizes.ravel() >= (1 - STILL) * np.nanmax(sizes)))
 
 
 def loaded(joints: Sequence[JointLoad], rounding: float) -> list[JointLoad]:
@@ -112,7 +118,7 @@ def _mark_worst(
 ) -> tuple[str, tuple[float | None, float | None]]:  # fmt: skip
     """Mark the largest of some values, shape (joints, poses); it in words, and ends of the axis before rare peaks."""
     sizes = np.nan_to_num(np.abs(values), nan=0.0, posinf=0.0)
-    which, row = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+    which, row = np.unravel_index(largest(sizes), sizes.shape)
     least, most, value = float(np.nanmin(values, initial=0.0)), float(sizes[which, row]), float(values[which, row])
     usual = _BEYOND * float(np.quantile(sizes.max(axis=0), _USUAL))
     beyond, ends = cut and most > usual > 0, tuple[float | None, float | None]((None, None))
@@ -172,12 +178,14 @@ def hodograph(forces: Complexes, look: Mapping[str, Any], label: str = "") -> It
     finite, color = forces[np.isfinite(forces)], look["color"]
     if not len(finite):
         return
-    first, worst = finite[0], finite[np.argmax(np.abs(finite))]
+    first, worst = finite[0], finite[largest(np.abs(finite))]
     yield Dots([first.real], [first.imag], look={"color": color, "markersize": 5})
     yield Trace([0, worst.real], [0, worst.imag], look={"color": color, "linewidth": 0.8})
     yield Dots([worst.real], [worst.imag], look=PEAK | {"color": color, "markersize": 9, "clip_on": True})
-    steps = np.linspace(0, len(finite) - 2, _ARROWS + 2).astype(int)[1:-1]
-    yield Own(partial(_arrows, [tuple(finite[k : k + 2]) for k in steps if finite[k] != finite[k + 1]], color))
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(finite))))
+    heads = np.linspace(0, way[-1], _ARROWS + 2)[1:-1]
+    ends = (np.interp(at, way, finite) for at in (heads - _SHAFT * way[-1], heads))
+    yield Own(partial(_arrows, [(tail, tip) for tail, tip in zip(*ends, strict=True) if tail != tip], color))
 
 
 def _arrows(steps: Sequence[tuple[complex, ...]], color: str, axes: Axes) -> None:

@@ -41,6 +41,13 @@ class Along(NamedTuple):
         """The axis with room for dots at its first and last value."""
         return Axis(self.label, over=True, margin=0.02)
 
+    def spread(self, count: int, shift: float) -> list[int]:
+        """Rows of as many of its values, evenly spread, which begin at a part of the step: for markers."""
+        low, high = float(np.nanmin(self.values)), float(np.nanmax(self.values))
+        places = low + (high - low) * (np.arange(count) + shift) / count
+        rows: list[int] = np.unique(np.abs(self.values[:, None] - places).argmin(axis=0)).tolist()
+        return rows
+
     def value(self, at: float) -> str:
         """One of its values with four digits and its unit."""
         return f"{at:.4g} {style.printed(self.unit)}".rstrip()

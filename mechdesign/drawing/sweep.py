@@ -14,15 +14,12 @@ from mechdesign.ground.numerics.arrays import Complexes, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.motion.motion import radians
-from mechdesign.motion.solving import anchors_of
+from mechdesign.motion.finer import CHORD, near_chords, ways_of
 from mechdesign.questions.poses import Shown, pose_in_words
 from mechdesign.study import Study
 
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
 _SAME_POSE = 1e-3
-_FEW_POSES = 60  # fewer would show a curve as chords
-_TRACE_POSES = 240  # of a curve between few poses, about
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +29,7 @@ class Sweep(Shown):
     @classmethod
     def of(cls, shown: Shown) -> Sweep:
         """What a result carries."""
-        return cls(shown.study, shown.poses, shown.rows, shown.configuration)
+        return cls(shown.study, shown.poses, shown.rows, shown.configuration, shown.curve)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -57,24 +54,14 @@ class Sweep(Shown):
 
     @cached_property
     def traces(self) -> dict[str, Complexes]:
-        """Path of every moving point as a curve: solved between the poses, too, where these are few."""
-        count = len(self.rows)
-        if count < 2 or count >= _FEW_POSES or not self.poses.followed or self.poses.places:
+        """Path of every moving point as a curve, with more places than those of the poses."""
+        curve, points = self.curve, [*self.places]
+        if curve is None or curve.spent.any() or len(self.rows) < 2:
             # A closed path is listed without its begin at its end.
-            return {
-                name: np.append(path, path[:1]) if self.poses.closed else path for name, path in self.places.items()
-            }
-        names = self.poses.groups[0].names
-        plan = self.mechanism.plan(names)
-        parts = -(-_TRACE_POSES // count)
-        ends = np.append(self.rows, self.poses.line) if self.poses.closed else self.rows
-        s = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
-        line, anchors = np.zeros(len(s), dtype=np.intp), anchors_of(self.study.motion(self.poses), plan)
-        there = self.poses.along(line, s).values
-        values = [radians(self.study.units, coordinate, there[name])
-                  for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
-        solved = plan.solve(values, start=None if anchors is None else anchors.at(line, s))
-        return {name: np.where(solved.valid, solved.point(name), complex(np.nan, np.nan)) for name in self.places}
+            return {name: np.append(path, path[:1]) if self.poses.closed else path
+                    for name, path in self.places.items()}  # fmt: skip
+        _, ways = near_chords(curve, ways_of(curve, points), self.poses.numbers[self.rows])
+        return dict(zip(points, CHORD * curve.mechanism.size * ways, strict=True))
 
     @cached_property
     def scene(self) -> Scene:

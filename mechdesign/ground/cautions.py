@@ -32,6 +32,7 @@ KINDS = {
         "a cam that is undercut, does not close or has a large pressure angle, or whose follower lifts off",
         "howto/gears_and_cams",
     ),
+    "collision": WarningKind("plates that overlap along the motion", "howto/export"),
     "disagree": WarningKind(
         "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
     ),

@@ -78,6 +78,7 @@ class KeyNumber:
     bounds: tuple[str, str] | None = None  #: columns of the ends between which it lies
     interval: str = "from {low} to {high}"
     several: str = ""  #: what the rows are, where the smallest of several stands beside the largest
+    nearest: bool = False  #: of several such columns that with the most extreme number alone
 
 
 class Strands(NamedTuple):
@@ -373,6 +374,7 @@ class Result:
     drawn: Drawn | None = None  #: what pictures need besides the tables
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
     reached: bool = True  #: else `failed` says why a reliability is not reached, where all poses assemble
+    allocated: Mapping[str, Table] = field(default_factory=dict)  #: those with allocated tolerances, which are judged
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())

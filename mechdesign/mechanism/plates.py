@@ -17,6 +17,7 @@ from itertools import combinations
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
@@ -26,6 +27,8 @@ from mechdesign.mechanism.model import Description
 
 # Diameter of a pin and thickness of a plate that a study leaves out, as parts of the width.
 PIN, THICKNESS = 0.4, 0.25
+# Directions in which a drawn outline is round.
+_ROUND = np.exp(2j * np.pi * np.arange(48) / 48)
 # Ending of the columns of clearances, and the column of the smallest.
 CLEARANCE = "clearance"
 
@@ -168,6 +171,12 @@ class Clearances:
         tip = [self._node(link.tip)] if link.tip is not None else []
         return [*(origin + along * corner for corner in self.corners[item.name]), *tip]
 
+    def outline(self, item: Item) -> Complexes:
+        """The outline of an item in the one pose of a configuration, counter-clockwise, as places."""
+        around = [complex(np.ravel(place)[0]) for place in self.around(item)]
+        rounded = np.array(around)[:, None] + float(np.ravel(self._radius(item))[0]) * _ROUND
+        return np.array(hull(rounded.ravel().tolist()))
+
     def moved(self, item: Item, link: str | None = None) -> Value:
         """The longest way of a place of an item from each pose to the next, shape (n - 1,); in a link's frame."""
         places = self.around(item)
@@ -202,6 +211,21 @@ def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
         largest = np.where(length > 0, np.fmax(largest, apart), largest)
     lost = np.isnan(sum(np.abs(corner) for corner in (*one, *other)))
     return np.where(lost, np.nan, np.where(np.isneginf(largest), 0.0, largest))
+
+
+def common(one: Complexes, other: Complexes) -> Complexes:
+    """What two convex outlines have in common, both counter-clockwise; empty where they are apart."""
+    left = one.tolist()
+    for begin, end in zip(other.tolist(), np.roll(other, -1).tolist(), strict=True):
+        inside = [cross(end - begin, place - begin) for place in left]
+        kept: list[complex] = []
+        for k, (place, own) in enumerate(zip(left, inside, strict=True)):
+            before, there = left[k - 1], inside[k - 1]
+            if (own > 0) != (there > 0):
+                kept.append(before + (place - before) * there / (there - own))
+            kept += [place] if own > 0 else []
+        left = kept
+    return np.array(left, dtype=complex)
 
 
 def hull(places: Iterable[complex], flat: float = 1e-12) -> list[complex]:

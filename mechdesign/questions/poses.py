@@ -10,11 +10,12 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.mechanism import Configuration
+from mechdesign.motion.curve import Curve
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.passage import MAX_SHOWN_POSES, shown_rows
 from mechdesign.motion.question import Passage
 from mechdesign.motion.rows import OWN, DesignNumbers, Poses
-from mechdesign.motion.solving import POSES_AT_ONCE, solve_rows
+from mechdesign.motion.solving import POSES_AT_ONCE, curve_with, solve_rows
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 
@@ -61,13 +62,15 @@ def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:
 class Shown:
     """Poses of a study's kinematics in their order: those that give the same coordinates as the first.
 
-    `rows` are those of the study's poses: all of them, or evenly spread where there are more than can be shown.
+    `rows` are those of the study's poses: all of them, or evenly spread where there are more than can be shown. `curve`
+    is the motion between them; None of poses one by one, and where it cannot be followed.
     """
 
     study: Study
     poses: Poses
     rows: Ints
     configuration: Configuration
+    curve: Curve | None = None
 
     @property
     def solved(self) -> SolvedPoses:
@@ -81,11 +84,12 @@ class Shown:
 
 def shown_of(study: Study, passage: Passage) -> Shown:
     """What pictures show of a pass over the poses of a study."""
-    return Shown(study, passage.values.question.poses, passage.shown.rows, passage.shown.configuration)
+    curve, poses = passage.question.curve, passage.values.question.poses
+    return Shown(study, poses, passage.shown.rows, passage.shown.configuration, curve)
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:
     """Solve what a picture shows of a motion that no analysis was asked for; raises as `solve_rows`."""
     poses = study_poses(study, "kinematics")
-    rows = shown_rows(poses, most)
-    return Shown(study, poses, rows, solve_rows(study.motion(poses), rows))
+    rows, motion = shown_rows(poses, most), study.motion(poses)
+    return Shown(study, poses, rows, solve_rows(motion, rows), curve_with(motion, ()) if poses.followed else None)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 import mechdesign
 
@@ -116,6 +116,25 @@ def test_the_file_keeps_its_comments_and_says_the_new_tolerances(tmp_path: Path)
         [name for name in result.tables if name[:4] not in ("allo", "conf")],
         [],
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("asked", "most", "met"), [(0.999, 9e-4, False), (0.9999, 1.1e-4, True)])
+def test_requirements_are_judged_with_the_allocated_tolerances(asked: float, most: float, met: bool) -> None:
+    required = (
+        f"requirements: [{{result: reliability.failure, at_most: {most}}}, "
+        "{result: reliability.allocation.cost_allocated.max, at_most: 1000}]\n"
+    )
+    result = ask(CHAIN + required, f"reliability.allocate.reliability={asked}")
+    # With the tolerances as they are given 8.4e-4 fail.
+    given = 2 * ndtr(-0.3 / np.hypot(np.hypot(0.1, 0.2) / 3, 0.05))
+    assert result.tables["reliability"]["failure"][0] == pytest.approx(given, rel=1e-6)
+    errors, cost = result.verdicts
+    assert errors.met == met
+    assert errors.worst == pytest.approx(1 - asked, rel=0.2)
+    assert "with the allocated tolerances" in str(errors)
+    assert cost.met
+    assert "allocated tolerances" not in str(cost)
 
 
 @pytest.mark.slow

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.drawings import distance
+from helpers.pictures import figure_of
 from scipy.optimize import minimize_scalar
 
 import mechdesign
+from mechdesign.door.report.page.headlines import headlines
+from mechdesign.drawing import style
 
 FOUR_BAR = """
 mechanism:
@@ -108,3 +111,74 @@ def test_all_pairs_of_which_none_is_left_are_refused():
 def test_clearances_need_plates():
     with pytest.raises(mechdesign.StudyError, match=r"give mechanism.plates, such as {width: 20}"):
         mechdesign.load(text=FOUR_BAR.replace("  plates: {width: w, pin: 4}\n", ""))
+
+
+# Crank and rocker overlap most between two poses of the sweep.
+WIDE = {"mechanism.parameters.w": 45}
+REQUIRED = FOUR_BAR + "requirements: [{result: kinematics.clearance, at_least: 1 mm}]\n"
+
+
+def least():
+    """Least clearance of plates so wide, and the angle there."""
+    angles = np.linspace(90, 300, 421)
+    near = angles[np.argmin([clearance(theta) for theta in angles])]
+    best = minimize_scalar(clearance, bounds=(near - 1, near + 1), method="bounded", options={"xatol": 1e-10})
+    return best.fun + 10 - 45, best.x
+
+
+def crashed():
+    study = mechdesign.load(text=REQUIRED, overrides=WIDE)
+    return study, mechdesign.kinematics(study)
+
+
+def test_a_collision_is_a_warning_with_its_depth_and_its_pose():
+    depth, angle = least()
+    (warning,) = (warning for warning in crashed()[1].warnings if warning.kind == "collision")
+    assert str(warning) == f"crank and rocker overlap by {-depth:.4g} mm at theta = {angle:.4g} deg"
+    apart = mechdesign.kinematics(mechdesign.load(text=FOUR_BAR))
+    assert "collision" not in [warning.kind for warning in apart.warnings]
+
+
+def test_the_verdict_on_a_collision_names_the_pose_and_the_depth():
+    depth, angle = least()
+    (verdict,) = crashed()[1].verdicts
+    assert not verdict.met
+    assert verdict.worst == pytest.approx(depth, abs=1e-9)
+    assert verdict.place.startswith(f"theta {angle:.4f}"[:-2])
+    assert verdict.note == f"an overlap of {-depth:.6g} mm"
+
+
+def test_the_first_key_number_is_the_least_clearance():
+    depth, _ = least()
+    first, *others = headlines(crashed()[1])
+    assert first.label == "least clearance, crank and rocker"
+    assert float(first.value.replace("\N{MINUS SIGN}", "-")) == pytest.approx(depth, rel=1e-3)
+    assert "theta" in first.at
+    assert not [number.label for number in others if "clearance" in number.label]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_plates_are_drawn_where_they_overlap_most_with_the_overlap_marked(look):
+    depth, _ = least()
+    study, result = crashed()
+    with style.context(look):
+        axes = figure_of(study, result, "collisions").axes[0]
+    title = axes.get_title("left").replace("\n", " ")
+    assert f"crank and rocker overlap by {-depth:.3g} mm at theta = " in title
+    (overlap,) = (patch for patch in axes.patches if patch.get_label() == "overlap")
+    places = overlap.get_xy() @ [1, 1j]
+    # Two round ends: the overlap is a lens as thick as it is deep.
+    thickness = min(np.ptp((places * np.exp(1j * turn)).real) for turn in np.linspace(0, np.pi, 181))
+    assert thickness == pytest.approx(-depth, rel=0.02)
+
+
+@pytest.mark.slow
+def test_plates_that_do_not_meet_are_drawn_where_they_are_nearest():
+    study = mechdesign.load(text=FOUR_BAR)
+    result = mechdesign.kinematics(study)
+    with style.context():
+        axes = figure_of(study, result, "collisions").axes[0]
+    (way,) = (line for line in axes.lines if line.get_label() == "least clearance")
+    least = result.tables["extremes"]["min"][-1]
+    assert abs(np.diff(way.get_xydata() @ [1, 1j])[0]) == pytest.approx(least, rel=0.01)

@@ -177,7 +177,7 @@ def test_the_first_key_numbers_are_peaks_of_effort_the_flywheel_and_what_was_ask
     study = asked("kinematics: {outputs: [B.x], loads: [{at: B, force: [-100, 0]}], rates: {theta: 60 rpm}}")
     told = headlines(mechdesign.kinematics(study))
     assert [number.label for number in told[:3]] == [
-        "largest effort of theta",
+        "largest static effort of theta",
         "range of B.x",
         "largest velocity of B.x",
     ]
@@ -186,7 +186,7 @@ def test_the_first_key_numbers_are_peaks_of_effort_the_flywheel_and_what_was_ask
     study = asked("dynamics: {rates: {theta: 600 rpm}, flywheel: {fluctuation: 0.02}}")
     told = headlines(mechdesign.dynamics(study))
     assert told[0].label == "moment of inertia that the flywheel adds on theta"
-    assert told[1].label == "peak effort of theta"
+    assert told[1].label == "peak effort of theta with weights and inertia"
 
 
 def test_headlines_know_a_column_by_its_kind_whatever_its_name_and_its_meaning() -> None:

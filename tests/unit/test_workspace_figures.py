@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.pictures import figure_of
 from helpers.studies import study_of
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.door.report.page.moving import moving
 from mechdesign.drawing import style
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.pictures import figures
@@ -376,3 +379,39 @@ def test_the_size_of_a_rectangle_keeps_off_the_outline_of_the_circle(look: str) 
         np.clip(0, corners.real.min(), corners.real.max()), np.clip(0, corners.imag.min(), corners.imag.max())
     )
     assert abs(corners).max() < circle.radius or abs(nearest) > circle.radius
+
+
+def colours(axes: Axes) -> tuple[float, float]:
+    """Ends of the bar beside a map."""
+    ticks = axes.child_axes[0].get_yticks()
+    return float(min(ticks)), float(max(ticks))
+
+
+@pytest.mark.nightly
+def test_maps_of_several_orientations_have_the_same_colours_in_the_picture_and_on_the_page() -> None:
+    study = study_of(ARM.replace("rays: 30", "rays: 20"))
+    result = mechdesign.workspace(study)
+    local = result.tables["local"]
+    # One orientation has values many times those of another, of an index without bounds.
+    grown = np.where(local["hand.angle"] > 0, 10, 1) * local["sigma_min"]
+    columns = (replace(column, values=grown) if column.name == "sigma_min" else column for column in local.columns)
+    result = replace(result, tables={**result.tables, "local": replace(local, columns=tuple(columns))})
+    page = moving(study, result)
+    assert page is not None
+    with style.context():
+        bounded, alike, own = (
+            figure_of(study, result, name) for name in ("inverse_condition", "sigma_max", "sigma_min")
+        )
+        words = [
+            " ".join(text.get_text() for text in figure.findobj(Text)).replace("\n", " ")
+            for figure in (bounded, alike, own)
+        ]
+    assert {colours(axes) for axes in bounded.axes[:3] if axes.child_axes} == {(0.0, 1.0)}
+    assert ["one scale" in part for part in words] == [True, True, False]
+    assert "scale of its own" in words[2]
+    assert "inverse condition, from 0 to 1; one scale" in page.drawing
+    assert "scale of its own" in page.drawing
+    parts = [axes.get_title(loc="left").split("\n")[-1] for axes in own.axes[:3]]
+    labels = [chosen.label for _, maps in page.maps for chosen in maps if chosen.index == "sigma_min"]
+    assert labels == [f"sigma min {part}" for part in parts]
+    assert len({*labels}) == 2

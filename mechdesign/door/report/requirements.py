@@ -19,6 +19,7 @@ from mechdesign.ground.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.ground.statistics import AT_END, STATISTICS
 from mechdesign.ground.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.ground.terms import command_of as command_named
+from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
@@ -239,7 +240,14 @@ def verdict_on(result: Result, requirement: Requirement, freedom: int = 1, *, fe
     UnknownColumnError
         See `requirements`.
     """
-    return _with_unit_of_limit(_judged(result, requirement, freedom, fewer), requirement)
+    judged, named = result, requirement.result.split(".")[1:2]
+    allocated = bool(result.allocated) and not {*named} & (result.tables.keys() - result.allocated.keys())
+    if allocated:
+        judged = replace(result, tables={**result.tables, **result.allocated})
+    verdict = _judged(judged, requirement, freedom, fewer)
+    if allocated:
+        verdict = replace(verdict, note="; ".join(filter(None, ("with the allocated tolerances", verdict.note))))
+    return _with_unit_of_limit(verdict, requirement)
 
 
 def _with_unit_of_limit(verdict: Verdict, requirement: Requirement) -> Verdict:
@@ -329,6 +337,8 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
     ends = [scope.until for scope in scopes if scope is not None and scope.until]
     lacking = [chosen.lacking for chosen in terms.parts] if np.isnan(value) else []
+    least = [chosen.column.rpartition(".")[2] for chosen in terms.parts if chosen.statistic in ("", "min")]
+    notes += [f"an overlap of {-value:.6g} {terms.unit}".rstrip()] * (value < 0 and CLEARANCE in least)
     note = "; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))])
     return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
 

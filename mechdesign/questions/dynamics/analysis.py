@@ -57,10 +57,6 @@ class DrawnForces(DrawnPoses):
 
     name: ClassVar[str] = "dynamics"
 
-    def table(self, motion: PoseValues) -> Table:
-        """``dynamics.csv``."""
-        return dynamics_table(motion)
-
     def vectors(self, motion: PoseValues, shown: Shown) -> Iterator[DrawnVectors]:
         """Velocities, and forces by what exerts them.
 

@@ -20,6 +20,7 @@ from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, profiles
+from mechdesign.questions.kinematics.collisions import collision
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import LimitPlace, change_points, hidden, limits_of, limits_table, passed
@@ -163,6 +164,7 @@ class Kinematics(KinematicQuestion, MotionQuestion):
                 if lost and not passage.marks[design][without_value(name)].number:
                     words = f"{name} has {no_value_along(lost)}, between its poses"
                     warnings.append(Caution("undefined", words, "motion"))
+        warnings += collision(passage.values, along, design, self.study.units.label("length"))
         return [*warnings, *cautions(self.study, between.cams, design)], []
 
     def drawn(self, passage: Passage) -> DrawnMotion:

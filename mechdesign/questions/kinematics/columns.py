@@ -83,6 +83,7 @@ MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
 KEY_NUMBERS = (
+    KeyNumber(MOTION, "<a>.<b>.clearance", "least clearance, {pair}", "smallest", nearest=True),
     KeyNumber(MOTION, "<drive>_effort", "largest static effort of {name}", "size"),
     KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes
+from mechdesign.ground.columns import Column
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.results import Drawn, Table
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
+from mechdesign.motion.finer import asked_at, extremes_of, finer, together
+from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import PoseValues
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.limits import LimitPlace
 from mechdesign.questions.kinematics.loops import Toggle
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.special_poses import SpecialPoses, special_poses
-from mechdesign.questions.kinematics.tables import motion_table
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import Shown
 
@@ -64,9 +66,50 @@ class DrawnPoses(Drawn):
     #: Name of the table with a row a pose.
     name: ClassVar[str] = "motion"
 
-    def table(self, motion: PoseValues) -> Table:
-        """The table with a row a pose of a motion of this question."""
-        return motion_table(motion)
+    @cached_property
+    def finer(self) -> Self:
+        """The motion as curves are drawn: at its poses, its ends and the extremes of its columns, and between."""
+        along, shown = self.along, self.shown
+        if along is None or along.curve.spent.any():
+            return self
+        question, poses = along.question, shown.poses
+        sizes = {**question.parts, **{name: size for name, (size, _) in question.columns.items()}}
+
+        def columns(motion: PoseValues) -> dict[str, Floats]:
+            valid, arrays = motion.valid, motion.arrays
+            return {name: np.where(valid, arrays[name], np.nan) for name in sizes if name in arrays}
+
+        # Parts of a force are drawn by its size, whose extremes are known.
+        followed = [name for name in sizes if name in along.columns or not name.endswith(".moment")]
+        rows = together(poses.numbers[shown.rows], extremes_of(along))
+        return self._of(*finer(question, along.curve, rows, self.motion, columns, sizes, followed))
+
+    def at(self, places: Floats) -> Self:
+        """The motion at places, in rows; without errors of targets that are given pose by pose."""
+        assert self.along is not None
+        return self._of(*asked_at(self.along.question, self.along.curve, places))
+
+    def _of(self, there: SolvedPoses, motion: PoseValues) -> Self:
+        shown = replace(self.shown, poses=there.poses, rows=there.rows, configuration=there.configuration)
+        return replace(self, motion=motion, shown=shown)
+
+    def rows_of(self, table: Table, whole: DrawnPoses) -> Table:
+        """A table of the whole motion with its rows at these poses, those of the study as they stand in it.
+
+        An error of a target that is given pose by pose is drawn straight between these.
+        """
+        if self is whole:
+            return table
+        solved = self.motion.question.a_row_a_pose[table.name](self.motion)
+        rows, places = whole.shown.rows, self.shown.poses.numbers
+        numbers, columns = whole.shown.poses.numbers[rows], list[Column]()
+        at_rows = np.searchsorted(places, numbers)
+        for column in table.columns:
+            own = column.values[rows]
+            values = np.array(solved[column.name] if column.name in solved else np.interp(places, numbers, own))
+            values[at_rows] = own
+            columns.append(replace(column, values=values))
+        return replace(table, columns=tuple(columns))
 
     def vectors(self, motion: PoseValues, shown: Shown) -> Iterable[DrawnVectors]:
         """Vectors at shown poses of a motion of this question: velocities of the points, where there are rates."""

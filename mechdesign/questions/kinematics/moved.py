@@ -130,8 +130,9 @@ class MovedQuestion(PoseQuestion):
         arrays = full(self.moved(part)[0], part.rows.shape)
         smooth = _through_change_points(self, part, arrays)
         line, row = part.poses.places_along
-        rows = (line * self.whole.line + row).astype(np.intp)
-        return {**arrays, THROUGH: smooth, **targets.errors(self.study, self.whole, arrays, rows)}
+        between = row.dtype.kind == "f"
+        rows = (line * self.whole.line + (0 if between else row)).astype(np.intp)
+        return {**arrays, THROUGH: smooth, **targets.errors(self.study, self.whole, arrays, rows, between=between)}
 
     @property
     def drives(self) -> list[Coordinate]:

@@ -25,8 +25,7 @@ def allocated_data(study: Study, tolerances: Sequence[Allotment], scales: Floats
     data: dict[str, Any] = plain(study.resolved)
     changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
     written = data["reliability"]
-    judged = (["allocation"], ["confirmation"])
-    if not any(requirement.result.split(".")[1:2] in judged for requirement in study.requirements):
+    if not any(of_allocation(requirement.result) for requirement in study.requirements):
         del written["allocate"]
     entries = written.get("dimensions") or {}
     # Of several wildcards the last one counts.
@@ -44,6 +43,11 @@ def allocated_data(study: Study, tolerances: Sequence[Allotment], scales: Floats
         if point in changed:
             written["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
     return data
+
+
+def of_allocation(result: str) -> bool:
+    """Whether a result that a requirement names stands in the tables of an allocation."""
+    return result.split(".")[1:2] in (["allocation"], ["confirmation"])
 
 
 def _dimension(raw: Any, tolerance: Allotment, scale: float, study: Study) -> Any:

@@ -23,6 +23,8 @@ from mechdesign.questions.reliability.grades import graded
 from mechdesign.questions.reliability.schema.section import Precision, ReliabilitySection
 from mechdesign.questions.reliability.tables import at_poses
 from mechdesign.questions.reliability.task import Partial, Task
+from mechdesign.study import Study
+from mechdesign.study.loading import load_data
 from mechdesign.study.variants import rewritten
 
 # Most rounds of allocation and simulation.
@@ -110,10 +112,13 @@ def _worst(level: Floats) -> tuple[int, int]:
     return int(limit), int(pose)
 
 
-def allocate(task: Task, section: ReliabilitySection) -> Result:
-    """Allocate the tolerances of a study with `allocate`: tables, warnings, and the study with the new tolerances."""
+def allocate(task: Task, section: ReliabilitySection) -> tuple[Result, Study | None]:
+    """Allocate the tolerances of a study with `allocate`: tables, warnings, the file of the study with the new ones.
+
+    Returns this study as well, without `allocate`, where the tolerances reach what is asked.
+    """
     if section.allocate is None or not task.settings:
-        return Result("allocation", {})
+        return Result("allocation", {}), None
     study, aim = task.study, aim_of(section.allocate)
     start = tolerances(study, task.sources)
     free = np.array([k for k, tolerance in enumerate(start) if tolerance.cost is not None], dtype=np.intp)
@@ -124,7 +129,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     rounds = _rounds(model, aim.method(task, section))
     confirmed = [candidate for candidate in rounds if not candidate.missed().any()]
     if not confirmed and rounds[-1].tightest():
-        return Result("allocation", {}, failed=_unreachable(rounds[-1]))
+        return Result("allocation", {}, failed=_unreachable(rounds[-1])), None
     last = min(confirmed, key=_Round.cost) if confirmed else rounds[-1]
     where, by_model, by_simulation = last.worst()
     asked, failed = f"{float(aim.shown(np.array(aim.goal))):.15g}", ""
@@ -150,14 +155,14 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if last.bound < last.cost() * (1.0 - _SAME):
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
-    text, others = rewritten(
-        study,
-        allocated_data(study, start, last.scales),
-        f"Tolerances of {study.name}, the cheapest for a {aim.noun} of {asked}",
-    )
+    data, made = allocated_data(study, start, last.scales), None
+    if confirmed:
+        made = load_data(data, (), None, study.folder, study.drawn)
+        made = made.with_sections(reliability=ReliabilitySection.of(made).model_copy(update={"allocate": None}))
+    text, others = rewritten(study, data, f"Tolerances of {study.name}, the cheapest for a {aim.noun} of {asked}")
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))
-    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others})
+    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others}), made
 
 
 def _rounds(model: ToleranceModel, method: str) -> list[_Round]:

@@ -12,12 +12,14 @@ from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import Interrupted, StudyError
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Result, Table
+from mechdesign.ground.terms import command_of
 from mechdesign.ground.work.threads import keep_freed_memory, one_thread
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.reliability import methods, sobol, tables
+from mechdesign.questions.reliability.allocated import of_allocation
 from mechdesign.questions.reliability.allocation import allocate
 from mechdesign.questions.reliability.between import between_poses, places_between
 from mechdesign.questions.reliability.cycle import with_cycle
@@ -57,12 +59,14 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     )  # fmt: skip
     results, stopped = list[MethodResult](), False
     indices: dict[int, SobolIndices] = {}
-    allocated = Result("allocation", {})
+    allocated, made = Result("allocation", {}), dict[str, Table]()
     try:
         for method in section.methods:
             results.append(with_cycle(methods.run(method, task), task, results))
         indices = sobol.indices(task, section)
-        allocated = allocate(task, section)
+        allocated, own = allocate(task, section)
+        if own is not None and _judges_errors(study):
+            made = dict(reliability(own, seed=task.seed, jobs=jobs, progress=progress).tables)
     except KeyboardInterrupt as stop:
         results += [stop.result] if isinstance(stop, Partial) else []
         if not results:
@@ -85,11 +89,17 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files,
         f"interrupted: {samples} samples, {named}" if stopped else "",
-        tables.drawn_errors(task, sampled), reached=bool(failed) or not allocated.failed,
+        tables.drawn_errors(task, sampled), reached=bool(failed) or not allocated.failed, allocated=made,
     )  # fmt: skip
     if stopped:
         raise Interrupted(result)
     return result
+
+
+def _judges_errors(study: Study) -> bool:
+    """Whether requirements of a study judge its reliability, and not its allocation alone."""
+    results = [requirement.result for requirement in study.requirements]
+    return any(command_of(name) == "reliability" and not of_allocation(name) for name in results)
 
 
 def first_order_tables(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.along import BELOW, PlainAlong
 from mechdesign.motion.answer import alone
+from mechdesign.motion.finer import finer
 from mechdesign.motion.motion import Motion, SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, unfilled
 from mechdesign.motion.rows import Poses
@@ -42,6 +43,8 @@ from mechdesign.study import Study
 CHUNK = 8192
 # Tables in the order in which they are shown.
 ORDER = ("stiffness", "compliance", "eigen", "springs", "deflections", "forces", "displacements")
+# Tables that are drawn as curves.
+DRAWN = ("stiffness", "forces")
 # Columns of which nothing is said between the poses: directions, which jump, and counts.
 OF_POSES = ("k_angle", "free_x", "free_y", "free_phi", "rank", "valid")
 # Columns that go to infinity: where the body is rigid in a direction, and of compliances where a twist is free.
@@ -94,11 +97,38 @@ class DrawnStiffness(Drawn):
         The solved poses, evenly spread where they are many.
     first, loose : DrawnPose or None
         The first valid pose, and the first with a free twist; None where there is none.
+    values : PoseValues
+        What the question has at the poses.
     """
 
     shown: Shown
     first: DrawnPose | None
     loose: DrawnPose | None
+    values: PoseValues
+
+    @cached_property
+    def finer(self) -> PoseValues:
+        """The same with as many poses as curves need."""
+        curve, shown, question = self.shown.curve, self.shown, self.values.question
+        if curve is None or curve.spent.any():
+            return self.values
+
+        def columns(values: PoseValues) -> dict[str, Floats]:
+            own: Stiffness = values.question
+            made = own.chosen(values, DRAWN)
+            drawn = {(name, c.name): c.values for name, table in made.items() for c in table.columns
+                     if c.values.dtype.kind == "f" and c.name not in OF_POSES}  # fmt: skip
+            if "forces" in made:
+                drawn["forces", ""] = np.hypot(drawn["forces", "fx"], drawn["forces", "fy"])
+            return {f"{name} {column} {k}": part for (name, column), numbers in drawn.items()
+                    for k, part in enumerate(numbers.reshape(own.poses.count, -1).T)}  # fmt: skip
+
+        at_poses = columns(self.values)
+        force = max((float(np.nanmax(part, initial=0.0)) for name, part in at_poses.items() if name[:8] == "forces  "),
+                    default=0.0)  # fmt: skip
+        arm = shown.study.mechanism.size
+        sizes = {name: force * (arm if " mz " in name else 1.0) for name in at_poses if name.startswith("forces ")}
+        return finer(question, curve, shown.poses.numbers[shown.rows], self.values, columns, sizes)[1]
 
 
 def _made(name: str, values: PoseValues) -> Table:
@@ -249,7 +279,7 @@ class Stiffness(MotionQuestion):
             self._drawn_pose(values, int(where.argmax())) if where.any() else None
             for where in (values.valid, np.isfinite(values.arrays["free"][:, 0]))
         )
-        return DrawnStiffness(shown_of(self.body.study, passage), first, loose)
+        return DrawnStiffness(shown_of(self.body.study, passage), first, loose, values)
 
     def _drawn_pose(self, values: PoseValues, row: int) -> DrawnPose:
         """A pose with its springs, and with the twists that the loads make."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
@@ -13,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.door.report.page.frames import near_the_paths, paths_of
 from mechdesign.door.report.page.linkage import Canvas, Sketcher, add
 from mechdesign.door.report.page.moving import gaps
 from mechdesign.door.report.page.tracks import TIMES, Cell, MovingPicture, ShownNumbers, deltas, places
@@ -27,6 +25,7 @@ from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.numerics.arrays import Ints, evenly
 from mechdesign.ground.results import Table
 from mechdesign.motion.corners import curve_of
+from mechdesign.motion.finer import near_chords, ways_of
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.optimize import pareto
@@ -158,8 +157,8 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     curve = curve_of(study.motion(poses))
     places = evenly(poses.line, MAX_POSES).astype(float)
     if not curve.spent.any():
-        places = near_the_paths(curve, partial(paths_of, curve, study.mechanism.points), places, MAX_POSES)
-    if poses.closed:
+        places, _ = near_chords(curve, ways_of(curve, study.mechanism.points), places, MAX_POSES)
+    elif poses.closed:
         places = np.append(places, poses.end)
     configuration = curve.solve(*curve.grid(places), turning=False).configuration
     sweeps = []

@@ -26,12 +26,12 @@ from mechdesign.questions.workspace.columns import HELD
 # Largest number of headlines of a question.
 MOST = 8
 _MOST_GOALS = 4  # of the best case of a sweep
-# Rates, forces and what cams have: their extremes are not shown, of some the largest absolute value is.
+# Rates, forces, what cams have and clearances: their extremes are not shown, of some the largest absolute value is.
 _RATES_AND_FORCES = [
     MOTION[name]
     for name in (
         "<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration",
-        "<coupling>_pressure_angle", "<coupling>_curvature_radius",
+        "<coupling>_pressure_angle", "<coupling>_curvature_radius", "<a>.<b>.clearance", "clearance",
     )
 ]  # fmt: skip
 # Kinds of columns that say which pose a row is of.
@@ -91,11 +91,14 @@ def headlines(result: Result) -> list[Headline]:
         table = result.tables.get(rule.table.name)
         if table is None or not len(table):
             continue
-        for column in table.columns:
-            fits = not rule.column or column.kind == rule.table[rule.column]
-            if fits and column.numeric and _requested(result, rule, column):
-                for number in _of(result, rule, column):
-                    numbers.setdefault(number.label, number)
+        kind = rule.table[rule.column] if rule.column else None
+        columns = [column for column in table.columns
+                   if kind in (None, column.kind) and column.numeric and _requested(result, rule, column)]  # fmt: skip
+        if rule.nearest:
+            columns = sorted(columns, key=lambda column: _least(result, rule, column))[:1]
+        for column in columns:
+            for number in _of(result, rule, column):
+                numbers.setdefault(number.label, number)
     return list(numbers.values())[:MOST]
 
 
@@ -150,6 +153,12 @@ def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:
     return True
 
 
+def _least(result: Result, rule: KeyNumber, column: Column) -> float:
+    """The smallest value of a column over the motion, or of its rows; infinite without any."""
+    between = _between(rule, result, column)
+    return between[1] if between else float(np.nanmin(column.values, initial=np.inf))
+
+
 def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     table = result.tables[rule.table.name]
     values = np.asarray(column.values, dtype=float)
@@ -178,7 +187,8 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = re.sub("_(effort|power|mean)$", "", column.name)
-        label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
+        pair = " and ".join(name.split(".")[:-1])
+        label = rule.label.format_map({**words, "name": name, "meaning": column.meaning, "pair": pair})
         low, high = (float(table[bound][row]) for bound in rule.bounds or (column.name, column.name))
         if rule.table is EXTREMES and low == high:
             # The motion has a single pose.

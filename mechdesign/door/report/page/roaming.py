@@ -18,6 +18,7 @@ from PIL import Image
 from mechdesign.door.report.page.linkage import Canvas, Sketcher, add, dashed
 from mechdesign.door.report.page.tracks import Map, MovingPicture, ShownNumbers, meanings, places
 from mechdesign.drawing import style
+from mechdesign.drawing.contours import Grid
 from mechdesign.drawing.scene import Scene
 from mechdesign.ground.columns import Column
 from mechdesign.ground.numerics.arrays import Complexes, Ints, evenly
@@ -25,7 +26,7 @@ from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
-from mechdesign.questions.workspace.figures.index_maps import contours, index_columns, index_norm
+from mechdesign.questions.workspace.figures.index_maps import Scale, contours, index_columns
 from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
@@ -74,17 +75,17 @@ def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
     root = sheet.root(f"the mechanism in the workspace of point {section.point}")
     indices = [index for index in index_columns(shown[0])
                if all(np.isfinite(region.local[index]).any() for region in shown)]  # fmt: skip
-    norms = {index: index_norm(shown, index) for index in indices}
+    scales = {index: Scale.of(shown, index) for index in indices}
     maps, layers = [], add(root, "defs")
     for k, region in enumerate(shown):
-        maps.append((region.title, _maps(layers, sheet, region, norms, f"{name}-map-{k}")))
+        maps.append((region.title, _maps(layers, sheet, region, k, scales, f"{name}-map-{k}")))
     add(root, "use", **{"class": "moving-region"}, href=f"#{maps[0][1][0].href}")
     scenes = Scene(mechanism, configuration).some([begin, *evenly(len(rows), _NAMED_POSES).tolist()])
     sketcher = Sketcher(root, sheet, scenes[0])
     sketcher.draw()
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
-    _legend(root, sheet, shown, [(shown[0].local.column(index), norm) for index, norm in norms.items()])
+    _legend(root, sheet, shown, scales)
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
     words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
     replaces = ("workspace", *indices)
@@ -122,8 +123,10 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
     return Table("poses", tuple(columns))
 
 
-def _maps(layers: Element, sheet: Canvas, region: Region, norms: Mapping[str, BoundaryNorm], name: str) -> list[Map]:
-    """A group for each index with its map over a region, or one of the region alone."""
+def _maps(
+    layers: Element, sheet: Canvas, region: Region, number: int, scales: Mapping[str, Scale], name: str
+) -> list[Map]:  # fmt: skip
+    """A group for each index with its map over a region, the one of a number, or a group of the region alone."""
     places = sheet.all(region.places())
     low, high = _corners(places)
     window = f"{low.real:.0f} {low.imag:.0f} {high.real - low.real:.0f} {high.imag - low.imag:.0f}"
@@ -131,17 +134,16 @@ def _maps(layers: Element, sheet: Canvas, region: Region, norms: Mapping[str, Bo
     _region(below, sheet, region)
     _boundary(above, sheet, region)
     maps = []
-    for index, norm in norms.items() or [("", None)]:
+    for index, scale in scales.items() or [("", None)]:
         # Small maps are drawings of their own, which would fill what the large one does not.
         layer = add(layers, "g", id=f"{name}-{index}", fill="none")
         add(layer, "use", href=f"#{name}-region")
-        if norm is None:
+        if scale is None:
             maps.append(Map("", "region", "", f"{name}-", window))
         else:
-            column = region.local.column(index)
-            _map(layer, sheet, region, index, norm)
-            label = style.axis_label(index.replace("_", " "), column.unit)
-            maps.append(Map(index, label, column.meaning, f"{name}-{index}", window))
+            _map(layer, sheet, scale.patches[number], scale.norm)
+            meaning = region.local.column(index).meaning
+            maps.append(Map(index, scale.labels[number], meaning, f"{name}-{index}", window))
         add(layer, "use", href=f"#{name}-boundary")
     return maps
 
@@ -160,13 +162,13 @@ def _region(layer: Element, sheet: Canvas, region: Region) -> None:
     _fill(layer, sheet, region.local, PALE)
 
 
-def _map(layer: Element, sheet: Canvas, region: Region, index: str, norm: BoundaryNorm) -> None:
-    """A local index over the region, as a picture of few colours."""
+def _map(layer: Element, sheet: Canvas, patches: Sequence[Grid], norm: BoundaryNorm) -> None:
+    """A local index over the patches of a region, as a picture of few colours."""
     figure = Figure(figsize=(sheet.width / 72, sheet.height / 72), dpi=_DPI, facecolor="none")
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
-    contours(axes, list(grids(region.local, index)), norm)
+    contours(axes, patches, norm)
     far = sheet.corner + complex(sheet.width, -sheet.height) / sheet.scale
     axes.set_xlim(sheet.corner.real, far.real)
     axes.set_ylim(far.imag, sheet.corner.imag)
@@ -205,7 +207,7 @@ def _look(line: Element, kind: str) -> None:
     dashed(line, dashes, width)
 
 
-def _legend(root: Element, sheet: Canvas, shown: Sequence[Region], maps: Sequence[tuple[Column, BoundaryNorm]]) -> None:
+def _legend(root: Element, sheet: Canvas, shown: Sequence[Region], scales: Mapping[str, Scale]) -> None:
     """Below the drawing what ends the regions, and what the colours of each map mean; the first is seen."""
     fates = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip
@@ -216,17 +218,16 @@ def _legend(root: Element, sheet: Canvas, shown: Sequence[Region], maps: Sequenc
         _look(add(root, "path", d=f"M{x:g} {y:.1f}h24"), kind)
         add(root, "text", LOOKS[kind][3], x=x + 30, y=y + 3.5, font_size=10, fill="#333333")
     height = sheet.height + _LINE * -(-len(kinds) // columns)
-    height += _LINE * bool(maps)
-    for index, norm in maps:
-        entry = add(
-            root, "g", **{"class": f"moving-legend{' moving-off' * (index is not maps[0][0])}"}, data_index=index.name
-        )
+    height += _LINE * bool(scales)
+    for number, (index, scale) in enumerate(scales.items()):
+        norm = scale.norm
+        entry = add(root, "g", **{"class": f"moving-legend{' moving-off' * bool(number)}"}, data_index=index)
         levels = np.asarray(norm.boundaries, dtype=float)
         for k, level in enumerate((levels[1:] + levels[:-1]) / 2):
             add(entry, "rect", x=12 + _SWATCH * k, y=height - 0.8 * _LINE, width=_SWATCH, height=0.6 * _LINE,
                 fill=to_hex(colormaps[style.COLORMAP](int(norm(level)))))  # fmt: skip
-        name = style.axis_label(index.name.replace("_", " "), index.unit)
-        words = f"{name}, from {levels[0]:g} to {levels[-1]:g}{' and beyond' * (norm.extend != 'neither')}"
+        beyond = " and beyond" * (norm.extend != "neither")
+        words = f"{scale.label}, from {levels[0]:g} to {levels[-1]:g}{beyond}{scale.words.replace('panel', 'map')}"
         add(entry, "text", words, x=18 + _SWATCH * (len(levels) - 1), y=height - 0.3 * _LINE, font_size=10,
             fill="#333333")  # fmt: skip
     root.set("viewBox", f"0 0 {sheet.width:g} {height + 4:.1f}")

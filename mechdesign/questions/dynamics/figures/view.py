@@ -22,8 +22,8 @@ class DynamicsView(PosesView):
 
     @cached_property
     def drawn(self) -> DrawnForces:
-        """The solved poses and the columns of the motion."""
-        return DrawnForces.of(self.result)
+        """The solved poses and the columns of the motion, with as many poses as curves need."""
+        return DrawnForces.of(self.result).finer
 
     @property
     def question(self) -> ForceQuestion:

@@ -39,10 +39,10 @@ class Centrodes(NamedTuple):
 @picture(MotionView, "centrodes", order=35)
 def centrodes_picture(view: MotionView) -> Picture | None:
     """A panel for each pair of links whose instant centre is asked for; None where each stays at a pin."""
-    sweep, table = view.sweep, view.result.tables.get("instant_centres")
-    if table is None or not sweep.poses.followed or not len(sweep.valid):
+    if "instant_centres" not in view.result.tables or not view.sweep.poses.followed or not len(view.sweep.valid):
         return None
-    pairs = centrodes(sweep, table)[:MOST_PAIRS]
+    sweep = Sweep.of(view.curves.shown)
+    pairs = centrodes(sweep, view.table("instant_centres"))[:MOST_PAIRS]
     if not pairs:
         return None
     middle, *sides = extent(sweep.extent)

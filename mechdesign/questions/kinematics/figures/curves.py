@@ -83,8 +83,10 @@ class _Group(NamedTuple):
 @picture(MotionView, "motion", order=20)
 def motion_picture(view: MotionView) -> Picture | None:
     """Every output of a motion."""
-    poses = view.sweep.poses
-    return motion_curves(view.study, view.result.tables, poses, view.before) if poses.followed else None
+    if not view.sweep.poses.followed:
+        return None
+    tables = {**view.result.tables, "motion": view.table("motion")}
+    return motion_curves(view.study, tables, view.curves.shown.poses, view.before)
 
 
 def motion_curves(
@@ -112,7 +114,7 @@ def motion_curves(
         )
     common += both_named(before)
     colors: dict[tuple[str, str], str] = {}
-    panels = [_panel(group, axis, x, study.units, colors, before, common) for group in shown]
+    panels = [_panel(group, axis, over, study.units, colors, before, common) for group in shown]
     return Picture("", panels, share="x")
 
 
@@ -249,7 +251,7 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
 
 
 def _panel(
-    group: _Group, over: Axis, x: Floats, units: Units, colors: dict[tuple[str, str], str], before: Before | None,
+    group: _Group, axis: Axis, over: Along, units: Units, colors: dict[tuple[str, str], str], before: Before | None,
     common: Sequence[PanelMark],
 ) -> Panel:  # fmt: skip
     """The curves of a group and those of the study before; notes the colour of each."""
@@ -264,11 +266,11 @@ def _panel(
         colors[curve.color_key] = color
         hidden = any(_coincide(values, other) for other in shown)
         # In grey the markers tell what the colours tell.
-        which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
+        which = _COLORS.index(color)
         marker = _MARKERS[which] if len(group.curves) > 1 else ""
         look = {"color": color, "linestyle": (0, (3, 3)) if hidden else "-", "marker": marker, "markersize": 4,
-                "markevery": (which * every // len(_COLORS), every)}  # fmt: skip
-        marks.append(Trace(x, values, label=curve.label if named else "", look=look))
+                "markevery": over.spread(_MARKS, which / len(_COLORS))}  # fmt: skip
+        marks.append(Trace(over.values, values, label=curve.label if named else "", look=look))
         shown.append(values)
     ends = _ends(group, np.concatenate([values[np.isfinite(values)] for values in shown]))
     if before is not None:
@@ -276,8 +278,9 @@ def _panel(
             # Of the study before rates may grow without bound: their axis stays that of the study now.
             low, high = (float(end(np.concatenate(shown))) for end in (np.nanmin, np.nanmax))
             ends = low - _AROUND * (high - low), high + _AROUND * (high - low)
-        earlier, was = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
-        places = abscissa(before.study, was, _speed(before.study)).values
+        was = DrawnMotion.of(before.result)
+        earlier, own = was.finer.rows_of(before.result.tables["motion"], was), was.finer.shown.poses
+        places = abscissa(before.study, own, _speed(before.study)).values
         for curve, color in zip(group.curves, used, strict=True):
             if curve.column.name in earlier:
                 earlier_look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
@@ -287,7 +290,7 @@ def _panel(
         kinds = {units.label("angle"): "angle", units.label("length"): "position"}
         title = kinds.get(first.column.unit, "value")
     more = f"and {group.left_out} more" if group.left_out else ""
-    return Panel(marks, over, Axis(title, first.column.unit, ends=ends), legend="beside", heading=more)
+    return Panel(marks, axis, Axis(title, first.column.unit, ends=ends), legend="beside", heading=more)
 
 
 def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:

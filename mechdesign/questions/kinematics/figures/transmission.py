@@ -51,10 +51,10 @@ class Transmission(NamedTuple):
 @picture(MotionView, "transmission", order=40)
 def transmission_picture(view: MotionView) -> Picture | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
-    study, tables, sweep = view.study, view.result.tables, view.sweep
-    section = study.kinematics
-    if not sweep.poses.followed or not moving_names(sweep.poses):
+    study, tables, section = view.study, view.result.tables, view.study.kinematics
+    if not view.sweep.poses.followed or not moving_names(view.sweep.poses):
         return None
+    sweep = Sweep.of(view.curves.shown)
     over = abscissa(study, sweep.poses, section.speed if section is not None else None)
     every = transmissions(study, tables.get("loops"), sweep, over)
     loops = sorted(every, key=lambda loop: _off(loop.worst))[:MOST_LOOPS]
@@ -66,7 +66,7 @@ def transmission_picture(view: MotionView) -> Picture | None:
     notes += [f"{len(names)} of {len(advantages)} mechanical advantages"] * (len(advantages) > len(names))
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names)).capitalize()
     panels = [_angles(over.values[sweep.rows], loops, over)] if loops else []
-    toggles, motion = tables.get("toggles"), tables["motion"]
+    toggles, motion = tables.get("toggles"), view.table("motion")
     places = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
     for output, source in names:
         column = motion.column(f"{output}_advantage")

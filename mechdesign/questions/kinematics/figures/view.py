@@ -6,6 +6,7 @@ from functools import cached_property
 
 from mechdesign.drawing.pictures import View
 from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.results import Table
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 
 
@@ -21,6 +22,15 @@ class MotionView(View):
         """Whether the study asks for a picture that is not always drawn."""
         section = self.study.kinematics
         return section is not None and picture in section.pictures
+
+    @cached_property
+    def curves(self) -> DrawnMotion:
+        """The motion with as many poses as curves need."""
+        return self.drawn.finer
+
+    def table(self, name: str) -> Table:
+        """A table with a row a pose, at these poses."""
+        return self.curves.rows_of(self.result.tables[name], self.drawn)
 
     @cached_property
     def sweep(self) -> Sweep:

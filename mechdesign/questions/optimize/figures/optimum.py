@@ -70,8 +70,8 @@ def reached(table: Table) -> list[Reached]:
 
 def design_picture(study: Study, motion: Result, words: str) -> Picture:
     """The mechanism in motion or at its listed poses, with target places; below, target curves and those reached."""
-    sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
-    shown = reached(table)
+    drawn, table = DrawnMotion.of(motion), motion.tables["motion"]
+    sweep, shown, curves = Sweep.of(drawn.shown), reached(table), drawn.finer
     targets = [*_target_marks(table, shown)]
     if sweep.poses.followed:
         panel = paths_panel(sweep, targets)
@@ -79,7 +79,8 @@ def design_picture(study: Study, motion: Result, words: str) -> Picture:
         worst = _worst(shown, sweep.valid)
         words += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
         panel = _posed(sweep, worst, _targets(table, shown), targets)
-    return Picture(words, [panel, *_over_poses(abscissa(study, sweep.poses), shown[: MAX_PANELS // 2])])
+    over = reached(curves.rows_of(table, drawn))[: MAX_PANELS // 2]
+    return Picture(words, [panel, *_over_poses(abscissa(study, curves.shown.poses), over)])
 
 
 def designs_picture(parts: Sequence[tuple[str, Shown, Result | None]]) -> Picture:
@@ -160,7 +161,7 @@ def _over_poses(over: Along, shown: Sequence[Reached]) -> Iterator[Panel]:
             marks = [Trace(over.values, curve.values - curve.error, label="wanted", look=dashed),
                      Trace(over.values, curve.values, label="reached", look=blue | {"linewidth": 1.2})]  # fmt: skip
             yield Panel(marks, over.wider, Axis("value", curve.unit), curve.output)
-        words = f"{curve.output}: reached less wanted, in the poses at most {curve.worst:.3g} {curve.unit}".rstrip()
+        words = f"{curve.output}: reached less wanted, at most {curve.worst:.3g} {curve.unit}".rstrip()
         zero = Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})
         yield Panel([zero, Trace(over.values, curve.error, look=blue)], over.wider, Axis("error", curve.unit), words)
 

@@ -59,7 +59,10 @@ _GRADES = {"anyOf": [{"type": "boolean"}, fields.NAME_FORM, fields.NAMES_FORM], 
 
 
 class Allocate(fields.Model):
-    """The cheapest tolerances that reach a reliability or a Cpk at every pose, each by itself (not over a cycle)."""
+    """The cheapest tolerances that reach a reliability or a Cpk at every pose, each by itself (not over a cycle).
+
+    ``requirements`` on the reliability are judged with these tolerances.
+    """
 
     one_of = ("tolerances are allocated to reach either a 'reliability' or a 'cpk'", "reliability", "cpk")
     reliability: fields.Positive | None = None

@@ -62,7 +62,7 @@ def joint_force_pictures(view: StiffnessView) -> dict[str, Picture] | None:
     section = StiffnessSection.of(study)
     if over is None or "forces" not in view.result.tables:
         return None
-    forces, moments = borne(view.result.tables["forces"], view.poses.count, study.mechanism.size)
+    forces, moments = borne(view.table("forces"), view.poses.count, study.mechanism.size)
     if not forces:
         return None
     loads = cases_in_words(study)[:MAX_LOADS]

@@ -30,7 +30,7 @@ _TAIL = 0.04
 @picture(StiffnessView, "stiffness", order=50)
 def stiffness_picture(view: StiffnessView) -> Picture | None:
     """Stiffnesses along a motion, or a map of them; None of poses that are neither."""
-    table = view.result.tables["stiffness"]
+    table = view.table("stiffness")
     if view.over is not None:
         return _map(view.study, table, view.over)
     return _curves(view.study, table, view.swept) if view.swept is not None else None
@@ -55,10 +55,9 @@ def _curves(study: Study, table: Table, over: Along) -> Picture | None:
         marks = []
         for k, name in enumerate(names):
             dashes, color, marker = _LOOKS[kind][name]
-            step = max(1, len(over.values) // 12)
             marks.append(Trace(over.values, np.where(np.isfinite(table[name]), table[name], np.nan), label=name, look={
                 "linestyle": dashes, "color": color, "marker": marker, "markersize": 5,
-                "markevery": (k * step // 2, step), "linewidth": 2.4 if marker else 1.4}))  # fmt: skip
+                "markevery": over.spread(12, k / 2), "linewidth": 2.4 if marker else 1.4}))  # fmt: skip
         axis = _axis(about, study.units.label(kind), [table[name] for name in names])
         panels.append(Panel(marks, over.axis, axis, legend="beside"))
     if not panels:

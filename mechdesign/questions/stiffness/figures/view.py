@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from mechdesign.drawing.pictures import PosesView
+from mechdesign.ground.results import Table
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.stiffness.analysis import DrawnStiffness
 
@@ -19,5 +20,14 @@ class StiffnessView(PosesView):
 
     @property
     def poses(self) -> Poses:
-        """The poses of the table."""
-        return self.drawn.shown.poses
+        """The poses of `table`."""
+        poses: Poses = self.drawn.finer.question.poses
+        return poses
+
+    def table(self, name: str) -> Table:
+        """A table with rows of each pose, along a motion of as many as curves need."""
+        values = self.drawn.finer
+        if values is self.drawn.values:
+            return self.result.tables[name]
+        table: Table = values.question.chosen(values, (name,))[name]
+        return table

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -19,7 +21,7 @@ from mechdesign.drawing.labels import paper
 from mechdesign.drawing.marks import Coloured, Late, Own, PanelMark, Picture
 from mechdesign.drawing.panels import node_areas, quantile, quantity
 from mechdesign.drawing.pictures import picture
-from mechdesign.ground.indices import INDEX_NAMES
+from mechdesign.ground.indices import INDEX_NAMES, index
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.regions import (
     Region,
@@ -62,37 +64,79 @@ def index_columns(region: Region) -> list[str]:
     return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
 
 
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Colours of a local index over some regions, the same in pictures and on pages.
+
+    An index with bounds has all of these over several regions. One without has a scale for all regions together where
+    their colours end near to each other; else each region has its own, and its values are parts of where that ends.
+
+    Parameters
+    ----------
+    patches : sequence of sequence of Grid
+        The values of each region, or their parts.
+    labels : sequence of str
+        What the colours of each region mean, with the unit.
+    label : str
+        What they mean in all of them.
+    words : str
+        How far colours of several regions can be compared.
+    value : float, optional
+        Of an index that is the same everywhere, and so has no colours.
+    """
+
+    patches: Sequence[Sequence[Grid]]
+    norm: BoundaryNorm
+    labels: Sequence[str]
+    label: str
+    words: str = ""
+    value: float | None = None
+
+    @classmethod
+    def of(cls, regions: Sequence[Region], column: str) -> Scale:
+        """That of a column of the table of local indices."""
+        unit, name = regions[0].local.column(column).unit, column.replace("_", " ")
+        shown, label = [[*grids(region.local, column)] for region in regions], style.axis_label(name, unit)
+        several, (least, most) = len(regions) > 1, index(column).bounds
+        parts, words = None, "; one scale for all panels" * several
+        if several and math.isfinite(most - least):
+            norm = colour_steps(round_levels(least, most, 11), least, most)
+        else:
+            parts = _parts(shown)
+            if parts is not None:
+                shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
+                words = "; each panel has a scale of its own"
+            norm = _norm([patch for patches in shown for patch in patches])
+        low, _, top = _ends([patch for patches in shown for patch in patches])
+        value = low if parts is None and constant(low, top) else None
+        if parts is None:
+            return cls(shown, norm, [label] * len(regions), label, words, value)
+        labels = [f"{name} in parts of {quantity(part, unit)}".strip() for part in parts]
+        return cls(shown, norm, labels, f"{name}, in parts", words)
+
+
 def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -> Picture:
-    index = regions[0].local.column(column)
+    meaning, scale = regions[0].local.column(column), Scale.of(regions, column)
     everywhere = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""
-    name = column.replace("_", " ")
-    title, titles = f"{name} at point {point}: {index.meaning}{cut}", [region.title for region in regions]
-    shown = [[*grids(region.local, column)] for region in regions]
-    label = style.axis_label(name, index.unit)
-    parts = _parts(shown)
-    if parts is not None:
-        title, label = f"{title}; each panel has a scale of its own", f"{name}, in parts"
-        titles = [f"{words}\nin parts of {quantity(part, index.unit)}".strip()
-                  for words, part in zip(titles, parts, strict=True)]  # fmt: skip
-        shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
-    every = [patch for patches in shown for patch in patches]
-    low, _, top = _ends(every)
-    same = parts is None and constant(low, top)
-    if same:
-        title = f"{title}; {quantity(low, index.unit).strip()} everywhere"
-    norm, panels = _norm(every), list[tuple[str, list[PanelMark]]]()
-    for words, patches, region in zip(titles, shown, regions, strict=True):
-        within = _within(patches, norm)
-        lines = [] if same else contour_lines(within, norm.boundaries[1:])
+    title = f"{column.replace('_', ' ')} at point {point}: {meaning.meaning}{cut}"
+    if scale.value is None:
+        title += scale.words
+    else:
+        title = f"{title}; {quantity(scale.value, meaning.unit).strip()} everywhere"
+    panels = list[tuple[str, list[PanelMark]]]()
+    for region, patches, label in zip(regions, scale.patches, scale.labels, strict=True):
+        words = region.title + f"\nin {label.partition(' in ')[2]}" * (label != scale.label)
+        within = _within(patches, scale.norm)
+        lines = [] if scale.value is not None else contour_lines(within, scale.norm.boundaries[1:])
         drawn = (
             Own(partial(fill, local=region.local))
-            if same
-            else Coloured(partial(_field, within, norm, lines), bar=label)
+            if scale.value is not None
+            else Coloured(partial(_field, within, scale.norm, lines), bar=scale.label)
         )
         marks = [drawn, *region_marks(region)]
-        if len(regions) == 1 and not same:
-            marks.append(Late(partial(label_levels, patches=patches, norm=norm, drawn=lines)))
+        if len(regions) == 1 and scale.value is None:
+            marks.append(Late(partial(label_levels, patches=patches, norm=scale.norm, drawn=lines)))
         panels.append((words, marks))
     return region_picture(study, everywhere, panels, title)
 
@@ -165,11 +209,6 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
     if not len(others):
         return np.full(len(places), np.inf)
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
-
-
-def index_norm(regions: Sequence[Region], column: str) -> BoundaryNorm:
-    """Colours of a local index over some regions; see `_norm`."""
-    return _norm([patch for region in regions for patch in grids(region.local, column)])
 
 
 def _norm(patches: Sequence[Grid]) -> BoundaryNorm:
