@@ -115,8 +115,8 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
         columns += SOLUTIONS.columns({}, **dict(zip(("yield", "yield_low", "yield_high"), shares, strict=True)))
     columns += SOLUTIONS.columns({}, score=np.array(scores))
     places = {
-        place: declared.quantity for one in solutions for place, declared in one.kind.mechanism.description.places.items()
-        if place not in task.apart
+        place: declared.quantity for one in solutions
+        for place, declared in one.kind.mechanism.description.places.items() if place not in task.apart
     }  # fmt: skip
     for place, quantity in places.items():
         values = np.array([one.values[one.kind[place]] if place in one.kind.places else np.nan for one in solutions])

@@ -133,13 +133,14 @@ def _sampled(
 ) -> Complexes:
     """Places in a region, each given one equally often; without a region within `reach` of the origin."""
     if places is None:
-        return reach * np.sqrt(random.uniform(size=WISHES)) * np.exp(1j * random.uniform(-np.pi, np.pi, WISHES))
+        around = np.exp(1j * random.uniform(-np.pi, np.pi, WISHES))
+        return np.asarray(reach * np.sqrt(random.uniform(size=WISHES)) * around)
     if not isinstance(places, Region):
         given = np.array([complex(x, y) for x, y in places])
-        return np.resize(given, WISHES)
+        return np.asarray(np.resize(given, WISHES))
     if places.through is not None:
         along = np.exp(1j * places.direction) * reach * random.uniform(-1, 1, WISHES)
-        return complex(*places.through) + along
+        return np.asarray(complex(*places.through) + along)
     parts = []
     for ends in (places.x, places.y):
         low, high = ends if isinstance(ends, tuple) else (ends, ends) if ends is not None else (-reach, reach)
@@ -201,15 +202,14 @@ def _refined(start: Dyads, task: Positions, held: Sequence[int] = ()) -> Dyads:
         if start.kind == LINK:
             size = np.maximum(np.abs(reach), np.finfo(float).tiny)
             along = np.conj(reach) / size
-            wrong = size - length[:, None]
-            matrix = np.stack(
-                [(along * r).real, (along * 1j * r).real, -along.real, -along.imag, -np.ones_like(size)], 2
-            )
+            wrong: Floats = size - length[:, None]
+            parts = [(along * r).real, (along * 1j * r).real, -along.real, -along.imag, -np.ones_like(size)]
         else:
-            along = np.conj(normal)[:, None] * np.ones_like(reach)
+            along = np.broadcast_to(np.conj(normal)[:, None], reach.shape)
             wrong = (along * reach).real
             turn = (np.conj(1j * normal)[:, None] * (p + r * pin[:, None])).real
-            matrix = np.stack([(along * r).real, (along * 1j * r).real, turn, -np.ones_like(turn)], 2)
+            parts = [(along * r).real, (along * 1j * r).real, turn, -np.ones_like(turn)]
+        matrix = np.stack(parts, 2)
         matrix[..., held] = 0.0
         square = np.einsum("npi,npj->nij", matrix, matrix)
         slope = np.einsum("npi,np->ni", matrix, wrong)

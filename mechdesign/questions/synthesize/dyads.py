@@ -1,7 +1,7 @@
 """Dyads that guide a body through given positions, all of them, by one elimination.
 
-A dyad joins the body to the frame. At position j, with the place P and the rotation R (complex, of size 1), it fulfils one
-equation that is linear in eight homogeneous real unknowns, w, k, and the parts of X, A and q:
+A dyad joins the body to the frame. At position j, with the place P and the rotation R (complex, of size 1), it fulfils
+one equation that is linear in eight homogeneous real unknowns, w, k, and the parts of X, A and q:
 
     w |P|^2 + k + 2 Re(conj(P) R X) - 2 Re(conj(A) P) - 2 Re(q R) = 0,     and once for all  w q = conj(A) X
 
@@ -111,7 +111,7 @@ def unknowns(equations: Floats) -> Floats:
     w = free.reshape(-1, 8)
     w = w / np.abs(w).max(axis=1, keepdims=True)
     gap = np.abs(w[:, 0] * _complex(w, 6) - np.conj(_complex(w, 4)) * _complex(w, 2))
-    return w[gap < _FULFILLED]
+    return np.asarray(w[gap < _FULFILLED])
 
 
 def _complex(w: Floats, k: int) -> Complexes:
@@ -174,7 +174,7 @@ def _points(free: Floats) -> Floats:
     for k in range(1, len(w)):
         same = lane[:k] == lane[k]
         keep[k] = not (same & keep[:k] & (np.abs(w[:k] - w[k]).max(axis=1) < _SAME)).any()
-    return w[keep]
+    return np.asarray(w[keep])
 
 
 def _product(one: Floats, other: Floats) -> Floats:

@@ -51,7 +51,8 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
         if solution.full_turn:
             turn = np.linspace(0, 2 * np.pi / factor, _AROUND, endpoint=False) + solution.angles[0] / factor
             around += [{DRIVE: plainly(angle)} for angle in turn.tolist()]
-        tolerances = dict(judge.dimensions or {})
+        judged = study.resolved["synthesis"]["judge"]
+        tolerances = dict(judged.get("dimensions", {}))
         if judge.tolerance is not None:
             lengths = [place for place, declared in kind.mechanism.description.places.items()
                        if declared.quantity == "length" and place not in task.apart]  # fmt: skip
@@ -62,7 +63,7 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
             "methods": ["monte_carlo"], "samples": judge.samples, "sobol": 0,
         }  # fmt: skip
         if judge.clearances:
-            data["reliability"]["clearances"] = dict(judge.clearances)
+            data["reliability"]["clearances"] = judged["clearances"]
     return data
 
 

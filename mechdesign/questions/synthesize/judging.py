@@ -82,7 +82,7 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
     parts = np.linspace(0, 1, POSES)
     poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
     _, sine = margins(kind, poses)
-    worst, dead = sine.min(axis=1), ~poses.valid.all(axis=1)
+    worst, dead = sine.min(axis=1), np.asarray(~poses.valid.all(axis=1))
     # Between poses it is lowest beside the lowest of them; a few local minima are looked at.
     inner = np.concatenate([sine[:, :1] >= np.inf, (sine[:, 1:-1] <= sine[:, :-2]) & (sine[:, 1:-1] <= sine[:, 2:]),
                             sine[:, :1] >= np.inf], axis=1)  # fmt: skip

@@ -120,7 +120,7 @@ class Kind:
     @cached_property
     def modes(self) -> list[tuple[int, ...]]:
         """Its assembly modes."""
-        every = [()]
+        every: list[tuple[int, ...]] = [()]
         for mode in self.mechanism.forward.modes:
             every = [(*modes, sign) for modes in every for sign in ((1, -1) if mode else (0,))]
         return every

@@ -80,8 +80,7 @@ def fits(
 def samples(kind: Kind, random: np.random.Generator, count: int, ratio: float, *, full_turn: bool) -> Floats:
     """Random linkages of a kind in no special place and size, about `count` of them; their cranks turn or may not.
 
-    Lengths are log-uniform over a ratio; the crank, or the frame, is more often the shortest than by chance, as then the
-    crank may turn.
+    Lengths are log-uniform over a ratio; the crank is more often the shortest than by chance, as then it may turn.
     """
     values, few = np.tile(kind.nominal, (count, 1)), np.log(ratio)
     lengths = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
@@ -254,7 +253,7 @@ def polish(
 
     def cost(values: Floats, angles: Floats) -> Floats:
         gaps = kind.points(kind.solve(values, angles, modes)) - task.points
-        return np.nan_to_num((np.abs(gaps) ** 2).sum(axis=1), nan=np.inf, posinf=np.inf)
+        return np.asarray(np.nan_to_num((np.abs(gaps) ** 2).sum(axis=1), nan=np.inf, posinf=np.inf))
 
     costs, damping = cost(values, angles), np.full(len(values), 1e-3)
     for number in range(rounds):

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field
 
+from mechdesign.questions.reliability.schema.clearances import Clearance
+from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.synthesize.kinds import BODIES, FOUR_BAR, FUNCTIONS, PATHS, starting
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
@@ -76,7 +78,7 @@ class PathTask(fields.Model):
     """Points that a point of the linkage shall pass, in their order."""
 
     points: Annotated[tuple[Point, ...] | str, BeforeValidator(_points)]
-    """The points, or the name of a CSV file with a row [x, y] each. Example: [[55, 60], [45, 75], [25, 75], [10, 55]]"""
+    """The points, or the name of a CSV file with a row [x, y] each. Example: [[55, 60], [45, 75], [25, 75]]"""
     closed: bool = False
     """Whether the path ends where it begins."""
     timing: fields.Numbers | None = None
@@ -148,9 +150,9 @@ class JudgeSection(fields.Model):
 
     tolerance: fields.PositiveLength | None = None
     """Tolerance, plus and minus, of every length and place of the linkage. Example: 0.1 mm"""
-    dimensions: Mapping[str, Any] | None = None
+    dimensions: dict[str, Dimension] = Field(default_factory=dict)
     """Tolerances of single dimensions, as ``reliability.dimensions`` takes them. Example: {crank.length: 0.05}"""
-    clearances: Mapping[str, Any] | None = None
+    clearances: dict[str, Clearance] = Field(default_factory=dict)
     """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: 0.02}"""
     within: Annotated[float, fields.number(None, 0.0, exclusive=True)]
     """Largest error of a made linkage at a point of the task. Example: 0.5 mm"""
@@ -160,7 +162,7 @@ class JudgeSection(fields.Model):
     """Samples of the Monte Carlo simulation of each. Example: 10000"""
 
     def faults(self) -> Iterator[str]:
-        if self.tolerance is None and self.dimensions is None and self.clearances is None:
+        if self.tolerance is None and not self.dimensions and not self.clearances:
             yield "what deviates? give 'tolerance', 'dimensions' or 'clearances'"
 
 
@@ -196,7 +198,7 @@ class SynthesisSection(fields.Model):
     """Of a function, what its output is: the angle of a four-bar's rocker, or the place of a slider."""
     of: str | None = None
     """In place of ``kinds`` a study whose mechanism of one drive is varied. Example: linkage.yaml"""
-    ranges: dict[str, Range] | None = None
+    ranges: dict[str, Range] = Field(default_factory=dict)
     """With ``of``, the ranges of its parameters. Example: {a: [10, 40], b: [60, 120]}"""
     frame: fields.PositiveLength | None = None
     """Of a function, the distance between the two pivots of a four-bar. Left out: 1. Example: 100"""
@@ -212,8 +214,8 @@ class SynthesisSection(fields.Model):
     """
     slide: bool = False
     """Whether one side of the body must be a slide."""
-    lengths: dict[str, Range] = {}
-    """Ranges of lengths by the names of the links, ``ground`` the frame's. Example: {crank: [20, 60], rocker: [30, 90]}"""
+    lengths: dict[str, Range] = Field(default_factory=dict)
+    """Ranges of lengths by the names of the links, ``ground`` the frame's. Example: {crank: [20, 60]}"""
     limits: Limits = Limits()
     """Bounds that hold without being written; both may be raised."""
     grashof: bool = False
@@ -232,9 +234,9 @@ class SynthesisSection(fields.Model):
     """How linkages are judged once they are made. Example: {tolerance: 0.1 mm, within: 0.5 mm}"""
     rank: Annotated[
         dict[Rank, fields.NonNegative], BeforeValidator(_rank), fields.OrShort({"enum": [*_RANKS]})
-    ] = {"error": 1.0}  # fmt: skip
-    """Order of the solutions, or weights of several: each counts as a part of its range. Example: yield Example: {error:
-    2, transmission: 1}
+    ] = Field(default_factory=lambda: {"error": 1.0})  # fmt: skip
+    """Order of the solutions, or weights of several: each counts as a part of its range. Example: yield
+    Example: {error: 2, transmission: 1}
     """
     solutions: Annotated[int, fields.whole(1, 1000)] = 20
     """How many are kept. Example: 10"""
@@ -272,7 +274,7 @@ class SynthesisSection(fields.Model):
                 yield f"no {kind} is looked for from a {task}" + (f"; {', '.join(possible)} are" if possible else "")
         keys = {"frame": "function", "pins": "body", "of": "path", "ranges": "path"}
         for key, task in keys.items():
-            if getattr(self, key) is not None and task != self.kind_of_task:
+            if getattr(self, key) and task != self.kind_of_task:
                 yield f"{key!r} is of a {task}"
         for key, task in (("zeros", "function"), ("output_kind", "function"), ("slide", "body")):
             if key in self.model_fields_set and task != self.kind_of_task:

@@ -148,7 +148,7 @@ class Conditions:
             (np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size),
         )
         with np.errstate(all="ignore"):
-            ratio = lengths.max(axis=0) / lengths.min(axis=0)
+            ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
         yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
         if isinstance(section.pivots, Region):
             yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size).all(axis=1)
@@ -157,13 +157,10 @@ class Conditions:
             gap = np.abs(held[..., None] - given).min(axis=2)
             yield "a pivot is none of those given (pivots)", (gap <= 1e-6 * self.size).all(axis=1)
         for box in section.keep_out:
-            wrong = (
-                (pivots.real > box.x[0])
-                & (pivots.real < box.x[1])
-                & (pivots.imag > box.y[0])
-                & (pivots.imag < box.y[1])
+            within = (np.abs(pivots.real - np.mean(box.x)) < np.ptp(box.x) / 2) & (
+                np.abs(pivots.imag - np.mean(box.y)) < np.ptp(box.y) / 2
             )
-            yield "a pivot lies where none may (keep_out)", ~wrong.any(axis=1)
+            yield "a pivot lies where none may (keep_out)", ~within.any(axis=1)
         for name, (low, high) in section.lengths.items():
             if name in links:
                 good = (links[name] >= low) & (links[name] <= high)

@@ -237,7 +237,7 @@ class Bound:
 
     def __call__(self, values: Floats) -> Floats:
         values, limits = values.copy(), self.task.section.limits
-        for number, (x, y) in enumerate(self.kind.pivots):
+        for x, y in self.kind.pivots:
             place = values[:, x] + 1j * values[:, y]
             if self.fixed.any():
                 assert self.given is not None
