@@ -47,10 +47,10 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
     }
     judge = task.section.judge
     if judge is not None:
-        around = [*positions]
+        around = solution.angles
         if solution.full_turn:
-            turn = np.linspace(0, 2 * np.pi / factor, _AROUND, endpoint=False) + solution.angles[0] / factor
-            around += [{DRIVE: plainly(angle)} for angle in turn.tolist()]
+            turn = np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)
+            around = np.concatenate([around, around.min() + turn])
         judged = study.resolved["synthesis"]["judge"]
         tolerances = dict(judged.get("dimensions", {}))
         if judge.tolerance is not None:
@@ -59,7 +59,8 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
             tolerances = dict.fromkeys(lengths, float(judge.tolerance)) | tolerances
         limit = {POINT: {"radius": float(judge.within)}} if output == POINT else {output: float(judge.within)}
         data["reliability"] = {
-            "dimensions": tolerances, "poses": around, "outputs": [output], "limits": limit,
+            "dimensions": tolerances,
+            "path": {DRIVE: [plainly(angle) for angle in np.unique(around / factor).tolist()]}, "outputs": [output], "limits": limit,
             "methods": ["monte_carlo"], "samples": judge.samples, "sobol": 0,
         }  # fmt: skip
         if judge.clearances:
@@ -84,10 +85,18 @@ def _pair(place: complex) -> list[float]:
     return [plainly(place.real), plainly(place.imag)]
 
 
+class _Dumper(yaml.SafeDumper):
+    """Writes every pose where it stands, and no reference to another."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
 def study_text(data: Mapping[str, Any], heading: str) -> str:
     """A study of a solution as the text of a file."""
     lines = "".join(f"# {line}\n" for line in heading.splitlines())
-    return lines + yaml.safe_dump(dict(data), sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+    form = {"sort_keys": False, "default_flow_style": None, "width": 120, "allow_unicode": True}
+    return lines + yaml.dump(dict(data), Dumper=_Dumper, **form)
 
 
 def judged_share(study: Study, data: Mapping[str, Any]) -> tuple[float, float, float]:
@@ -100,5 +109,5 @@ def judged_share(study: Study, data: Mapping[str, Any]) -> tuple[float, float, f
     """
     made = load_data(data, (), None, study.folder)
     table = ask(made, "reliability").tables["reliability"]
-    rows = table.take(table["scope"] == "cycle") if (table["scope"] == "cycle").any() else table
+    rows = table.take(table["scope"] == "cycle")
     return tuple(float(rows[name][0]) for name in ("reliability", "low", "high"))  # type: ignore[return-value]

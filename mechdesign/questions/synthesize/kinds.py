@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
@@ -98,6 +98,11 @@ def starting(section: Mapping[str, Any]) -> Mapping[str, Any]:
     kinds = section.get("kind" if task == "function" else "kinds") or [FOUR_BAR]
     first = kinds if isinstance(kinds, str) else kinds[0] if isinstance(kinds, list) else FOUR_BAR
     return _ALL[task].get(first, _ALL[task][FOUR_BAR]) if isinstance(first, str) else _PATHS[FOUR_BAR]
+
+
+def links(task: str, kinds: Sequence[str]) -> list[str]:
+    """Names of the links of kinds of linkages for a task, each once."""
+    return [*dict.fromkeys(link for kind in kinds if kind in _ALL[task] for link in _ALL[task][kind]["links"])]
 
 
 class Kind:

@@ -11,15 +11,19 @@ from typing import Protocol
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses of a curve, and points at equal arc length by which forms are compared.
 POSES = 64
 # Most linkages of a kind and an assembly whose curves are polished, and how many go on after so many rounds.
-POLISHED = 500
-_KEPT = {6: 400, 12: 150, 20: 80, 30: 60}
-ROUNDS = 60
+POLISHED = 1000
+_KEPT = {12: 500, 24: 200, 40: 100}
+ROUNDS = 120
+# Most points that linkages can pass exactly; of these no start is left behind, so that the exact ones are counted.
+MOST_EXACT = 9
+# Root of the sum of the squared distances, as a part of the task's size, that is rounding.
+_CONVERGED = 1e-14
 # Largest change of a crank angle in a round, radians.
 _LARGEST_TURN = 0.3
 # Of samples with poses at which the linkage cannot be assembled few poses are enough to see it.
@@ -56,10 +60,14 @@ class Fits:
     values: Floats  # shape (count, places)
     angles: Floats  # shape (count, points)
     costs: Floats  # sum of the squared distances
+    starts: Ints  # which of the linkages that were polished each was, from 0
 
 
 class Bound(Protocol):
     """What keeps linkages within their conditions while they are polished."""
+
+    fixed: Flags  #: which places have their values
+    in_place: bool  #: whether samples are where they must be, so that only their forms are free
 
     def __call__(self, values: Floats) -> Floats:
         """The nearest values within the limits of each."""
@@ -73,8 +81,11 @@ def fits(
 ) -> Fits:
     """The linkages among samples whose curves have the form of the task, polished; `bound` keeps their values."""
     samples = samples[bound.accepts(modes, samples)]
-    values, angles = _alike(kind, modes, task, samples, polished)
-    return polish(kind, modes, task, bound(values), angles, bound)
+    if bound.in_place and task.timing is None:
+        values, angles = _near(kind, modes, task, samples, 4 * polished)
+    else:
+        values, angles = _alike(kind, modes, task, samples, polished)
+    return polish(kind, modes, task, bound(values), angles, bound, culled=len(task.points) > MOST_EXACT)
 
 
 def samples(kind: Kind, random: np.random.Generator, count: int, ratio: float, *, full_turn: bool) -> Floats:
@@ -189,6 +200,15 @@ def _alike(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, mos
     return kind.moved(values[best], scale, middle - scale * middles[best]), angles + np.angle(scale)[:, None]
 
 
+def _near(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int) -> tuple[Floats, Floats]:
+    """The linkages whose curves, as they are, pass nearest to the points; and their crank angles there."""
+    angles = 2 * np.pi * np.arange(POSES) / POSES
+    curves = kind.points(kind.solve(values, angles[None], modes))
+    gaps = np.stack([np.nan_to_num(np.abs(curves - point), nan=np.inf) for point in task.points], axis=1)
+    best = np.argsort((gaps.min(axis=2) ** 2).sum(axis=1), kind="stable")[:most]
+    return values[best], angles[gaps[best].argmin(axis=2)]
+
+
 def _alike_open(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int) -> tuple[Floats, Floats]:
     """The same for a path that is not closed, which a part of the curve resembles."""
     grid = 2 * np.pi * np.arange(2 * POSES) / POSES
@@ -246,25 +266,28 @@ def _alike_in_time(
 
 def polish(
     kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, bound: Bound,
-    rounds: int = ROUNDS,
+    *, culled: bool = True,
 ) -> Fits:  # fmt: skip
-    """All linkages at once by Levenberg and Marquardt's method, the worse ones left behind on the way."""
+    """All linkages at once by Levenberg and Marquardt's method, the worse ones left behind on the way if `culled`."""
     count = len(kind.places)
 
     def cost(values: Floats, angles: Floats) -> Floats:
         gaps = kind.points(kind.solve(values, angles, modes)) - task.points
         return np.asarray(np.nan_to_num((np.abs(gaps) ** 2).sum(axis=1), nan=np.inf, posinf=np.inf))
 
-    costs, damping = cost(values, angles), np.full(len(values), 1e-3)
-    for number in range(rounds):
-        best = np.argsort(costs, kind="stable")[: _KEPT.get(number, len(costs))]
+    costs, damping, starts = cost(values, angles), np.full(len(values), 1e-3), np.arange(len(values))
+    for number in range(ROUNDS):
+        best = np.argsort(costs, kind="stable")[: _KEPT.get(number, len(costs)) if culled else len(costs)]
         best = best[np.isfinite(costs[best])]
-        if not len(best):
-            return Fits(kind, modes, values[:0], angles[:0], costs[:0])
-        values, angles, costs, damping = values[best], angles[best], costs[best], damping[best]
+        values, angles, costs, damping, starts = (
+            values[best], angles[best], costs[best], damping[best], starts[best],
+        )  # fmt: skip
+        if not (costs > (_CONVERGED * task.size) ** 2).any():
+            break
         poses = kind.solve(values, angles, modes)
         gaps = kind.points(poses) - task.points
         by_place, by_drive = kind.derivatives(poses)
+        by_place = np.where(bound.fixed[:, None, None], 0.0, by_place)
         speed = np.maximum(np.abs(by_drive), np.finfo(float).tiny)
         along = by_drive / speed
         if task.timing is None:
@@ -292,4 +315,4 @@ def polish(
         values, angles = np.where(better[:, None], moved, values), np.where(better[:, None], turned, angles)
         costs, damping = np.where(better, new, costs), np.where(better, np.maximum(damping / 4, 1e-12), 5 * damping)
     best = np.argsort(costs, kind="stable")
-    return Fits(kind, modes, values[best], angles[best], costs[best])
+    return Fits(kind, modes, values[best], angles[best], costs[best], starts[best])

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.variation import Dimension
-from mechdesign.questions.synthesize.kinds import BODIES, FOUR_BAR, FUNCTIONS, PATHS, starting
+from mechdesign.questions.synthesize.kinds import BODIES, FOUR_BAR, FUNCTIONS, PATHS, links, starting
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.reading import failure
@@ -69,6 +69,8 @@ class FunctionTask(fields.Model):
 
 
 def _points(raw: Any) -> Any:
+    if isinstance(raw, list) and len(raw) < 2:
+        raise failure(f"a path has two points or more, not {len(raw)}")
     if isinstance(raw, list) and len(raw) > MOST_POINTS:
         raise failure(f"at most {MOST_POINTS} points, not {len(raw)}")
     return raw
@@ -121,6 +123,8 @@ class Box(fields.Model):
 
 def _region(raw: Any) -> Any:
     """A list of points, or what `Region` takes."""
+    if raw == []:
+        raise failure("expected a box, a line or points, not an empty list")
     if isinstance(raw, list) and len(raw) == 2 and not any(isinstance(part, list) for part in raw):
         return [raw]
     return raw
@@ -272,6 +276,13 @@ class SynthesisSection(fields.Model):
             if kind not in possible:
                 task = self.kind_of_task
                 yield f"no {kind} is looked for from a {task}" + (f"; {', '.join(possible)} are" if possible else "")
+        names = links(self.kind_of_task, self.kinds or possible or (self.output_kind,))
+        for name in self.lengths:
+            if name not in names and self.of is None:
+                yield f"lengths: no link {name!r}; links are {', '.join(names)}"
+        for name, (low, high) in (*self.lengths.items(), *self.ranges.items()):
+            if not low < high:
+                yield f"{name}: {high:g} is not beyond {low:g}"
         keys = {"frame": "function", "pins": "body", "of": "path", "ranges": "path"}
         for key, task in keys.items():
             if getattr(self, key) and task != self.kind_of_task:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -141,6 +141,8 @@ class Conditions:
         section = self.section
         pivots = np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1)
         held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
+        if section.pivots is not None and not held.shape[1]:
+            yield "it has no pivot (pivots)", np.zeros(len(values), dtype=bool)
         links = kind.links(values)
         lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
         yield (
@@ -226,13 +228,13 @@ def ranked(
     solutions: Sequence[Solution], weights: Mapping[str, float], size: float
 ) -> tuple[list[Solution], list[float]]:
     """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
-    measures = {
-        "error": [-rounded(one.error, size) for one in solutions], "yield": [one.share[0] for one in solutions],
-        "transmission": [one.transmission for one in solutions], "size": [-one.size for one in solutions],
+    measures: dict[str, Callable[[Solution], float]] = {
+        "error": lambda one: -rounded(one.error, size), "yield": lambda one: one.share[0],
+        "transmission": lambda one: one.transmission, "size": lambda one: -one.size,
     }  # fmt: skip
     total, whole = np.zeros(len(solutions)), sum(weights.values())
     for name, weight in weights.items():
-        values = np.nan_to_num(np.array(measures[name], dtype=float), nan=-np.inf)
+        values = np.nan_to_num(np.array([measures[name](one) for one in solutions], dtype=float), nan=-np.inf)
         known = values[np.isfinite(values)]
         low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
         share = (np.maximum(values, low) - low) / (high - low) if high > low else np.ones(len(values))

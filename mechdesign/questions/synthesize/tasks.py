@@ -22,6 +22,13 @@ from mechdesign.study.text.csv_files import read_table
 
 # Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
 _AROUND, _AT_ONCE = 32, 1000
+# Greatest ratio of lengths of samples between given pivots.
+_SAMPLED = 30.0
+# Of more points than this fewer linkages are polished, down to so few; of more points than the last only
+# every second, third and so on counts.
+_MANY, _FEWEST, _MOST_POINTS = 40, 100, 200
+# Exact linkages that differ by less are one.
+_DISTINCT = 1e-5
 # Most linkages of a kind whose ways are followed.
 MOST = 200
 # Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
@@ -199,19 +206,40 @@ class PathTask:
         section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         for name in section.kinds or (FOUR_BAR,):
             kind = kind_of("path", name)
-            bound = Bound(kind, self)
+            bound, exact = Bound(kind, self), []
             for modes in kind.modes:
-                samples = paths.samples(kind, random, count, section.limits.ratio, full_turn=section.needs_turn)
-                fits = paths.fits(kind, modes, self.path, samples, bound)
+                ratio = min(section.limits.ratio, _SAMPLED) if bound.in_place else section.limits.ratio
+                samples = paths.samples(kind, random, count, ratio, full_turn=section.needs_turn)
+                if bound.in_place:
+                    samples = bound.placed(samples)
+                most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
+                fits = paths.fits(kind, modes, self.path, samples, bound, most)
+                exact.append(_exact(fits, self.size))
                 if not len(fits.costs):
                     continue
                 rows = conditions.begun(kind, fits.values, fits.costs, MOST)
                 values, angles = fits.values[rows], fits.angles[rows]
                 gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
                 yield Pool(passed(kind, modes, values, angles, full_turn=section.needs_turn), gaps)
+            if len(self.path.points) <= paths.MOST_EXACT:
+                whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
+                conditions.told.append(f"{whole} exact, the last new one at start {last} of {starts}" if whole else
+                                       f"none exact of {starts} starts")  # fmt: skip
 
 
 Task = BodyTask | FunctionTask | PathTask
+
+
+def _exact(fits: paths.Fits, size: float) -> tuple[int, int, int]:
+    """How many linkages pass all points, the start (from 1) that gave the last new one, and the number of starts."""
+    kept: list[Floats] = []
+    last, limit = 0, (EXACT * size) ** 2 * fits.angles.shape[1]
+    for row in np.flatnonzero(fits.costs <= limit)[np.argsort(fits.starts[fits.costs <= limit])].tolist():
+        values = fits.values[row]
+        if not kept or (np.abs(np.array(kept) - values) / (np.abs(values) + size)).max(axis=1).min() > _DISTINCT:
+            kept.append(values)
+            last = int(fits.starts[row]) + 1
+    return len(kept), last, int(fits.starts.max(initial=-1)) + 1
 
 
 def _pairs(places: Complexes) -> list[list[float]]:
@@ -228,12 +256,22 @@ class Bound:
         self.ends = {
             kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
         }
+        self.ground = section.lengths.get("ground", (0.0, np.inf))
         pivots = section.pivots
         self.given = None if pivots is None or isinstance(pivots, Region) else np.array([complex(*p) for p in pivots])
         self.box = pivots if isinstance(pivots, Region) and pivots.through is None else None
         self.fixed = np.zeros(len(kind.places), dtype=bool)
-        if self.given is not None and len(self.given) >= len(kind.pivots):
+        self.in_place = self.given is not None and len(self.given) >= len(kind.pivots)
+        if self.in_place:
             self.fixed[[column for pair in kind.pivots for column in pair]] = True
+
+    def placed(self, values: Floats) -> Floats:
+        """Linkages turned, scaled and shifted to the first two of the given pivots."""
+        assert self.given is not None
+        first, second = (values[:, self.kind[f"ground.{name}.x"]] + 1j * values[:, self.kind[f"ground.{name}.y"]]
+                         for name in "OD")  # fmt: skip
+        turned = (self.given[1] - self.given[0]) / (second - first)
+        return self(self.kind.moved(values, turned, self.given[0] - turned * first))
 
     def __call__(self, values: Floats) -> Floats:
         values, limits = values.copy(), self.task.section.limits
@@ -254,6 +292,15 @@ class Bound:
         values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
         for column, (low, high) in self.ends.items():
             values[:, column] = np.clip(values[:, column], low, high)
+        if not self.in_place and self.links:
+            # The frame keeps the ratio by its second pivot.
+            (x, y), (u, v) = ((self.kind[f"ground.{name}.x"], self.kind[f"ground.{name}.y"]) for name in "OD")
+            own, frame = values[:, self.links], values[:, u] - values[:, x] + 1j * (values[:, v] - values[:, y])
+            length = np.maximum(np.abs(frame), np.finfo(float).tiny)
+            low, high = self.ground
+            least = np.maximum(own.max(axis=1) / limits.ratio, low)
+            moved = frame * np.clip(length, least, np.minimum(own.min(axis=1) * limits.ratio, high)) / length
+            values[:, u], values[:, v] = values[:, x] + moved.real, values[:, y] + moved.imag
         return values
 
     def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
@@ -308,6 +355,9 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
         inputs = factor * np.array(section.function.input, dtype=float)
         return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
     assert section.path is not None
+    if section.of is not None:
+        message = "linkages of a study's own mechanism are not looked for; give 'kinds', or ask optimize"
+        raise StudyError([study.problem(message, "synthesis", "of")])
     points = section.path.points
     table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
     if table.shape[1] != 2 or len(table) < 2:
@@ -318,6 +368,9 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     if timing is not None and len(timing) != len(table):
         message = f"{len(timing)} crank angles for {len(table)} points"
         raise StudyError([study.problem(message, "synthesis", "path", "timing")])
+    # The form of a path needs no more points; the time of a search grows with them.
+    every = -(-len(table) // _MOST_POINTS)
+    table, timing = table[::every], None if timing is None else timing[::every]
     path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
     if not path.size > 0:
         raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
