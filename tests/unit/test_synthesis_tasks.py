@@ -52,8 +52,9 @@ def test_what_is_no_task_is_said(task: Any, words: str) -> None:
     ],
 )
 def test_conditions_that_contradict_each_other_are_named(conditions: Any, words: str) -> None:
-    with pytest.raises(mechdesign.AssemblyError, match=words):
+    with pytest.raises(mechdesign.AssemblyError, match=words) as raised:
         solved({"body": THREE, **conditions, "kinds": "four_bar"})
+    assert "the nearest is in nearest.yaml: a pivot" in str(raised.value)
 
 
 def test_where_pivots_are_wished_each_linkage_has_one_in_the_box() -> None:

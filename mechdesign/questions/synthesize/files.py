@@ -58,9 +58,9 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
                        if declared.quantity == "length" and place not in task.apart]  # fmt: skip
             tolerances = dict.fromkeys(lengths, float(judge.tolerance)) | tolerances
         limit = {POINT: {"radius": float(judge.within)}} if output == POINT else {output: float(judge.within)}
+        course = [plainly(angle) for angle in np.unique(around / factor).tolist()]
         data["reliability"] = {
-            "dimensions": tolerances,
-            "path": {DRIVE: [plainly(angle) for angle in np.unique(around / factor).tolist()]}, "outputs": [output], "limits": limit,
+            "dimensions": tolerances, "path": {DRIVE: course}, "outputs": [output], "limits": limit,
             "methods": ["monte_carlo"], "samples": judge.samples, "sobol": 0,
         }  # fmt: skip
         if judge.clearances:
@@ -95,8 +95,10 @@ class _Dumper(yaml.SafeDumper):
 def study_text(data: Mapping[str, Any], heading: str) -> str:
     """A study of a solution as the text of a file."""
     lines = "".join(f"# {line}\n" for line in heading.splitlines())
-    form = {"sort_keys": False, "default_flow_style": None, "width": 120, "allow_unicode": True}
-    return lines + yaml.dump(dict(data), Dumper=_Dumper, **form)
+    text: str = yaml.dump(
+        dict(data), Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True
+    )
+    return lines + text
 
 
 def judged_share(study: Study, data: Mapping[str, Any]) -> tuple[float, float, float]:

@@ -106,18 +106,27 @@ class Conditions:
         self.told: list[str] = []  #: what is found, in words
 
     def begun(self, kind: Kind, values: Floats, errors: Floats, most: int) -> Ints:
-        """Linkages, at most so many, that keep what their dimensions alone tell; best first by their errors."""
+        """Linkages, at most so many, that keep what their dimensions alone tell; best first by their errors.
+
+        Where none does it is the one with the smallest error, as the nearest.
+        """
         kept = self._counted(self._of_dimensions(kind, values), len(values))
+        if not kept.any():
+            return np.argsort(errors, kind="stable")[:1]
         rows = np.flatnonzero(kept)
         return rows[np.argsort(errors[rows], kind="stable")][:most]
 
     def kept(self, pool: Pool) -> Flags:
-        """Which linkages keep all other conditions."""
-        return self._counted(self._of_way(pool.way), len(pool.way))
+        """Which linkages keep all conditions."""
+        kept = np.ones(len(pool.way), dtype=bool)
+        for _, good in self._of_dimensions(pool.kind, pool.way.values):
+            kept &= good
+        return kept & self._counted(self._of_way(pool.way), len(pool.way))
 
     def missed(self, pool: Pool, row: int) -> list[str]:
         """The conditions that one linkage of a pool does not keep."""
-        return [reason for reason, good in self._of_way(pool.way) if not good[row]]
+        conditions = [*self._of_dimensions(pool.kind, pool.way.values), *self._of_way(pool.way)]
+        return [reason for reason, good in conditions if not good[row]]
 
     def _counted(self, judged: Iterator[tuple[str, Flags]], count: int) -> Flags:
         """Which linkages keep conditions; the others are counted by the first that they miss."""
