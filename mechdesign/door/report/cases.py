@@ -41,6 +41,8 @@ class Best:
     ----------
     case : int
         Its number, from 1; of equals the first.
+    label : str
+        What the file of cases calls it.
     changes : str
         Its values in words.
     ranked, equals, front : int
@@ -48,6 +50,7 @@ class Best:
     """
 
     case: int
+    label: str
     changes: str
     ranked: int
     equals: int
@@ -57,7 +60,12 @@ class Best:
     def words(self) -> str:
         """``case 17 (r 35, l 120)``."""
         more = f" and {self.equals - 1} more as good" if self.equals > 1 else ""
-        return f"case {self.case} ({self.changes}){more}"
+        return f"case {self.case} ({f'{self.label}: ' * bool(self.label)}{self.changes}){more}"
+
+    @property
+    def name(self) -> str:
+        """Its number and label, ``17 (spare)``."""
+        return f"{self.case} ({self.label})" if self.label else f"{self.case}"
 
     def __str__(self) -> str:
         front = f"; {self.front} of them are on the Pareto front" if self.front > self.equals else ""
@@ -76,7 +84,7 @@ def best_of(table: Table) -> Best | None:
     """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
     if FRONT not in table:
         return None
-    best: tuple[int, str] | None = None
+    best: tuple[int, str, str] | None = None
     numbers = np.zeros(3, dtype=np.intp)
     for part in table.blocks():
         rank = part[RANK]
@@ -86,7 +94,7 @@ def best_of(table: Table) -> Best | None:
             changes = [
                 (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
             ]
-            label = f"{part['label'][row]}: " if "label" in part and part["label"][row] else ""
-            best = int(part["case"][row]), label + changes_in_words(changes)
+            label = str(part["label"][row]) if "label" in part else ""
+            best = int(part["case"][row]), label, changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
     return None if best is None else Best(*best, *numbers.tolist())

@@ -343,14 +343,14 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
 
 
-def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) -> Verdict:
+def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: str) -> Verdict:
     """The verdict on a requirement over cases: that of the worst, named in words, and how many of them miss it.
 
-    `first` is the number of the first one that does, from 0.
+    `first` is the first one that does.
     """
     place = ", ".join(filter(None, (name, worst.place)))
     if unmet:
-        place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is case {first + 1}"
+        place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is {first}"
     return replace(worst, met=not unmet, place=place)
 
 

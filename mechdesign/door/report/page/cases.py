@@ -39,7 +39,7 @@ def gates(result: Result) -> dict[str, Any] | None:
             about["kept"] = f"{met.sum()} of {len(table)}"
             about["met"] = bool(met.all()) if row is None else bool(met[row])
         rows.append(about)
-    return {"best": None if best is None else str(best), "case": None if best is None else best.case, "rows": rows}
+    return {"best": None if best is None else str(best), "case": None if best is None else best.name, "rows": rows}
 
 
 def _row(table: Table, row: int | None, name: str) -> dict[str, Any]:

@@ -109,7 +109,7 @@ def _of_cases(result: Result) -> Iterator[Headline]:
         row = int(np.flatnonzero(table[RANK] == 1)[0])
         more = [f"{best.equals - 1} more as good"] * (best.equals > 1)
         changes = [column for column in table.columns if column.meaning == VARIED]
-        yield Headline("best case", str(best.case), "", "; ".join([_in_words(changes, row), *more]))
+        yield Headline("best case", best.name, "", "; ".join([_in_words(changes, row), *more]))
         for name in [*DrawnCases.of(result).goals][:_MOST_GOALS]:
             yield Headline(f"{name} of the best case", shown(table[name][row]), table.column(name).unit)
         if best.front > best.equals:

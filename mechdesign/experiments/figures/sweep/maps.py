@@ -22,6 +22,7 @@ from mechdesign.experiments.figures.sweep.quantities import (
     CaseAxis,
     kinds_of,
     left_out,
+    names_of,
     number_text,
     sample,
     without_number,
@@ -77,6 +78,7 @@ def response(view: CasesView) -> Picture | None:
                 Contours([(*np.meshgrid(*plane.fine), np.ma.masked_invalid(field))], norm, everywhere=same),
                 *(_gate_marks(plane, gates[place]) if gates else ()),
                 *(kind.dots(plane.x, plane.y, drawn, size) for kind in kinds),
+                *names_of(table, plane.x, plane.y),
                 *(Trace([], [], label=_limits_in_words(axis), look={"color": style.INK, "linestyle": _dashes(j),
                                                                   "linewidth": 1.4})
                   for j, axis in enumerate(limited) if any(gate.crossed(j) for gate in gates)),
