@@ -20,8 +20,8 @@ _INDENT = "  "
 _NAMED = 3
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a column, a command, an option, one of the words below, or a text to look for (in quotes); and which pages "
-    "and shipped studies are about it."
+    "part (sweep), a column, a command, an option, one of the words below, or a text to look for (in quotes); and "
+    "which pages and studies are about it."
 )
 
 
