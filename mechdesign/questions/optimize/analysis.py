@@ -189,7 +189,8 @@ def _nothing_feasible(study: Study, designs: DesignSet, nearest: int | None) -> 
         + f" (it is {row['value']:.6g})" * bool(np.isfinite(row["value"]))
         for row in table if not row["missing"] <= 0
     ]  # fmt: skip
-    message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
+    if short:
+        message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
     files, wrong = design_files(study, designs, {"nearest": (nearest, f"Nearest to a feasible design of {study.name}")})
     counts = {"designs": len(designs), "infeasible": len(designs)}
     tables = {part.name: part for part in (table, designs_table(designs))}
