@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.motion.motion import Motion, in_study_units
@@ -88,6 +89,6 @@ def passed_limits(mechanism: Mechanism, units: Units, poses: Configuration) -> I
 
 def _between(low: float | None, high: float | None, unit: str) -> str:
     """``0 to 90 deg``; ``at least 0 deg`` where one end is open, and a single value where both are the same."""
-    words = [f"{end + 0.0:.6g}" for end in (low, high) if end is not None]
+    words = [numeral(end) for end in (low, high) if end is not None]
     open_end = "at most " if low is None else "at least " if high is None else ""
     return f"{open_end}{' to '.join(dict.fromkeys(words))} {unit}".rstrip()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.ground.columns import Column, ColumnKind
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.ground.results import Scope, Table
 from mechdesign.mechanism import Configuration, Mechanism, Reason
@@ -47,7 +48,7 @@ class Motion:
     def in_words(self, row: int, digits: int = 6) -> str:
         """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row, with its time along a motion over time."""
         return ", ".join(
-            f"{name} = {values[row] + 0.0:.{digits}g} {self.unit_of(name)}".rstrip()
+            f"{name} = {numeral(values[row], digits)} {self.unit_of(name)}".rstrip()
             for name, values in self.poses.named.items()
             if np.isfinite(values[row])
         )

@@ -264,7 +264,7 @@ def test_no_line_is_broken_inside_a_word(width, monkeypatch):
     assert terminal.folded(words, io.StringIO()) == words
 
 
-def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monkeypatch):
+def test_a_sweep_shows_what_varies_and_the_verdict_first_in_80_columns(folder, invoke, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
     judged = SLIDER + "requirements: [{result: kinematics.extremes.B.x.max, at_most: 200}]\n"
@@ -276,10 +276,13 @@ def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monke
     head = [line.split() for line in table]
     assert max(map(len, table)) <= 80
     assert head[:3] == [
-        ["mechanism.", "mechanism.links.", "kinematics.", "kinematics.rod."],
-        ["parameters.r", "rod.2", "extremes.B.x.range", "angle.peak"],
-        ["case", "[mm]", "[mm]", "[mm]", "[deg]"],
+        ["kinematics.", "kinematics.rod."],
+        ["r", "links.rod.2", "extremes.B.x.range", "angle.peak"],
+        ["case", "[mm]", "[mm]", "verdict", "[mm]", "[deg]"],
     ]
+    assert [line[:4] for line in head[3:7]] == [
+        ["1", "38", "110", "met"], ["2", "38", "120", "met"], ["3", "40", "110", "met"], ["4", "40", "120", "met"]
+    ]  # fmt: skip
 
 
 def test_what_does_not_fit_is_listed_without_a_break_in_a_word(capsys, monkeypatch):

@@ -22,7 +22,7 @@ from mechdesign.door.cli.options import PDF, Options
 from mechdesign.door.cli.outcome import Outcome
 from mechdesign.door.cli.places import RESUMED, extras, folder, place
 from mechdesign.door.report import manifest, requirements, writer
-from mechdesign.door.report.cases import best_of, telling_columns
+from mechdesign.door.report.cases import best_of, telling
 from mechdesign.door.report.manifest import Extras
 from mechdesign.door.report.page import pages
 from mechdesign.door.report.requirements import Verdict, judged_again, judged_by, on_warnings
@@ -371,8 +371,10 @@ def ask(options: Options) -> Outcome:
         tell(outcome, study, options)
         return outcome
     assert outcome.table is not None
-    first = telling_columns(outcome.table) if command == SWEEP.name else ()
-    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", first=first)
+    terminal.show(
+        outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", size=study.size,
+        arranged=telling if command == SWEEP.name else None,
+    )  # fmt: skip
     tell(outcome, study, options)
     best_seen = directory / pages.REPORT if options.report else outcome.picture
     terminal.suggest(best_seen, quiet=options.quiet or options.json)

@@ -26,7 +26,9 @@ from mechdesign.drawing.framing import extent
 from mechdesign.drawing.scene import Still, pose
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import MechdesignError, StudyError, printable
+from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Result
+from mechdesign.ground.table_text import Rounding
 from mechdesign.mechanism.plates import pins_of
 from mechdesign.questions.kinematics.analysis import kinematics
 
@@ -40,8 +42,6 @@ WIDTH, BLOCK = 180.0, (9.0, 15.0, 10.0)
 ROW, GAP, LEAST = 4.2, 3.5, 110.0
 # Room for each point of a mechanism below which a larger paper is taken (mm^2).
 CROWDED = 400.0
-# Part of the size of the mechanism, or of a turn, below which a number is rounding.
-ROUNDING = 1e-12
 # Around the mechanism, for dimension lines and names (mm).
 PAD = 22.0
 # Sizes of type, of labels, tables and values (points), and the least part to which a table's is reduced.
@@ -88,7 +88,6 @@ def _motion(view: PosedStudy) -> tuple[Result | None, tuple[Caution, ...]]:
 def _tables(view: PosedStudy, scene: Still, result: Result | None) -> Iterator[tuple[str, Rows]]:
     """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
     study, label = view.study, view.study.units.label
-    scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
     yield "links", table_rows(study, scene)
     yield "pins", _pins(view)
     if result is None:
@@ -99,23 +98,23 @@ def _tables(view: PosedStudy, scene: Still, result: Result | None) -> Iterator[t
         if name in poses.names:
             values = poses[name]
             low, high = float(np.nanmin(values)), float(np.nanmax(values))
-            unit = style.printed(poses.column(name).unit)
-            rows.append((f"drive {name}", f"{low:.5g}", f"{high:.5g}", f"{high - low:.5g}", unit))
+            unit = printed(poses.column(name).unit)
+            rows.append((f"drive {name}", numeral(low, 5), numeral(high, 5), numeral(high - low, 5), unit))
     if "extremes" in result.tables:
         table = result.tables["extremes"]
-        for row in table:
-            if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
-                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
-                extremes = (float(row[key]) for key in ("min", "max", "range"))
-                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
-                rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
+        rounding = Rounding.of(table.columns, study.size)
+        for number, output in enumerate(table["output"].tolist()):
+            if not output.endswith(("_velocity", "_acceleration", "_error")):
+                ends = (table.column(name) for name in ("min", "max", "range"))
+                numbers = (rounding.cell(table.columns, number, end, 5) for end in ends)
+                rows.append((output, *numbers, printed(str(table["unit"][number]))))
     if "loops" in result.tables:
         for row in result.tables["loops"]:
-            least = f"{row['transmission_min']:.4g}"
-            rows.append((f"least transmission angle, {row['joints']}", least, "", "", style.printed(label("angle"))))
+            least = numeral(row["transmission_min"], 4)
+            rows.append((f"least transmission angle, {row['joints']}", least, "", "", printed(label("angle"))))
     yield "motion", rows if len(rows) > 1 else []
     verdicts = [
-        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{own.worst:.5g} {style.printed(own.unit)}")
+        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{numeral(own.worst, 5)} {printed(own.unit)}")
         for verdict in requirements(study, result)
         for own in [verdict.as_required]
     ]

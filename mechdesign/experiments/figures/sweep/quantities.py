@@ -14,6 +14,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Lines, PanelMark, Zone
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import counted, cut
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.ground.results import Table
 from mechdesign.study.text.units import Amount
@@ -163,7 +164,7 @@ def limit_marks(of: CaseAxis, at: Literal["x", "y"] = "y") -> Iterator[PanelMark
 
 
 def number_text(value: float) -> str:
-    return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
+    return numeral(value).replace("-", "\N{MINUS SIGN}")
 
 
 def left_out(all_of: Sequence[CaseAxis], shown: Sequence[CaseAxis], noun: str) -> str:
