@@ -1,5 +1,7 @@
 """What messages say where a first guess is wrong: the cure, the values, and nothing that the reader does not need."""
 
+import re
+
 import pytest
 from helpers.command_line import ask
 
@@ -102,3 +104,41 @@ def test_exports_list_all_names_only_where_none_is_nearly_right() -> None:
     far = ask("export", "-", "--to", "gcode", study=ARM).stderr
     assert "what there is: " in far
     assert "parts.dxf" in far
+
+
+TOLERANCES = (
+    ARM.replace("step: 10", "step: STEP")
+    + """
+reliability:
+  dimensions: {r: {tolerance: 0.3}}
+  limits: {P.x: 0.2}
+  methods: [analytic, monte_carlo]
+  samples: 2000
+"""
+)
+
+
+def test_a_reliability_with_limits_ends_with_the_probability_of_failure_of_each_pose(tmp_path) -> None:
+    """Of a radius with the deviation 0.1 the error of x at 0 deg is beyond 0.2 at 2 sigma: 0.0455."""
+    study = TOLERANCES.replace("STEP", "45")
+    done = ask("reliability", "-", "--no-plots", "--out", tmp_path, study=study)
+    *lines, whole = done.stderr.splitlines()[-4:]
+    assert "over all poses together: probability of failure" in whole
+    for line, pose in zip(lines, ("arm = 0 deg", "arm = 45 deg", "arm = 90 deg"), strict=True):
+        assert f"reliability: at {pose}: probability of failure " in line
+        assert line.endswith(", Monte Carlo")
+    failure, low, high = map(float, re.findall(r"[\d.]+", lines[0].partition("failure")[2].replace("99.7 %", "")))
+    assert low < 0.0455 < high
+    assert low < failure < high
+    assert "below " in lines[2]
+    without = study.partition("  limits:")[0] + "  samples: 100\n"
+    done = ask("reliability", "-", "--no-plots", "--out", tmp_path / "without", study=without)
+    assert "probability" not in done.stderr
+
+
+def test_of_many_poses_the_worst_have_a_line(tmp_path) -> None:
+    done = ask("reliability", "-", "--no-plots", "--out", tmp_path, study=TOLERANCES.replace("STEP", "5"))
+    lines = [line for line in done.stderr.splitlines() if "probability of failure" in line and "at arm" in line]
+    assert len(lines) == 5
+    assert "arm = 0 deg" in lines[0]
+    assert "at 14 more poses it is smaller" in done.stderr

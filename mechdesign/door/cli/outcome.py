@@ -30,6 +30,7 @@ class Outcome:
     kept: bool = False
     written: bool = False  # whether the results are in the directory
     table: Table | None = None  # the main table
+    closing: Sequence[str] = ()  # what is told last, in words
     shard: str = ""  # what became of the shard, with --shard
     left: bool = False  # whether the run ended before this question
     reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble

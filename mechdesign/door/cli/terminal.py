@@ -66,13 +66,14 @@ def coloured(text: str, stream: TextIO) -> str:
     return _VERDICT.sub(lambda match: f"{match[1]}{_GREEN if match[2] == 'met' else _RED}{match[2]}{_PLAIN}", text)
 
 
-def _is_terminal() -> bool:
+def is_terminal() -> bool:
+    """Whether tables are shown to a person."""
     return sys.stdout.isatty()
 
 
 def suggest(path: Path | None, *, quiet: bool) -> None:
     """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
-    if path is not None and _is_terminal():
+    if path is not None and is_terminal():
         line = f"open {shlex.quote(str(path))}"
         if not quiet:
             print(printable_lines(line), file=sys.stderr, flush=True)
@@ -105,7 +106,7 @@ def show(
     """
     if as_json:
         emit_all(json_blocks(table))
-    elif _is_terminal():
+    elif is_terminal():
         _show_to_people(table, rest, arranged or _columns, size)
     elif rest is not None:
         with rest.open(encoding="utf-8", newline="") as stream:
