@@ -23,7 +23,7 @@ from mechdesign.door.cli.outcome import Outcome
 from mechdesign.door.cli.places import RESUMED, extras, folder, place
 from mechdesign.door.report import manifest, requirements, writer
 from mechdesign.door.report.cases import best_of, telling
-from mechdesign.door.report.closing import failures_in_words
+from mechdesign.door.report.closing import FAILURES, closing_words
 from mechdesign.door.report.manifest import Extras
 from mechdesign.door.report.page import pages
 from mechdesign.door.report.requirements import Verdict, judged_again, judged_by, on_warnings
@@ -49,7 +49,6 @@ from mechdesign.study.text.inputs import Folder
 STANDARD_INPUT = Path("-")
 HERE = Path("study.yaml")  # the study where none is named
 PICTURES = "mechdesign.drawing.pictures"  # with it all of Matplotlib that pictures need is imported
-_FAILURES = "reliability"  # the table of probabilities of failure
 _ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 
 
@@ -162,7 +161,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     code, seconds = exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, table=result.main, reached=result.reached, closing=_closing(result.tables.get(_FAILURES)),
+        written=True, table=result.main, reached=result.reached, closing=closing_words(result.tables.get(FAILURES)),
     )  # fmt: skip
 
 
@@ -203,9 +202,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
             for entry in content["requirements"][: len(judged_by(study, command))]
         ]
         table = _written_table(directory, content)
-        closing = _closing(
-            _written_table(directory, content, _FAILURES) if f"{_FAILURES}.csv" in content["tables"] else None
-        )
+        failures = _written_table(directory, content, FAILURES) if f"{FAILURES}.csv" in content["tables"] else None
         warnings, failed = [Caution(**warning) for warning in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
         # The manifest was changed by hand.
@@ -217,7 +214,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
     code = exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
-        written=True, table=table, closing=closing,
+        written=True, table=table, closing=closing_words(failures),
     )  # fmt: skip
 
 
@@ -231,11 +228,6 @@ def exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
     cases = (int(part["exit_code"].max(initial=0)) for part in (table.blocks() if "exit_code" in table else ()))
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
-
-
-def _closing(failures: Table | None) -> Sequence[str]:
-    """What a question ends with; `failures` is the table of probabilities of failure, where there is one."""
-    return () if failures is None else [*failures_in_words(failures)]
 
 
 def _written_table(directory: Path, content: Mapping[str, Any], name: str = "") -> Table:

@@ -12,20 +12,21 @@ from mechdesign.ground.results import Table
 from mechdesign.ground.table_text import Rounding
 from mechdesign.questions.reliability.schema.methods import METHODS
 
+FAILURES = "reliability"  # the table of probabilities of failure
 _MOST = 6  # poses with a line of their own
 _DIGITS = 3
 
 
-def failures_in_words(table: Table) -> Iterator[str]:
+def closing_words(failures: Table | None) -> tuple[str, ...]:
+    """What a question ends with, by its table of probabilities of failure; nothing where it has none."""
+    return () if failures is None else (*_failures_in_words(failures),)
+
+
+def _failures_in_words(table: Table) -> Iterator[str]:
     """``at crank = 30 deg: probability of failure 0.0277 (0.0274 to 0.0284), importance sampling``, a line a pose.
 
     Of several methods it is that of the most accurate one, and of many poses it is the worst of them; then comes the
     probability over the whole cycle.
-
-    Parameters
-    ----------
-    table : Table
-        The table ``reliability``.
     """
     method = max(table["method"].tolist(), key=lambda name: METHODS[name].accuracy)
     rows = table.where(method=method) & np.isfinite(table["failure"])
