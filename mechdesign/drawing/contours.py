@@ -18,7 +18,8 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from mechdesign.drawing.style import COLORMAP, raised
+from mechdesign.drawing.style import COLORMAP
+from mechdesign.ground.numerals import raised
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 # x, y and a value at the nodes of a patch, each of shape (rays, nodes).

@@ -21,6 +21,7 @@ from mechdesign.drawing.labels import covered, paper, place_labels
 from mechdesign.drawing.marks import Late, LateMark, Panel, Picture
 from mechdesign.drawing.panels import drawn_plane
 from mechdesign.drawing.scene import Still, hull, sketched
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
@@ -329,7 +330,7 @@ def _nominal(study: Study, name: str) -> str:
 def _unit(study: Study, name: str) -> str:
     """The unit of what varies, where it is not that of the lengths."""
     unit = study.units.label(LOADS[name]) if name in LOADS else study.unit_of(name) or ""
-    return "" if unit == study.units.label("length") else style.printed(unit)
+    return "" if unit == study.units.label("length") else printed(unit)
 
 
 def _tolerance(dimension: Dimension, nominal: float, unit: str = "") -> str:

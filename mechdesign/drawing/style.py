@@ -22,6 +22,8 @@ from matplotlib.ticker import LogFormatter, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
+from mechdesign.ground.numerals import as_written, printed, raised, reading
+
 DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
 DEFLATE_LEVEL = 7
@@ -58,13 +60,7 @@ INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
 _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers of ten alone have ticks
-# Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
-_PLAIN = 5e-3, 2e4
 
-_MICROMETRES = re.compile(r"\bum\b")
-_PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
-
-_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
 
 # A name, an equals sign, a number and its unit.
 _EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
@@ -211,7 +207,7 @@ class _Powers(LogFormatter):
 
 
 def name_powers(panels: Iterable[Axes]) -> None:
-    """Write the power of ten of an axis into its label, ``force [10\N{SUPERSCRIPT THREE} N]``, once all is drawn.
+    """Write the power of ten of an axis into the unit of its label, ``force [kN]``, once all is drawn.
 
     At the end of the axis, where Matplotlib writes it, it would lie over titles and legends. An axis without a label,
     such as that of a bar of colours below a title, keeps it there.
@@ -229,37 +225,16 @@ def name_powers(panels: Iterable[Axes]) -> None:
             if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
                 continue
             axis.offsetText.set_visible(False)
-            exponent = power(float(np.abs(axis.get_view_interval()).max()))
+            name, bracket, unit = label.rpartition("[")
+            largest = float(np.abs(axis.get_view_interval()).max())
+            exponent, unit = reading(largest, as_written(unit.removesuffix("]")) if bracket else "")
             formatter.set_scientific(exponent != 0)
             if exponent:
                 formatter.set_powerlimits((exponent, exponent))
-                name, bracket, unit = label.rpartition("[")
-                ten = f"10{raised(exponent)}"
-                axis.set_label_text(f"{name}[{ten} {unit}" if bracket else f"{label} [{ten}]")
-
-
-def power(largest: float) -> int:
-    """Power of ten, a multiple of three, of which the numbers up to a largest one are written as multiples."""
-    return 0 if _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 else 3 * int(np.floor(np.log10(largest) / 3))
-
-
-def printed(unit: str) -> str:
-    """A unit with powers, products and micrometres as they are set in print."""
-    unit = _MICROMETRES.sub("\N{MICRO SIGN}m", unit)
-    for plain, sign in _PRINTED.items():
-        unit = unit.replace(plain, sign)
-    return unit
-
-
-def in_powers(value: float) -> str:
-    """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}\N{MIDDLE DOT}10{raised(int(power))}"
-
-
-def raised(power: int) -> str:
-    """A whole number as an exponent."""
-    return str(power).translate(_RAISED)
+            if bracket:
+                axis.set_label_text(f"{name}[{unit}]")
+            elif exponent:
+                axis.set_label_text(f"{label} [{unit}]")
 
 
 def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:

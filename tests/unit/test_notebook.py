@@ -19,6 +19,7 @@ from helpers import command_line
 from matplotlib.figure import Figure
 
 import mechdesign
+from mechdesign.ground.columns import ColumnKind
 
 DATA = {
     "mechanism": {
@@ -363,8 +364,9 @@ def test_a_table_shows_no_rounding_error():
         mechdesign.Column("x", np.array([1.0, 6.1e-17, np.nan]), "mm"),
         mechdesign.Column("y", np.array([-3e-16, 2.0, np.inf]), "mm"),
         mechdesign.Column("part", np.array([1.0, 6.1e-17, 0.5])),
+        ColumnKind("failure", "of what is rare", tail=True).column(np.array([1.0, 6.1e-17, 0.5])),
     )
     rows = Page(mechdesign.Table("motion", columns)._repr_html_()).all("tr")
     assert len(rows) == 4
     text = Page(mechdesign.Table("motion", columns)._repr_html_()).text
-    assert text.endswith("part101026.1e-17\N{EN DASH}\N{INFINITY}0.5")
+    assert text.endswith("failure10110206.1·10⁻¹⁷\N{EN DASH}\N{INFINITY}0.50.5")

@@ -20,6 +20,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.pictures import figures
 from mechdesign.ground.columns import Column
+from mechdesign.ground.numerals import power
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.results import Result, Table
 from mechdesign.questions.workspace.figures.boundary import inscribed_picture
@@ -132,7 +133,7 @@ def test_every_name_of_a_level_stands_where_the_index_has_that_value(
             page.canvas.draw()
         (axes,) = page.axes
         (bar,) = axes.child_axes
-        ten = 10.0 ** style.power(float(bar.get_yticks().max()))
+        ten = 10.0 ** power(float(bar.get_yticks().max()))
         for words in axes.texts:
             box = words.get_window_extent()
             about = (box.min + box.max) @ np.array([0.5, 0.5j]) + disc * page.dpi / 72

@@ -9,11 +9,13 @@ import numpy as np
 from mechdesign.door.exporting.view import PosedStudy
 from mechdesign.door.exporting.wheels import wheels_of
 from mechdesign.door.report.requirements import requirements
-from mechdesign.drawing import style
 from mechdesign.drawing.dimensions import table_rows, tolerance_of
 from mechdesign.drawing.scene import Still
+from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.ground.results import Result
+from mechdesign.ground.table_text import Rounding
 from mechdesign.mechanism.cams import CamFollower
 from mechdesign.mechanism.elements.plates import NO_CLASS
 from mechdesign.mechanism.plates import pins_of
@@ -21,8 +23,6 @@ from mechdesign.mechanism.wheels import Mesh
 from mechdesign.questions.reliability.schema.variation import ToleranceClass
 from mechdesign.study import Study
 
-# Part of the size of the mechanism, or of a turn, below which a number is rounding.
-ROUNDING = 1e-12
 # Rows of a table at most.
 MOST = {
     "links": 20, "pivots": 12, "plates": 12, "pins": 12, "wheels": 10, "cams": 6, "laws": 6, "motion": 16,
@@ -59,7 +59,7 @@ def general_tolerance(study: Study) -> str:
 
 def _number(value: float, size: float) -> str:
     """A length; 0 of what is rounding beside a size."""
-    return f"{0.0 if abs(value) < ROUNDING * size else value:.5g}"
+    return numeral(0.0 if abs(value) < STILL * size else value, 5)
 
 
 def _pivots(study: Study, scene: Still) -> list[tuple[str, ...]]:
@@ -124,7 +124,7 @@ def _cams(view: PosedStudy) -> list[tuple[str, ...]]:
             view.study.units.angle_factor if cam.follower.quantity == "angle" else 1.0
         )
         low, high = _ends(ends)
-        unit = style.printed(view.study.units.label(cam.follower.quantity))
+        unit = printed(view.study.units.label(cam.follower.quantity))
         values = (f"{value:.5g} {unit}".rstrip() for value in (low, high, high - low))
         rows.append((cam.coupling, cam.links[1], _base(view, cam), follower, *values))
     return rows
@@ -153,35 +153,34 @@ def _laws(view: PosedStudy) -> list[tuple[str, ...]]:
 
 def _motion(view: PosedStudy, result: Result) -> list[tuple[str, ...]]:
     """Ranges of drives and outputs, and least transmission angles."""
-    label, turn = view.study.units.label, 2 * np.pi / view.study.units.angle_factor
-    scales = {label("length"): view.mechanism.size, label("angle"): turn}
+    label = view.study.units.label
     rows: list[tuple[str, ...]] = [("motion", "from", "to", "range", "unit")]
     poses = result.tables["motion"]
     for name in view.mechanism.drives:
         if name in poses.names:
             values = poses[name]
             low, high = float(np.nanmin(values)), float(np.nanmax(values))
-            unit = style.printed(poses.column(name).unit)
-            rows.append((f"drive {name}", f"{low:.5g}", f"{high:.5g}", f"{high - low:.5g}", unit))
+            unit = printed(poses.column(name).unit)
+            rows.append((f"drive {name}", numeral(low, 5), numeral(high, 5), numeral(high - low, 5), unit))
     if "extremes" in result.tables:
         table = result.tables["extremes"]
-        for row in table:
-            if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
-                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
-                extremes = (float(row[key]) for key in ("min", "max", "range"))
-                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
-                rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
+        rounding = Rounding.of(table.columns, view.study.size)
+        for number, output in enumerate(table["output"].tolist()):
+            if not output.endswith(("_velocity", "_acceleration", "_error")):
+                ends = (table.column(name) for name in ("min", "max", "range"))
+                numbers = (rounding.cell(table.columns, number, end, 5) for end in ends)
+                rows.append((output, *numbers, printed(str(table["unit"][number]))))
     if "loops" in result.tables:
         for row in result.tables["loops"]:
-            least = f"{row['transmission_min']:.4g}"
-            rows.append((f"least transmission angle, {row['joints']}", least, "", "", style.printed(label("angle"))))
+            least = numeral(row["transmission_min"], 4)
+            rows.append((f"least transmission angle, {row['joints']}", least, "", "", printed(label("angle"))))
     return rows
 
 
 def _requirements(study: Study, result: Result) -> list[tuple[str, ...]]:
     """Verdicts on what is required."""
     verdicts = [
-        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{own.worst:.5g} {style.printed(own.unit)}")
+        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{numeral(own.worst, 5)} {printed(own.unit)}")
         for verdict in requirements(study, result)
         for own in [verdict.as_required]
     ]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from mechdesign.ground.columns import CHOSEN, VARIED
-from mechdesign.ground.errors import counted
+from mechdesign.ground.columns import CHOSEN, VARIED, Column
+from mechdesign.ground.errors import OUTCOMES, counted
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import Table
 from mechdesign.study.text.document import in_yaml
 
@@ -24,7 +25,7 @@ def short(name: str) -> str:
 def text_of(value: Any) -> str:
     """A value in words."""
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return numeral(value)
     return value if isinstance(value, str) else in_yaml(value)
 
 
@@ -72,12 +73,21 @@ class Best:
         return f"best of {counted(self.ranked, 'ranked case')} is {self.words}{front}"
 
 
-def telling_columns(table: Table) -> list[str]:
-    """Columns of a sweep that are shown first: the case, the results asked for, what varies, and what is required."""
-    chosen = [column.name for column in table.columns if column.meaning == CHOSEN]
-    varied = [column.name for column in table.columns if column.meaning == VARIED]
+def telling(table: Table) -> list[Column]:
+    """Columns of a sweep as people read them: the case, what varies, the verdict in words, results, and all others."""
     required = [name for name in table.names if f"{name}_met" in table]
-    return ["case", *(["label"] if "label" in table else []), *chosen, *varied, *required]
+    kept = {1: "NOT MET", 0: "met"} if required else {}
+    codes = table["exit_code"].tolist() if "exit_code" in table else []
+    words = np.array([kept.get(code) or OUTCOMES[code] for code in codes])
+    first = [column for column in table.columns if column.name in ("case", "label")]
+    varied = [column for column in table.columns if column.meaning == VARIED]
+    first += [replace(column, name=short(column.name)) for column in varied]
+    first += [Column("verdict", words, meaning="what became of the case")] * bool(codes)
+    first += [column for column in table.columns if column.name == RANK]
+    first += [column for column in table.columns if column.meaning == CHOSEN]
+    first += [column for column in table.columns if column.name in required]
+    rest = [column for column in table.columns if column not in (*first, *varied) and column.name != "exit_code"]
+    return [*first, *rest]
 
 
 def best_of(table: Table) -> Best | None:

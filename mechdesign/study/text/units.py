@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from mechdesign.ground.errors import nearest
 from mechdesign.ground.expressions import Expression, Number
-from mechdesign.study.text.unit_table import Powers, listed, unit_value
+from mechdesign.ground.unit_table import Powers, listed, unit_value
 
 KINDS: dict[str, Powers] = {
     "none": (0, 0, 0, 0),

@@ -35,6 +35,7 @@ from mechdesign.drawing.layout import draw
 from mechdesign.drawing.mechanism import sketch_picture
 from mechdesign.drawing.scene import sketched
 from mechdesign.ground.errors import counted, explain
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.terms import path_of
 from mechdesign.ground.versions import installed
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
@@ -233,7 +234,7 @@ def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] =
         finalize=harmless, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
-    environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
+    environment.filters |= {"printed": printed, "counted": counted, "shown": shown}
     styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
     script = "".join(_text(f"{part}.js") for part in (*parts, "page"))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]

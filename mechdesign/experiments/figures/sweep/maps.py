@@ -28,6 +28,7 @@ from mechdesign.experiments.figures.sweep.quantities import (
     without_number,
 )
 from mechdesign.experiments.figures.sweep.view import CasesView
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Floats
 
 # Entries of which every two have a map, and maps of a picture, also where none have room side by side.
@@ -132,4 +133,4 @@ def _dashes(k: int) -> Any:
 def _limits_in_words(limited: CaseAxis) -> str:
     limits = [("at least", limited.low), ("at most", limited.high)]
     words = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
-    return f"{limited.name} {words} {style.printed(limited.unit)}".rstrip()
+    return f"{limited.name} {words} {printed(limited.unit)}".rstrip()

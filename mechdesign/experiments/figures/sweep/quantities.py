@@ -17,6 +17,7 @@ from mechdesign.drawing.labels import Label
 from mechdesign.drawing.marks import Axis, Dots, LateMark, Lines, PanelMark, Zone
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import counted, cut
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.ground.results import Table
 from mechdesign.study.text.units import Amount
@@ -192,7 +193,7 @@ def limit_marks(of: CaseAxis, at: Literal["x", "y"] = "y") -> Iterator[PanelMark
 
 
 def number_text(value: float) -> str:
-    return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
+    return numeral(value).replace("-", "\N{MINUS SIGN}")
 
 
 def left_out(all_of: Sequence[CaseAxis], shown: Sequence[CaseAxis], noun: str) -> str:

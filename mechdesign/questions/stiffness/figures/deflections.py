@@ -18,6 +18,7 @@ from mechdesign.drawing.panels import drawn_plane, quantity, round_down
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Scene, Still, hull, pose
 from mechdesign.drawing.shapes import Shape
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.questions.poses import pose_in_words
@@ -210,7 +211,7 @@ def directions_picture(view: StiffnessView) -> Picture | None:
             title += f"\n{adjective} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}"
         title += f"\ndrawn {scale / force:g} times as large"
         panels.append(drawn_plane(marks, np.append(scene.places, edge), study, title))
-    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    words = f"{force:g} {printed(study.units.label('force'))}"
     heading = f"Ellipse: where a force of {words} in any direction moves {section.at}"
     return Picture(heading, panels, across=2, share="xy")
 
