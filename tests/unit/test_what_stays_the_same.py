@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.pages import faults
 from helpers.pictures import figure_of
 
 import mechdesign
@@ -101,7 +102,7 @@ mechanism:
   sketch: {A: [0, 40], B: [130, 0]}
   friction: {guide: {coefficient: 0.1}}
 kinematics:
-  sweep: {crank: {from: 20, to: 160, step: 20}}
+  sweep: {crank: {from: 0, to: 360, step: 20}}
   outputs: [B.x]
   rates: {crank: 60 rpm}
   mechanical_advantage: {B.x: crank}
@@ -117,7 +118,10 @@ def test_a_mechanical_advantage_says_that_it_leaves_out_the_friction_that_there_
     result = mechdesign.kinematics(study)
     assert "without friction though its joints have some" in result.main.column("B.x_advantage").meaning
     with style.context():
-        titles = [axes.get_title("left") for axes in figure_of(study, result, "transmission").axes]
+        figure = figure_of(study, result, "transmission")
+        style.encoded(figure)
+        assert not list(faults(figure))
+        titles = [axes.get_title("left") for axes in figure.axes]
     assert any("without the friction of the joints" in title for title in titles)
     smooth = mechdesign.load(text=FRICTION.replace("friction: {guide: {coefficient: 0.1}}", "measures: {}"))
     assert "some" not in mechdesign.kinematics(smooth).main.column("B.x_advantage").meaning
