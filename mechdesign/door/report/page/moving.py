@@ -75,7 +75,7 @@ _ARROWS = {
     "spring": ("Springs", LOOKS["spring"].color),
     "effort": ("Drives", LOOKS["effort"].color),
     "coupling": ("Couplings", LOOKS["coupling"].color),
-    "shaking": ("Shaking force", style.PURPLE),
+    "shaking": ("Shaking force", style.SKY),
 }
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",

@@ -140,7 +140,8 @@ def _outside(action: Action, acting: Sequence[Action]) -> bool:
     """Whether it comes from outside of the moving links: not from what acts between them alone."""
     if action.kind not in ("joint", "spring", "effort", "coupling"):
         return True
-    return any(other.link == GROUND and (other.kind, other.name) == (action.kind, action.name) for other in acting)
+    same = [other for other in acting if (other.link, other.kind, other.name) == (GROUND, action.kind, action.name)]
+    return any(own.size > LEAST * action.size or abs(own.moment) > LEAST * abs(action.moment) for own in same)
 
 
 def _alone(scene: Still, name: str, whole: Sequence[Shape]) -> list[Shape]:
