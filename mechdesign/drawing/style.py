@@ -64,8 +64,8 @@ _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers 
 
 # A name, an equals sign, a number and its unit.
 _EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
-# What a long word may be broken into.
-_PARTS = re.compile(r"[^._]+[._]*|[._]+")
+# What a long word may be broken into: never the value of a name, which would read as two numbers.
+_PARTS = re.compile(r"\xa0?=\xa0.+|[^._\xa0]+[._]*|[._]+|\xa0(?!=)")
 NO_BREAK = "\N{NO-BREAK SPACE}"
 _MINUS = "\N{MINUS SIGN}"
 
@@ -178,7 +178,7 @@ def folded(words: str, size: float, room: float) -> str:
             for part in [word] if fits(word) else _PARTS.findall(word):
                 longer = f"{lines[-1]}{gap if lines[-1] else ''}{part}"
                 if lines[-1] and not fits(longer):
-                    lines.append(part)
+                    lines.append(part.lstrip(NO_BREAK))
                 else:
                     lines[-1] = longer
                 gap = ""

@@ -12,6 +12,8 @@ DIGITS = 6
 # Numbers up to a largest one outside of this range are multiples of a power of ten.
 _PLAIN = 5e-3, 2e4
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
+_LOWERED = {raised: ord(digit) for digit, raised in zip("0123456789-", _RAISED.values(), strict=True)}
+_TEN = re.compile(rf"(\N{{MIDDLE DOT}})?10([{''.join(map(chr, _LOWERED))}]+)")
 _MICROMETRES = re.compile(r"\bum\b")
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
 _PREFIXES = {"n": -9, "u": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9}
@@ -25,6 +27,20 @@ _SMALL = "m", "s"  # never kilometres
 def raised(power: int) -> str:
     """A whole number as an exponent."""
     return str(power).translate(_RAISED)
+
+
+def writable(encoding: str) -> bool:
+    """Whether an encoding has the letters of powers of ten."""
+    try:
+        f"\N{MIDDLE DOT}{raised(-1234567890)}".encode(encoding)
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
+
+
+def plain_powers(text: str) -> str:
+    """A text with powers of ten in letters that every encoding has: ``2.5*10^-6``."""
+    return _TEN.sub(lambda power: f"{'*' * bool(power[1])}10^{power[2].translate(_LOWERED)}", text)
 
 
 def printed(unit: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,8 @@ class Rounding:
     def cell(self, columns: Sequence[Column], row: int, column: Column, digits: int = DIGITS) -> str:
         """A number of a table as a person reads it, in its own unit."""
         own = _units_of_rows(columns)
-        here = replace(column, values=np.asarray(column.values, dtype=float)[row : row + 1])
+        values = np.asarray(column.values, dtype=float)[row : row + 1]
+        here = Column(column.name, values, column.unit, column.meaning, column.kind)
         return numeral(float(self.cleared(here, None if own is None else own[row : row + 1])[0]), digits)
 
     def cleared(self, column: Column, own: NDArray[Any] | None = None) -> Floats:

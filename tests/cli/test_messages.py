@@ -142,3 +142,16 @@ def test_of_many_poses_the_worst_have_a_line(tmp_path) -> None:
     assert len(lines) == 5
     assert "arm = 0 deg" in lines[0]
     assert "at 14 more poses it is smaller" in done.stderr
+
+
+def test_a_reliability_that_is_kept_ends_with_the_same_words(tmp_path) -> None:
+    file = tmp_path / "arm.yaml"
+    file.write_text(TOLERANCES.replace("STEP", "45").replace("kinematics:", "kinematics:", 1))
+    asked = ("run", file, "--no-plots", "--out", tmp_path / "out")
+    first, again = ask(*asked, study=""), ask(*asked, "--resume", study="")
+    words = [
+        [line for line in done.stderr.splitlines() if ": probability of failure" in line] for done in (first, again)
+    ]
+    assert again.exit_code == 0
+    assert words[0] == words[1]
+    assert len(words[0]) == 4

@@ -555,3 +555,16 @@ def test_in_a_moving_picture_paths_are_seen_over_moving_plates():
         pixels = np.asarray(picture, dtype=float)[-1 - up, across]
         # Pins and bars alone cover the path.
         assert (np.abs(pixels - color).max(axis=1) < 60).mean() > 0.85
+
+
+def test_axes_of_measures_have_their_names():
+    """An expression has no unit that tells what it is, and a distance is no position."""
+    measures = "measures: {lift: {expression: C.y - 20}, gap: {distance: [A, D]}}\n  sketch:"
+    study = study_of(
+        FOUR_BAR.replace("sketch:", measures),
+        "kinematics.outputs=[C, lift, gap]",
+        "kinematics.rates={theta: 6}",
+    )
+    labels = [axes.get_ylabel().replace("\n", " ") for axes in drawn(study, "motion").axes]
+    assert {"position, gap [mm]", "lift", "velocity [mm/s]", "velocity of lift", "acceleration of lift"} <= {*labels}
+    assert not [label for label in labels if label.startswith("value")]

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mechdesign.door.report.page.headlines import _in_words
+from mechdesign.drawing import style
 from mechdesign.ground.columns import Column
-from mechdesign.ground.numerals import numeral, reading
+from mechdesign.ground.numerals import numeral, plain_powers, reading, writable
 from mechdesign.ground.table_text import readable
 
 
@@ -64,3 +66,30 @@ def test_rounding_of_rows_with_their_own_units_is_zero() -> None:
         Column("unit", np.array(["mm", "deg"])),
     ]
     assert readable(columns, columns, (160.0, "mm"))[0].cells == ["160", "0"]
+
+
+@pytest.mark.parametrize("room", [0.6, 0.9, 1.2, 2.0, 3.0])
+@pytest.mark.parametrize("space", [" ", "\N{NO-BREAK SPACE}"])
+def test_a_number_is_not_broken_across_lines_of_a_picture(room: float, space: str) -> None:
+    """``= 7`` above ``8.8`` reads as a fraction."""
+    words = "kinematics.extremes.range (output P.x) = 78.8 deg".replace(" ", space)
+    lines = style.folded(words, 10, room).split("\n")
+    assert [line for line in lines if "= 78.8 deg" in line], lines
+    assert "".join(lines).replace(" ", "") == words.replace(space, "")
+
+
+def test_a_number_is_not_broken_across_lines_of_key_numbers() -> None:
+    columns = [
+        Column("kinematics.extremes.range (output P.x)", np.array([78.8]), "mm"),
+        Column("r", np.array([20.0]), "mm"),
+    ]
+    words = _in_words(columns, 0)
+    assert "=\N{NO-BREAK SPACE}78.8\N{NO-BREAK SPACE}mm" in words
+    assert "r\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}20\N{NO-BREAK SPACE}mm" in words
+    assert words.startswith("kinematics.extremes.range (output P.x) ")
+
+
+def test_a_power_of_ten_is_not_lost_where_an_encoding_has_no_raised_digits() -> None:
+    assert not writable("cp1252")
+    assert writable("utf-8")
+    assert plain_powers("1.76·10⁻⁹ to 10¹²").encode("ascii") == b"1.76*10^-9 to 10^12"

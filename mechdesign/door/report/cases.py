@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def telling(table: Table) -> list[Column]:
     words = np.array([kept.get(code) or OUTCOMES[code] for code in codes])
     first = [column for column in table.columns if column.name in ("case", "label")]
     varied = [column for column in table.columns if column.meaning == VARIED]
-    first += [replace(column, name=short(column.name)) for column in varied]
+    first += [Column(short(column.name), column.values, column.unit, column.meaning, column.kind) for column in varied]
     first += [Column("verdict", words, meaning="what became of the case")] * bool(codes)
     first += [column for column in table.columns if column.name == RANK]
     first += [column for column in table.columns if column.meaning == CHOSEN]

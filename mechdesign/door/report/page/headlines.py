@@ -43,6 +43,7 @@ _ABSOLUTE, _LOWEST = ("size", "least"), ("smallest", "least")
 _MINUS = "\N{MINUS SIGN}"
 _TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
+_SHORT = 20  # letters of a name beside which its value has always room
 
 
 @dataclass(frozen=True)
@@ -135,11 +136,18 @@ def _of_front(table: Table) -> Iterator[Headline]:
 
 
 def _in_words(columns: Iterable[Column], row: int) -> str:
-    """``r = 35 mm, section = tube``; a line may be broken between the quantities only."""
+    """``r = 35 mm, section = tube``; a line may be broken between quantities, and before the value of a long name."""
     values = [(column, column.values[row].item()) for column in columns]
     words = [f"{short(column.name)} = {shown(value) if column.numeric else text_of(value)} {printed(column.unit)}"
              for column, value in values]  # fmt: skip
-    return ", ".join(word.strip().replace(" ", _TOGETHER) for word in words)
+    return ", ".join(map(_together, words))
+
+
+def _together(words: str) -> str:
+    """``name = 35 mm`` in one line, or where the name is long at least the value with its unit."""
+    name, equals, value = words.strip().partition(" = ")
+    value = f"={_TOGETHER}{value.replace(' ', _TOGETHER)}" if equals else ""
+    return f"{name} {value}".rstrip() if len(name) > _SHORT else f"{name} {value}".rstrip().replace(" ", _TOGETHER)
 
 
 def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:

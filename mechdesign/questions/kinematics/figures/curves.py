@@ -24,7 +24,7 @@ from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.study import Study, Units
+from mechdesign.study import Study
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12
@@ -114,7 +114,7 @@ def motion_curves(
         )
     common += both_named(before)
     colors: dict[tuple[str, str], str] = {}
-    panels = [_panel(group, axis, over, study.units, colors, before, common) for group in shown]
+    panels = [_panel(group, axis, over, study, colors, before, common) for group in shown]
     return Picture("", panels, share="x")
 
 
@@ -251,7 +251,7 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
 
 
 def _panel(
-    group: _Group, axis: Axis, over: Along, units: Units, colors: dict[tuple[str, str], str], before: Before | None,
+    group: _Group, axis: Axis, over: Along, study: Study, colors: dict[tuple[str, str], str], before: Before | None,
     common: Sequence[PanelMark],
 ) -> Panel:  # fmt: skip
     """The curves of a group and those of the study before; notes the colour of each."""
@@ -285,12 +285,19 @@ def _panel(
             if curve.column.name in earlier:
                 earlier_look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
                 marks.append(Trace(places, earlier[curve.column.name], look=earlier_look))
-    title = first.order.replace("_", " ")
-    if title == "position":
-        kinds = {units.label("angle"): "angle", units.label("length"): "position"}
-        title = kinds.get(first.column.unit, "value")
     more = f"and {group.left_out} more" if group.left_out else ""
-    return Panel(marks, axis, Axis(title, first.column.unit, ends=ends), legend="beside", heading=more)
+    return Panel(marks, axis, Axis(_title(group, study), first.column.unit, ends=ends), legend="beside", heading=more)
+
+
+def _title(group: _Group, study: Study) -> str:
+    """What a panel shows: a kind of quantity, and measures by their names."""
+    first, names = group.curves[0], [curve.of for curve in group.curves]
+    measures = [name for name in names if name in study.mechanism.description.measures]
+    if first.order == "position":
+        kinds = {study.units.label("angle"): "angle", study.units.label("length"): "position"}
+        return ", ".join([kinds.get(first.column.unit, "value")] * (len(measures) < len(names)) + measures)
+    kind = first.order.replace("_", " ")
+    return kind if len(measures) < len(names) else f"{kind} of {', '.join(measures)}"
 
 
 def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:

@@ -160,7 +160,7 @@ def _over_poses(over: Along, shown: Sequence[Reached]) -> Iterator[Panel]:
             dashed = {"color": style.VERMILION, "linestyle": (0, (5, 2)), "linewidth": 2.4}
             marks = [Trace(over.values, curve.values - curve.error, label="wanted", look=dashed),
                      Trace(over.values, curve.values, label="reached", look=blue | {"linewidth": 1.2})]  # fmt: skip
-            yield Panel(marks, over.wider, Axis("value", curve.unit), curve.output)
+            yield Panel(marks, over.wider, Axis(curve.output, curve.unit))
         worst = quantity(curve.worst, curve.unit).rstrip()
         words = f"{curve.output}: reached less wanted, at most {worst}"
         zero = Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})
