@@ -35,9 +35,9 @@ BEYOND: Mapping[str, str] = dict.fromkeys(
         "universal joint", "cardan joint", "cylindrical joint", "screw joint", "Stewart platform", "delta robot",
     ),
     "planar mechanisms only: every link moves in one plane, with pins and slides. A mechanism in space is for a "
-    "program of multibody dynamics, such as MuJoCo, MBDyn, Project Chrono or Simscape Multibody; what of it moves in a "
-    "plane goes on from here by 'mechdesign export --to model.xml' (docs/howto/simulate_elsewhere.md). How far each question "
-    "goes: docs/theory/limits.md",
+    "program of multibody dynamics, such as MuJoCo, MBDyn, Project Chrono or Simscape Multibody; what of it moves "
+    "in a plane goes on from here by 'mechdesign export --to model.xml' (docs/howto/simulate_elsewhere.md). How far "
+    "a question goes: docs/theory/limits.md",
 )  # fmt: skip
 
 
