@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
+from unicodedata import east_asian_width
 
 import matplotlib
 import numpy as np
@@ -22,6 +23,7 @@ from matplotlib.ticker import LogFormatter, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
+from mechdesign.drawing import fonts
 from mechdesign.ground.numerals import as_written, printed, raised, reading
 
 DPI = 120
@@ -46,6 +48,7 @@ _COLUMN = 88 / 25.4
 _TALLEST = 230 / 25.4
 _REDUCTION = 0.8  # to type of 8 points
 _NARROW = 6.0  # inches
+_LEAST_PRINTED = 6.8  # points
 LOOKS = {
     # 960 pixels, which a README shows at about 800.
     "screen": Look(8.0, math.inf, DPI, 1.0),
@@ -69,11 +72,13 @@ _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers 
 _EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
 # What a long word may be broken into.
 _PARTS = re.compile(r"[^._]+[._]*|[._]+")
+_NAME = re.compile(r"[\w.]+")
+_MOST_LETTERS, _FEWEST_LETTERS = 36, 16  # of a name in a line of text, of a long one in a narrow line
+_LETTER = 0.58  # mean width of a letter in font sizes
 NO_BREAK = "\N{NO-BREAK SPACE}"
 _MINUS = "\N{MINUS SIGN}"
 
 _SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
     "font.size": 10,
     "axes.titlesize": 11,
     # Given: to find it from all that stands above the axes takes as long as a tenth of the picture.
@@ -110,8 +115,8 @@ def context(look: str = "screen") -> Iterator[None]:
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     # As rcdefaults, which reads all styles that come with Matplotlib besides.
     defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
-    with matplotlib.rc_context():
-        matplotlib.rcParams.update(defaults | _SETTINGS | page)
+    with matplotlib.rc_context(), fonts.quiet():
+        matplotlib.rcParams.update(defaults | _SETTINGS | page | {"font.family": fonts.families()})
         yield
 
 
@@ -127,7 +132,7 @@ def dots() -> float:
 
 def tallest() -> float:
     """Greatest height of the page, inches of its layout."""
-    return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
+    return _look().height
 
 
 def narrow() -> bool:
@@ -142,12 +147,22 @@ class NotebookFigure(Figure):
         with context():
             return encoded(self)
 
+    def draw(self, renderer: Any) -> None:
+        """As Matplotlib does; of letters without a font `fonts.lost_letters` tells."""
+        with fonts.quiet():
+            super().draw(renderer)
+
 
 def new_figure(height: float) -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
     figure = NotebookFigure(figsize=(width(), height))
     FigureCanvasAgg(figure)
     return figure
+
+
+def small() -> float:
+    """The least size of type, points of the layout: 6.8 points on paper."""
+    return max(8.0, _LEAST_PRINTED / _look().reduction)
 
 
 def line(size: float) -> float:
@@ -159,9 +174,10 @@ def folded(words: str, size: float, room: float) -> str:
     """Text of a size (points) in lines of at most `room` inches.
 
     ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a word that fits no line is broken after
-    its dots and underscores.
+    its dots and underscores. Long names are shortened.
     """
-    lines: list[str] = []
+    fitting = int(72 * room / (_LETTER * size))
+    words, lines = shortened(words, _MOST_LETTERS, max(_FEWEST_LETTERS, min(_MOST_LETTERS, fitting))), list[str]()
     if max(map(len, words.split("\n"))) * size <= 72 * room:
         return words  # no letter is wider than high
 
@@ -186,6 +202,26 @@ def folded(words: str, size: float, room: float) -> str:
                     lines[-1] = longer
                 gap = ""
     return "\n".join(lines).replace(NO_BREAK, " ")
+
+
+def shortened(words: str, most: int, left: int = 0) -> str:
+    """Text whose names of more letters than `most` are cut in their middle to as many, or those `left`.
+
+    Beginning and end tell names apart.
+    """
+    left = left or most
+
+    def ends(name: re.Match[str]) -> str:
+        if len(name[0]) <= most:
+            return name[0]
+        return f"{name[0][: left // 2]}\N{HORIZONTAL ELLIPSIS}{name[0][len(name[0]) + left // 2 + 1 - left :]}"
+
+    return _NAME.sub(ends, words)
+
+
+def letters(line: str) -> int:
+    """Letters of a line of text, those of East Asia counted twice, which are as wide as high."""
+    return len(line) + sum(east_asian_width(letter) in "WF" for letter in line) * (not line.isascii())
 
 
 @lru_cache(maxsize=1024)
@@ -248,12 +284,12 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
     stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
     if kind == "svg":
         figure.savefig(stream, format=kind, metadata={"Date": None})
-        return _reduced(stream.getvalue(), _reduction())
+        return _reduced(stream.getvalue(), _look().reduction)
     if kind == "pdf":
         # Its modules take a fifth of a second to import.
         from mechdesign.drawing.reduced_pdf import pdf
 
-        return pdf(figure, creator, _reduction())
+        return pdf(figure, creator, _look().reduction)
     figure.canvas.draw()
     few = _in_few_colours(np.asarray(cast(Any, figure.canvas).buffer_rgba()))
     few.save(stream, format="png", dpi=(dots, dots), compress_level=_DEFLATE_LEVEL)
@@ -290,9 +326,9 @@ def _in_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
     return picture
 
 
-def _reduction() -> float:
-    """Inches of paper over those of the layout."""
-    return float(matplotlib.rcParams["figure.dpi"] / matplotlib.rcParams["savefig.dpi"])
+def _look() -> Look:
+    """That of the page."""
+    return next((look for look in LOOKS.values() if look.width == width()), LOOKS["screen"])
 
 
 def _reduced(drawing: bytes, share: float) -> bytes:

@@ -144,7 +144,7 @@ def test_many_names_are_placed_in_time_that_grows_with_their_number():
             labels = [Label(f"P{k}", (place,), "black") for k, place in enumerate(places)]
             begun = time.process_time()
             place_labels(axes, labels, paper(axes, np.repeat(places, 9)), order=3)
-            assert len(axes.texts) == count
+            assert len(axes.texts) > count / 2  # names without room are left out
             return time.process_time() - begun
 
     # The bound is 20 times what it takes; each name against all others took 33 s.
