@@ -122,7 +122,7 @@ def draw(picture: Picture) -> Figure:
         if cell.panel.shows is not None:
             _frame(cell, own)
         _place(cell, left[cell.column])
-        _show_whole_markers(cell.axes)
+        style.show_whole_markers(cell.axes)
         for mark in cell.panel.marks:
             if mark.late:
                 mark.draw(cell.axes)
@@ -377,14 +377,6 @@ def _place(cell: _Cell, left: float) -> None:
     axes.yaxis.label.set_verticalalignment("top")
     axes.xaxis.set_label_coords(0.5, -cell.below / height)
     axes.xaxis.label.set_verticalalignment("bottom")
-
-
-def _show_whole_markers(axes: Axes) -> None:
-    """Markers of curves that end at the edges of a panel are not cut there."""
-    for line in axes.get_lines():
-        places = np.ma.compress_rows(np.ma.masked_invalid(np.asarray(line.get_xydata(), dtype=float)))
-        low, high = np.sort([axes.get_xlim(), axes.get_ylim()]).T
-        line.set_clip_on(line.get_marker() in ("", "None") or not ((low <= places) & (places <= high)).all())
 
 
 def _lines(text: str, size: float) -> float:

@@ -276,6 +276,14 @@ def name_powers(panels: Iterable[Axes]) -> None:
                 axis.set_label_text(f"{label} [{unit}]")
 
 
+def show_whole_markers(axes: Axes) -> None:
+    """Markers of curves that end at the edges of a panel are not cut there."""
+    for line in axes.get_lines():
+        places, (low, high) = np.asarray(line.get_xydata(), float), np.sort([axes.get_xlim(), axes.get_ylim()]).T
+        inside = (low <= places) & (places <= high) | np.isnan(places)
+        line.set_clip_on(line.get_marker() in ("", "None") or not inside.all())
+
+
 def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:
     """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made a PDF.
 
