@@ -198,7 +198,7 @@ def answered(command: str, text: str) -> tuple[mechdesign.Study, mechdesign.Answ
         ("kinematics", LONG_MOTION, {"motion", "paths", "poses", "transmission"}),
         ("dynamics", LONG_FORCES, {"efforts", "free_bodies", "joint_forces", "bearings", "energies", "shaking"}),
         ("kinematics", SCISSORS, {"motion", "paths", "poses", "transmission"}),
-        ("kinematics", COLLISIONS, {"motion", "paths", "poses", "transmission"}),
+        ("kinematics", COLLISIONS, {"motion", "paths", "poses", "transmission", "collisions"}),
         ("workspace", RING, {"workspace", "inscribed", "drives", "joint_space", "ellipses", "inverse_condition",
                                "resistivity"}),
     ],
