@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -229,19 +228,14 @@ def net(lines: Iterable[tuple[Complexes, float, bool]]) -> Floats:
 
 def _offsets(label: Label, half: Floats, stretches: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
     """Where the middle of the text may stand from its anchor (points), shape (n, 2), and how much each displeases."""
-    places, strains = [], []
-    preferred = math.pi / 4 if label.heading is None else label.heading
-    for stretch, strain in stretches:
-        for k in range(_DIRECTIONS):
-            angle = preferred + math.tau * k / _DIRECTIONS
-            toward = cmath.exp(1j * angle)
-            turned = min(k, _DIRECTIONS - k) / _DIRECTIONS
-            place = label.reach * stretch * np.array([toward.real, toward.imag])
-            # The distance is that of the nearest edge of the text, not of its middle.
-            place += half * np.clip(1.3 * np.array([toward.real, toward.imag]), -1, 1)
-            places.append(place)
-            strains.append(strain + turned * (0.5 if label.heading is None else 2.0))
-    return np.array(places), np.array(strains)
+    steps = np.arange(_DIRECTIONS)
+    way = (math.pi / 4 if label.heading is None else label.heading) + math.tau * steps / _DIRECTIONS
+    toward = np.column_stack([np.cos(way), np.sin(way)])
+    turned = np.minimum(steps, _DIRECTIONS - steps) / _DIRECTIONS * (0.5 if label.heading is None else 2.0)
+    stretch, strain = np.array(stretches).T
+    # The distance is that of the nearest edge of the text, not of its middle.
+    places = label.reach * np.multiply.outer(stretch, toward) + half * np.clip(1.3 * toward, -1, 1)
+    return places.reshape(-1, 2), np.add.outer(strain, turned).ravel()
 
 
 def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> Floats:

@@ -102,11 +102,12 @@ def lost_curves(figure: Figure) -> Iterator[str]:
 
 
 def _lost_digits(axes: Axes) -> Iterator[str]:
-    """Axes with a label whose power of ten stands apart from it, numbers that are alike, and those of many digits."""
+    """Axes whose power of ten stands apart from their label, numbers that are alike, and those of many digits."""
     for axis in (axes.xaxis, axes.yaxis) if axes.get_visible() and axes.name != "3d" else ():
         label = axis.get_label_text()
-        if label and axis.offsetText.get_visible() and axis.offsetText.get_text():
-            yield f"{axis.offsetText.get_text()!r} apart from {label!r}"
+        power = axis.offsetText.get_text() if axis.offsetText.get_visible() else ""
+        if power and (label or "e" in power):
+            yield f"{power!r} apart from {label!r}"
         drawn = [tick.label1.get_text() for tick in axis._update_ticks() if tick.label1.get_visible()]
         numbers = [text for text in drawn if text.strip("-\N{MINUS SIGN}.0123456789") == "" and text]
         if len(set(numbers)) < len(numbers) or any(len(text) > MOST_DIGITS for text in numbers):
