@@ -462,6 +462,7 @@ def test_a_study_without_plates_or_motion_says_what_is_taken():
     assert incomplete.endswith("[incomplete]")
 
 
+@pytest.mark.slow
 def test_a_drawing_of_a_large_mechanism_is_shown_on_a_screen_and_that_of_its_parts_at_full_size():
     """A crank-rocker of 9 m was 33,000 pixels wide in a browser."""
     large = "units: {length: dm}" + FOUR_BAR.split("reliability:")[0]

@@ -564,7 +564,6 @@ def seen(figure, axes, place, color):
     return (np.abs(shown[row - 3 : row + 3, column - 3 : column + 3] - to_rgb(color)).max(axis=2) < 0.2).any()
 
 
-@pytest.mark.slow
 def test_markers_at_the_ends_of_a_curve_are_whole():
     figure = drawn(study_of(FOUR_BAR, "kinematics.outputs=[C]"), "motion")
     axes = figure.axes[0]

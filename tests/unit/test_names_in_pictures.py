@@ -58,7 +58,6 @@ def drawn(study, result):
         return np.asarray(figure.canvas.buffer_rgba())
 
 
-@pytest.mark.slow
 def test_curves_of_names_that_differ_at_their_end_are_told_apart():
     name = "messpunkt_auf_der_übergroßen_pleuelstange_der_schmiedepresse"
     study = study_of(FOUR_BAR.replace("P", name))
