@@ -29,6 +29,7 @@ from mechdesign.questions.stiffness.schema import CrossSection
 from mechdesign.study import Study
 
 _SIZE = 8.5  # points, of numbers
+_LETTERS = (60, 36, 24, 18, 14, 11, 9)  # of names in the table, the most that it has room for
 # Points between a link and its dimension line: beside it, farther out, or along the link itself.
 _AWAY = (16.0, -16.0, 26.0, -26.0, 38.0, -38.0, 52.0, -52.0, 70.0, -70.0, 0.0)
 _SHARES = (0.5, 0.38, 0.62, 0.25, 0.75)  # of a dimension line, where its number may stand
@@ -43,7 +44,7 @@ _NET = 4.0  # points between two places of a line that others keep off
 _ORDER = 6.0
 _NONE = 1e-9  # part of the size of the mechanism that is no distance
 _HALO = 1.5  # points about a number
-_COLUMN_GAP = 14.0  # points, between columns of the table
+_COLUMN_GAP, _BOLD = 9.0, 1.15  # points, between columns of the table; width of bold letters over others
 _AROUND = 0.12  # of the mechanism's size, for dimension lines beside it
 
 
@@ -359,7 +360,10 @@ def _size(profile: CrossSection) -> str:
 
 @dataclass(frozen=True, eq=False)
 class WrittenRows(LateMark):
-    """A table in print, its head first; columns are as wide as what they hold, and smaller where there is no room."""
+    """A table in print, its head first; columns are as wide as what they hold.
+
+    Where there is no room its type is smaller, and then long names are shortened.
+    """
 
     rows: Sequence[Sequence[str]]
 
@@ -368,11 +372,18 @@ class WrittenRows(LateMark):
         return 1.6 * style.line(_SIZE) * len(self.rows)
 
     def draw(self, axes: Axes) -> None:
-        widths = [max(2 * _half(row[k])[0] + _COLUMN_GAP for row in self.rows) for k in range(len(self.rows[0]))]
-        room = 72 * axes.bbox.width / style.dots()
-        share = min(1.0, room / sum(widths))
-        for number, row in enumerate(self.rows):
-            for left, words in zip(np.cumsum([0.0, *widths[:-1]]) * share / room, row, strict=True):
-                axes.text(float(left), 1 - (number + 0.5) / len(self.rows), words,
+        # From the left edge of the page.
+        begin, wide = (72 * side / style.dots() for side in (axes.bbox.x0, axes.bbox.width))
+        room, least = wide + begin - _COLUMN_GAP, style.small() / _SIZE
+        for most in _LETTERS:
+            rows = [[style.shortened(words, most) for words in row] for row in self.rows]
+            columns = [[2 * _half(words)[0] for words in column] for column in zip(*rows, strict=True)]
+            widths = [max(_BOLD * head, *others) + _COLUMN_GAP for head, *others in columns]
+            if least * sum(widths) <= room:
+                break
+        share = max(least, min(1.0, room / sum(widths)))
+        for number, row in enumerate(rows):
+            for left, words in zip(np.cumsum([0.0, *widths[:-1]]) * share, row, strict=True):
+                axes.text((float(left) + wide - room) / wide, 1 - (number + 0.5) / len(self.rows), words,
                           transform=axes.transAxes, fontsize=_SIZE * share, va="center",
                           fontweight="bold" if number == 0 else "normal")  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from helpers.command_line import ask, exported
 from helpers.studies import SLIDER_CRANK
+from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.drawing import style
@@ -239,3 +240,16 @@ def test_a_class_that_all_dimensions_have_is_the_general_tolerance(monkeypatch):
     rows, numbers = rows_on(drawn(text, monkeypatch))
     assert any("ISO 2768-f" in row for row in rows)
     assert "30 \N{PLUS-MINUS SIGN}0.1" in numbers
+
+
+@pytest.mark.slow
+def test_nothing_on_a_sheet_is_in_smaller_type_than_six_points(monkeypatch):
+    """Long names once made tables of five points."""
+    name = "pleuelstange_der_übergroßen_schmiedepresse_mit_schwungrad_ab"
+    drawn = []
+    monkeypatch.setattr(style, "encoded", lambda figure, *said: drawn.append(figure) or b"")
+    exported("sheet.pdf", SLIDER.replace("rod", name))
+    (sheet,) = drawn
+    words = [text for text in sheet.findobj(Text) if text.get_visible() and text.get_text()]
+    assert min(text.get_fontsize() for text in words) >= 6
+    assert not any(name in text.get_text() for text in words)

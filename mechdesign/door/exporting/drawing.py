@@ -144,11 +144,15 @@ Shape = Path | DrawnCircle | CentreMark | Text
 
 @dataclass(frozen=True)
 class Drawing:
-    """Shapes, those in one group together under its name; `title` and `remarks` say what it is."""
+    """Shapes, those in one group together under its name; `title` and `remarks` say what it is.
+
+    `longest` is the length (mm) of its longer side on a screen, beyond which it is shown reduced.
+    """
 
     title: str
     groups: Mapping[str, Sequence[Shape]]
     remarks: Sequence[str] = ()
+    longest: float = math.inf
 
     @property
     def shapes(self) -> list[Shape]:

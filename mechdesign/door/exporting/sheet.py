@@ -47,8 +47,9 @@ CROWDED = 400.0
 PALE = 0.12
 # Around the mechanism, for dimension lines and names (mm).
 PAD = 22.0
-# Sizes of type, of labels, tables and values (points), and the least part to which a table's is reduced.
-LABEL, CELL, VALUE, REDUCED = 4.6, 6.6, 8.5, 0.75
+# Sizes of type, of labels, tables and values (points); letters of a name in a table.
+LABEL, CELL, VALUE = 6.0, 6.8, 8.5
+MOST_LETTERS = 30
 # How much wider bold letters are.
 BOLD = 1.15
 # Between columns of a table (mm).
@@ -69,7 +70,8 @@ def sheet_pdf(view: PosedStudy) -> Content:
     scene = pose(mechanism, view.pose)
     assert scene is not None
     result, warnings = _motion(view)
-    tables = sheet_tables(view, scene, result)
+    tables = [[[style.shortened(words, MOST_LETTERS) for words in row] for row in rows]
+              for rows in sheet_tables(view, scene, result)]  # fmt: skip
     with style.context():
         bands = _bands(tables)
         sheet = PaperSheet.of(view, scene, sum(band.height for band in bands))
@@ -205,8 +207,9 @@ class PaperSheet:
                 _box(page, x, top, width, height, 0.25)
                 page.text(x + 1, top + height - 1, label, fontsize=LABEL, va="top", color=style.INK)
                 size = VALUE if label != "Title" else 1.4 * VALUE
-                size *= min(1.0, (width - 3) / max(_width(value, size), 1e-9))
-                page.text(x + 1.5, top + 0.38 * height, value, fontsize=size, va="center", color=style.INK)
+                size = max(CELL, size * min(1.0, (width - 3) / max(_width(value, size), 1e-9)))
+                shown = _cut(value, size, width - 3)
+                page.text(x + 1.5, top + 0.38 * height, shown, fontsize=size, va="center", color=style.INK)
                 x += width
 
 
@@ -275,7 +278,7 @@ def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
     """Tables in two columns where they are narrow enough, in their order; what is wider has its own band."""
     room = WIDTH - 4.0
     half = room / 2 - COLUMN
-    narrow = [rows for rows in tables if REDUCED * sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
+    narrow = [rows for rows in tables if sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
     bands = [TableColumns([[rows]], room) for rows in tables if rows not in narrow]
     if len(narrow) < 2:
         return [TableColumns([[rows]], room) for rows in tables]
@@ -285,11 +288,9 @@ def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
 
 
 def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) -> None:
-    """Draw a table, reduced where it is wider than the room; words without room are cut."""
+    """Draw a table; words without room are cut."""
     widths = _widths(rows)
     gaps = COLUMN * (len(widths) - 1)
-    share = max(REDUCED, min(1.0, (room - gaps) / sum(widths)))
-    widths = [share * width for width in widths]
     # The widest column gives up what is still missing.
     widest = int(np.argmax(widths))
     widths[widest] -= max(0.0, sum(widths) + gaps - room)
@@ -297,7 +298,7 @@ def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) ->
     for number, row in enumerate(rows):
         y = top - (number + 0.5) * ROW
         for x, words, width in zip(starts, row, widths, strict=True):
-            page.text(x, y, _cut(words, share * CELL, width), fontsize=share * CELL, va="center", color=style.INK,
+            page.text(x, y, _cut(words, CELL, width), fontsize=CELL, va="center", color=style.INK,
                       fontweight="bold" if number == 0 else "normal")  # fmt: skip
     page.plot([left, left + room], [top - ROW] * 2, color=style.INK, linewidth=0.25 * 72 / INCH)
 

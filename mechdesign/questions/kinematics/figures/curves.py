@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
 from mechdesign.drawing.layout import fitting_rows
-from mechdesign.drawing.legends import fitting
+from mechdesign.drawing.legends import fitting, legend_names
 from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
 from mechdesign.drawing.overlay import DASHES, both_named
 from mechdesign.drawing.panels import Along, abscissa, moving_names, times
@@ -43,7 +43,6 @@ _AROUND = 0.05  # part of the range beyond it
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
-_LEGEND_LETTERS = 26  # of the longest name in a legend
 
 
 class _Curve(NamedTuple):
@@ -62,8 +61,7 @@ class _Curve(NamedTuple):
     @property
     def label(self) -> str:
         """Its name in a legend."""
-        name = ", ".join((self.of, *self.same))
-        return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        return ", ".join((self.of, *self.same))
 
 
 class _Group(NamedTuple):
@@ -76,7 +74,7 @@ class _Group(NamedTuple):
     @property
     def rows(self) -> int:
         """Rows of its legend where that stands above it, on a narrow page."""
-        names = [curve.label for curve in self.curves]
+        names = legend_names([curve.label for curve in self.curves])
         return -(-len(names) // fitting(names)) + bool(self.left_out) if style.narrow() else 0
 
 

@@ -195,9 +195,10 @@ def label_levels(
         back = colormaps[style.COLORMAP](norm(level))
         # A place of the drawing, not of the page, whose layout may still change.
         axes.text(
-            anchors[best].real, anchors[best].imag, f"{level / ten:.6g}", fontsize=7.5, ha="center", va="center",
-            rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
-            zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
+            anchors[best].real, anchors[best].imag, f"{level / ten:.6g}", fontsize=style.small(), ha="center",
+            va="center", rotation=(turn + 90) % 180 - 90, rotation_mode="anchor",
+            color="white" if norm(level) < 140 else style.INK, zorder=3.5,
+            path_effects=[withStroke(linewidth=2.5, foreground=back)],
         )  # fmt: skip
 
 
