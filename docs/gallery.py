@@ -39,7 +39,7 @@ HOME = ("four_bar", "jansen", "shaper", "five_bar", "scissor_lift", "v_twin", "p
         "pantograph", "klann", "trammel")  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
 PICTURES = ("optimum", "allocation", "free_bodies", "deflections", "failure_map", "density_contours", "springs",
-            "workspace", "paths", "bands", "reliability")  # fmt: skip
+            "workspace", "paths", "bands", "reliability", "mechanism")  # fmt: skip
 
 
 def studies() -> dict[str, Path]:

@@ -18,7 +18,8 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from mechdesign.drawing.style import COLORMAP, raised
+from mechdesign.drawing.style import COLORMAP, small
+from mechdesign.ground.numerals import raised
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 # x, y and a value at the nodes of a patch, each of shape (rays, nodes).
@@ -33,7 +34,7 @@ def color_bar(axes: Axes, drawn: ScalarMappable, label: str = "", **options: Any
     figure = axes.get_figure(root=True)
     assert figure is not None
     beside = axes.inset_axes((1.02, 0, 0.04, 1))
-    beside.tick_params(labelsize=8)
+    beside.tick_params(labelsize=small())
     bar = figure.colorbar(drawn, cax=beside, **options)
     if isinstance(bar.formatter, ScalarFormatter):
         # Powers of ten stand above the bar: long numbers would push its name off the page.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +21,7 @@ from mechdesign.drawing.labels import covered, paper, place_labels
 from mechdesign.drawing.marks import Late, LateMark, Panel, Picture
 from mechdesign.drawing.panels import drawn_plane
 from mechdesign.drawing.scene import Still, hull, sketched
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
@@ -27,6 +29,7 @@ from mechdesign.questions.stiffness.schema import CrossSection
 from mechdesign.study import Study
 
 _SIZE = 8.5  # points, of numbers
+_LETTERS = (60, 36, 24, 18, 14, 11, 9)  # of names in the table, the most that it has room for
 # Points between a link and its dimension line: beside it, farther out, or along the link itself.
 _AWAY = (16.0, -16.0, 26.0, -26.0, 38.0, -38.0, 52.0, -52.0, 70.0, -70.0, 0.0)
 _SHARES = (0.5, 0.38, 0.62, 0.25, 0.75)  # of a dimension line, where its number may stand
@@ -41,7 +44,7 @@ _NET = 4.0  # points between two places of a line that others keep off
 _ORDER = 6.0
 _NONE = 1e-9  # part of the size of the mechanism that is no distance
 _HALO = 1.5  # points about a number
-_COLUMN_GAP = 14.0  # points, between columns of the table
+_COLUMN_GAP, _BOLD = 9.0, 1.15  # points, between columns of the table; width of bold letters over others
 _AROUND = 0.12  # of the mechanism's size, for dimension lines beside it
 
 
@@ -58,14 +61,71 @@ def dimensions_picture(study: Study) -> Picture:
 
 def draw_dimensions(scene: Still, axes: Axes) -> None:
     """Draw a mechanism in a pose, with dimension lines and the names of points and links."""
-    axes.grid(visible=False)
     Posed(scene, names=False, drives=False).draw(axes)
+    draw_lines(scene, axes, lengths(scene))
+
+
+class Length(NamedTuple):
+    """A distance of two points of a link, and the angle of their line where it counts (degrees).
+
+    With `along` it is that in the direction of a unit vector; `tolerance` is written behind it.
+    """
+
+    link: str
+    one: str
+    other: str
+    value: float
+    angle: float = 0.0
+    along: complex = 0j
+    tolerance: str = ""
+
+    @property
+    def words(self) -> str:
+        """The number, its angle and its tolerance."""
+        return f"{_number(self.value, self.angle)} {self.tolerance}".rstrip()
+
+
+def workshop_lengths(study: Study, scene: Still) -> list[Length]:
+    """The lengths as a workshop takes them: pivots apart in x and y, and tolerances at their dimensions."""
+    measured = list[Length]()
+    for length in lengths(scene):
+        if length.link != GROUND:
+            tolerance = tolerance_of(study, _place_of(scene, length))
+            measured.append(length._replace(tolerance=tolerance))
+            continue
+        run = scene.points[length.other] - scene.points[length.one]
+        for along, part in ((1 + 0j, abs(run.real)), (1j, abs(run.imag))):
+            if part > _NONE * scene.span:
+                measured.append(Length(GROUND, length.one, length.other, part, along=along))
+    return measured
+
+
+def tolerance_of(study: Study, place: str) -> str:
+    """The tolerance of a number of the geometry in words; empty where it has none."""
+    tolerances = study.reliability.dimensions if study.reliability is not None else {}
+    return _tolerance(tolerances[place], study.sizes[place]) if place in tolerances else ""
+
+
+def _place_of(scene: Still, length: Length) -> str:
+    """The name of a length that is one of the study's numbers."""
+    ends = scene.description.links[length.link].ends
+    return f"{length.link}.length" if ends in ((length.one, length.other), (length.other, length.one)) else ""
+
+
+def draw_lines(scene: Still, axes: Axes, measured: Iterable[Length], *, bars: bool = True) -> None:
+    """Draw dimension lines, and the names of points and links, beside a mechanism that is drawn already.
+
+    A number may stand on its link, if links are `bars`.
+    """
+    axes.grid(visible=False)
     net = covered(axes)
     boxes: list[Floats] = []
     # The shortest nearest to their links.
-    for name, one, other, value, angle in sorted(_lengths(scene), key=lambda entry: entry[3]):
-        ends = scene.points[one], scene.points[other]
-        net = _dimension(axes, ends, _number(value, angle), net, boxes, on_link=name != GROUND)
+    for length in sorted(measured, key=lambda entry: entry.value):
+        ends = scene.points[length.one], scene.points[length.other]
+        net = _dimension(
+            axes, ends, length.words, net, boxes, along=length.along, on_link=bars and length.link != GROUND
+        )
     for box in boxes:
         net = np.concatenate([net, _inside(box)])
     place_labels(axes, [*point_labels(scene), *link_labels(scene)], net, order=_ORDER + 1)
@@ -76,8 +136,8 @@ def _number(value: float, angle: float) -> str:
     return f"{value:.5g}" + f" \N{ANGLE} {angle:.3g}\N{DEGREE SIGN}" * inclined
 
 
-def _lengths(scene: Still) -> Iterator[tuple[str, str, str, float, float]]:
-    """Link, two of its points, their distance, and of the ground the angle of their line (degrees)."""
+def lengths(scene: Still) -> Iterator[Length]:
+    """The lengths of links, from point to point; those between pivots of the ground with their angle."""
     for name, link in scene.description.links.items():
         if link.telescopic:
             continue
@@ -95,24 +155,33 @@ def _lengths(scene: Still) -> Iterator[tuple[str, str, str, float, float]]:
             run = scene.points[other] - scene.points[one]
             if run:
                 angle = math.degrees(math.atan2(run.imag, run.real)) if name == GROUND else 0.0
-                yield name, one, other, abs(run), angle
+                yield Length(name, one, other, abs(run), angle)
 
 
 def _dimension(
-    axes: Axes, places: tuple[complex, complex], text: str, net: Floats, boxes: list[Floats], *, on_link: bool
-) -> Floats:
+    axes: Axes, places: tuple[complex, complex], text: str, net: Floats, boxes: list[Floats], *, along: complex = 0j,
+    on_link: bool,
+) -> Floats:  # fmt: skip
     """Draw a dimension where it covers least, or none; returns the net with what it covers.
 
-    `boxes` are those of the numbers before it (left, low, right, high; points), to which its own is added.
+    It runs from place to place, or in the direction of a unit vector. `boxes` are those of the numbers before it (left,
+    low, right, high; points), to which its own is added.
     """
     ends = paper(axes, np.array(places)) @ np.array([1, 1j])
-    length = abs(ends[1] - ends[0])
-    along = (ends[1] - ends[0]) / length
+    along = along or (ends[1] - ends[0]) / abs(ends[1] - ends[0])
+    ways = ends * np.conj(along)
+    length = abs(float(np.ptp(ways.real)))
+
+    def level(away: float) -> Complexes:
+        """The dimension line at a distance beside both places."""
+        beside = (ways.imag.max() if away > 0 else ways.imag.min()) + away
+        return np.asarray(along * (ways.real + 1j * beside))
+
     half = _half(text)
     window = paper(axes, np.array([complex(axes.get_xlim()[k], axes.get_ylim()[k]) for k in (0, 1)]))
     best: tuple[float, float, complex, Floats] | None = None
     for away in _AWAY:
-        line = ends + 1j * along * away
+        line = level(away)
         # A number must leave room for arrows at both sides.
         across = min(half[0] / max(abs(along.real), 1e-9), half[1] / max(abs(along.imag), 1e-9))
         if away == 0.0 and (length < 2 * across + 16 or not on_link):
@@ -135,7 +204,7 @@ def _dimension(
     back = _back(axes)
     drawn = [_inside(box)]
     if away:
-        line, side = ends + 1j * along * away, math.copysign(1.0, away) * 1j * along
+        line, side = level(away), math.copysign(1.0, away) * 1j * along
         for end, foot in zip(line, ends, strict=True):
             z = back(np.array([foot + _GAP * side, end + _OVERSHOOT * side]))
             axes.plot(z.real, z.imag, color=style.INK, linewidth=0.5, zorder=_ORDER - 1)
@@ -198,29 +267,33 @@ def _over(box: Floats, other: Floats) -> bool:
     return bool((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all())
 
 
-def table_rows(study: Study, scene: Still) -> list[tuple[str, ...]]:
+def table_rows(study: Study, scene: Still, *, pivots: bool = True) -> list[tuple[str, ...]]:
     """Link, its points, length, tolerance and section; then what else varies. Without columns that hold nothing.
 
-    Points without a length have a row with their place in the frame of the link, unless they are its origin.
+    Distances of `pivots` are among them. Points without a length have a row with their place in the frame of the link,
+    unless they are its origin.
 
     No rows at all of a mechanism without dimensions.
     """
     tolerances = dict(study.reliability.dimensions) if study.reliability is not None else {}
+    for place in () if pivots else [f"{GROUND}.{point}.{axis}" for point in scene.pivots() for axis in "xy"]:
+        tolerances.pop(place, None)
     rows: list[tuple[str, ...]] = [("link", "between", "length", "tolerance", "section")]
     described: set[str] = set()
-    lengths = list(_lengths(scene))
+    measured = [length for length in lengths(scene) if pivots or length.link != GROUND]
     for name, link in study.mechanism.description.links.items():
-        own = [entry for entry in lengths if entry[0] == name]
+        own = [length for length in measured if length.link == name]
         if link.telescopic and link.ends:
             rows.append((name, " to ".join(link.ends), "variable", "", _section(study, name)))
             described.add(name)
-        for _, one, other, value, angle in own:
-            place = f"{name}.length" if link.ends == (one, other) or link.ends == (other, one) else ""
-            text = _tolerance(tolerances.pop(place), study.sizes[place]) if place in tolerances else ""
-            section = "" if name in described else _section(study, name)
-            rows.append(("" if name in described else name, f"{one} to {other}", _number(value, angle), text, section))
+        for length in own:
+            text = tolerance_of(study, place := _place_of(scene, length))
+            tolerances.pop(place, None)
+            section, first = ("", "") if name in described else (_section(study, name), name)
+            rows.append((first, f"{length.one} to {length.other}", length.words, text, section))
             described.add(name)
-        dimensioned = {*(link.ends or ()), *(point for _, one, other, *_ in own for point in (one, other))}
+        dimensioned = {*(link.ends or ()), *(point for length in own for point in (length.one, length.other))}
+        dimensioned |= {*scene.pivots()} if name == GROUND and not pivots else set()
         # The rod's end of a telescopic link has no place in its frame.
         for point in link.points:
             local = complex(study.mechanism.geometry.local(name, point, {}))
@@ -258,7 +331,7 @@ def _nominal(study: Study, name: str) -> str:
 def _unit(study: Study, name: str) -> str:
     """The unit of what varies, where it is not that of the lengths."""
     unit = study.units.label(LOADS[name]) if name in LOADS else study.unit_of(name) or ""
-    return "" if unit == study.units.label("length") else style.printed(unit)
+    return "" if unit == study.units.label("length") else printed(unit)
 
 
 def _tolerance(dimension: Dimension, nominal: float, unit: str = "") -> str:
@@ -287,7 +360,10 @@ def _size(profile: CrossSection) -> str:
 
 @dataclass(frozen=True, eq=False)
 class WrittenRows(LateMark):
-    """A table in print, its head first; columns are as wide as what they hold, and smaller where there is no room."""
+    """A table in print, its head first; columns are as wide as what they hold.
+
+    Where there is no room its type is smaller, and then long names are shortened.
+    """
 
     rows: Sequence[Sequence[str]]
 
@@ -296,11 +372,18 @@ class WrittenRows(LateMark):
         return 1.6 * style.line(_SIZE) * len(self.rows)
 
     def draw(self, axes: Axes) -> None:
-        widths = [max(2 * _half(row[k])[0] + _COLUMN_GAP for row in self.rows) for k in range(len(self.rows[0]))]
-        room = 72 * axes.bbox.width / style.dots()
-        share = min(1.0, room / sum(widths))
-        for number, row in enumerate(self.rows):
-            for left, words in zip(np.cumsum([0.0, *widths[:-1]]) * share / room, row, strict=True):
-                axes.text(float(left), 1 - (number + 0.5) / len(self.rows), words,
+        # From the left edge of the page.
+        begin, wide = (72 * side / style.dots() for side in (axes.bbox.x0, axes.bbox.width))
+        room, least = wide + begin - _COLUMN_GAP, style.small() / _SIZE
+        for most in _LETTERS:
+            rows = [[style.shortened(words, most) for words in row] for row in self.rows]
+            columns = [[2 * _half(words)[0] for words in column] for column in zip(*rows, strict=True)]
+            widths = [max(_BOLD * head, *others) + _COLUMN_GAP for head, *others in columns]
+            if least * sum(widths) <= room:
+                break
+        share = max(least, min(1.0, room / sum(widths)))
+        for number, row in enumerate(rows):
+            for left, words in zip(np.cumsum([0.0, *widths[:-1]]) * share, row, strict=True):
+                axes.text((float(left) + wide - room) / wide, 1 - (number + 0.5) / len(self.rows), words,
                           transform=axes.transAxes, fontsize=_SIZE * share, va="center",
                           fontweight="bold" if number == 0 else "normal")  # fmt: skip

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.panels import Along, quantity
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.numerics.rounding import STILL, unchanging
 from mechdesign.motion.rules import TIME
@@ -138,7 +139,7 @@ def place_in_words(study: Study, over: Along, value: float) -> str:
     if not over.name:
         return f"pose {value:g}"
     unit = study.units.label("time" if over.name == TIME else study.mechanism.quantity(over.name))
-    return f"{over.name} = {value:.6g} {unit}".rstrip()
+    return f"{over.name} = {numeral(value)} {unit}".rstrip()
 
 
 def joint_hodographs(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,18 +15,25 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
+from mechdesign.drawing import style
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 HALO = [withStroke(linewidth=2.2, foreground="white")]  # keeps names clear of the lines below them
-_LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
 _NET = 4.5  # spacing (points) of the net on what names must not cover
 _SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
 _CLEARLY = 2.0  # points by which a name must be nearer to what it names than to another
 _UNCLEAR = 4.0  # cost of a name that is not
+_OVER = 60.0  # cost of a name over another or beyond the paper
+# Distances from what is named, in reaches, and how much they displease; those of names that find no room near.
+_NEAR = ((1.0, 0.0), (1.8, 0.6), (2.8, 1.4), (4.5, 3.0))
+_FAR = (*_NEAR, (7.0, 5.0), (10.0, 8.0))
 _NO_ROOM = 5.5  # cost from which an optional name is left out
 _LEADERLESS = 14.0  # points beyond its reach from which a name has a leader
 _LEADER: dict[str, Any] = {"arrowstyle": "-", "linewidth": 0.7, "shrinkA": 0.5}
+MOST_LETTERS, _FEWEST_LETTERS = 24, 12  # of a name in a drawing
+_WIDEST = 0.08  # of such letters a point of the width of a panel
+_CROWDED, _SMALLER = 0.15, 0.8  # part of the paper that names take from which on they are smaller, and by how much
 _PALE = 0.5  # opacity below which a drawing may be written on
 
 
@@ -57,8 +63,8 @@ class Label:
 
     @property
     def half(self) -> Floats:
-        """Half the width and height of the text, about (points)."""
-        return np.array([_LETTER * self.size * len(self.text), self.size]) / 2
+        """Half the width and height of the text (points)."""
+        return np.array([style.length(self.text, self.size), self.size]) / 2
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ def positions(
     """Where labels stand, one after another, each at the place that costs least on average over some poses.
 
     A label that is not nearer to what it names than to another of its kind has a line to it. None is an optional label
-    that finds no room.
+    that finds no room near, and in a single pose one that would lie over another or beyond the paper.
 
     Parameters
     ----------
@@ -94,27 +100,30 @@ def positions(
         # Names of one kind could be mistaken for each other.
         alike = [k for k, other in enumerate(labels) if k != which and other.size == label.size]
         half = label.half
-        offsets, strains = _offsets(label, half)
-        # Only what is within reach of some place can be covered.
-        reach = np.abs(offsets).max(axis=0) + half + 2
-        candidates = []
-        for rank in range(len(label.anchors)):
-            costs, unclear = strains + 0.4 * rank, np.zeros(len(offsets))
-            for named, net, boxes_taken in zip(anchors, nets, taken, strict=True):
-                origin = named[which][rank]
-                near = net[(np.abs(net - origin) <= reach).all(axis=1)]
-                written = boxes_taken[:count]
-                low, high = origin - reach, origin + reach
-                written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
-                boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
-                others = np.concatenate([named[k] for k in alike]) if alike else np.full((1, 2), np.inf)
-                doubtful = _distances(boxes, named[which]) + _CLEARLY > _distances(boxes, others)
-                costs = costs + _costs(boxes, near, written, window) / poses + _UNCLEAR * doubtful / poses
-                unclear += doubtful / poses
-            k = int(np.argmin(costs))
-            candidates.append((float(costs[k]), rank, offsets[k], unclear[k] > 0.5))
-        cost, rank, offset, doubt = min(candidates, key=lambda candidate: candidate[0])
-        if label.optional and cost > _NO_ROOM:
+        for stretches in (_NEAR, _FAR):
+            offsets, strains = _offsets(label, half, stretches)
+            # Only what is within reach of some place can be covered.
+            reach = np.abs(offsets).max(axis=0) + half + 2
+            candidates = []
+            for rank in range(len(label.anchors)):
+                costs, unclear = strains + 0.4 * rank, np.zeros(len(offsets))
+                for named, net, boxes_taken in zip(anchors, nets, taken, strict=True):
+                    origin = named[which][rank]
+                    near = net[(np.abs(net - origin) <= reach).all(axis=1)]
+                    written = boxes_taken[:count]
+                    low, high = origin - reach, origin + reach
+                    written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
+                    boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
+                    others = np.concatenate([named[k] for k in alike]) if alike else np.full((1, 2), np.inf)
+                    doubtful = _distances(boxes, named[which]) + _CLEARLY > _distances(boxes, others)
+                    costs = costs + _costs(boxes, near, written, window) / poses + _UNCLEAR * doubtful / poses
+                    unclear += doubtful / poses
+                k = int(np.argmin(costs))
+                candidates.append((float(costs[k]), rank, offsets[k], unclear[k] > 0.5))
+            cost, rank, offset, doubt = min(candidates, key=lambda candidate: candidate[0])
+            if cost < _OVER or label.optional or poses > 1:
+                break
+        if cost >= (_NO_ROOM if label.optional else _OVER) and (label.optional or poses == 1):
             chosen.append(None)
             continue
         far = np.hypot(*np.maximum(np.abs(offset) - half, 0.0)) > label.reach + _LEADERLESS
@@ -136,6 +145,11 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
     """
     window = paper(axes, np.array([complex(axes.get_xlim()[0], axes.get_ylim()[0]),
                                    complex(axes.get_xlim()[1], axes.get_ylim()[1])]))  # fmt: skip
+    most = int(min(MOST_LETTERS, max(_FEWEST_LETTERS, _WIDEST * (window[1] - window[0])[0])))
+    labels = [replace(label, text=style.shortened(label.text, most)) for label in labels]
+    if sum(4 * np.prod(label.half) for label in labels) > _CROWDED * np.prod(window[1] - window[0]):
+        labels = [replace(label, size=_SMALLER * label.size) for label in labels]
+    labels = [replace(label, size=max(label.size, style.small())) for label in labels]
     anchors = [paper(axes, np.array(label.anchors)) for label in labels]
     for label, position in zip(labels, positions(labels, [anchors], [obstacles], window), strict=True):
         if position is None:
@@ -212,21 +226,16 @@ def net(lines: Iterable[tuple[Complexes, float, bool]]) -> Floats:
     return np.unique(np.round(rows(every) / _NET), axis=0) * _NET
 
 
-def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
+def _offsets(label: Label, half: Floats, stretches: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
     """Where the middle of the text may stand from its anchor (points), shape (n, 2), and how much each displeases."""
-    places, strains = [], []
-    preferred = math.pi / 4 if label.heading is None else label.heading
-    for stretch, strain in ((1.0, 0.0), (1.8, 0.6), (2.8, 1.4), (4.5, 3.0)):
-        for k in range(_DIRECTIONS):
-            angle = preferred + math.tau * k / _DIRECTIONS
-            toward = cmath.exp(1j * angle)
-            turned = min(k, _DIRECTIONS - k) / _DIRECTIONS
-            place = label.reach * stretch * np.array([toward.real, toward.imag])
-            # The distance is that of the nearest edge of the text, not of its middle.
-            place += half * np.clip(1.3 * np.array([toward.real, toward.imag]), -1, 1)
-            places.append(place)
-            strains.append(strain + turned * (0.5 if label.heading is None else 2.0))
-    return np.array(places), np.array(strains)
+    steps = np.arange(_DIRECTIONS)
+    way = (math.pi / 4 if label.heading is None else label.heading) + math.tau * steps / _DIRECTIONS
+    toward = np.column_stack([np.cos(way), np.sin(way)])
+    turned = np.minimum(steps, _DIRECTIONS - steps) / _DIRECTIONS * (0.5 if label.heading is None else 2.0)
+    stretch, strain = np.array(stretches).T
+    # The distance is that of the nearest edge of the text, not of its middle.
+    places = label.reach * np.multiply.outer(stretch, toward) + half * np.clip(1.3 * toward, -1, 1)
+    return places.reshape(-1, 2), np.add.outer(strain, turned).ravel()
 
 
 def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> Floats:
@@ -236,8 +245,8 @@ def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> F
     inside = (x > left - 1) & (x < right + 1) & (y > low - 1) & (y < high + 1)
     wide = np.minimum(right, taken[:, 2]) - np.maximum(left, taken[:, 0]) + 2
     tall = np.minimum(high, taken[:, 3]) - np.maximum(low, taken[:, 1]) + 1
-    over = np.where((wide > 0) & (tall > 0), 20 + wide * tall, 0.0)
+    over = np.where((wide > 0) & (tall > 0), _OVER + wide * tall, 0.0)
     (x0, y0), (x1, y1) = window
     outside = (left < x0) | (right > x1) | (low < y0) | (high > y1)
-    costs: Floats = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
+    costs: Floats = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + _OVER * outside[:, 0]
     return costs

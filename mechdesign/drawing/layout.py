@@ -122,6 +122,7 @@ def draw(picture: Picture) -> Figure:
         if cell.panel.shows is not None:
             _frame(cell, own)
         _place(cell, left[cell.column])
+        style.show_whole_markers(cell.axes)
         for mark in cell.panel.marks:
             if mark.late:
                 mark.draw(cell.axes)
@@ -318,7 +319,7 @@ def _size(cell: _Cell, wide: float) -> None:
             tick(axis, declared, wide if axis is cell.axes.xaxis else cell.tall)
         axis.set_tick_params(labelbottom=outer and declared.numbers, labelleft=outer and declared.numbers)
         axis.set_label_text(declared.label if outer else "")
-        axis.offsetText.set_visible(outer)
+        axis.offsetText.set_visible(outer and declared.numbers)
 
 
 def _measure(cell: _Cell, renderer: Any) -> None:
@@ -328,12 +329,10 @@ def _measure(cell: _Cell, renderer: Any) -> None:
         axis.label.set_visible(False)
         # `_place` places it; else Matplotlib looks for a place beside the numbers of all axes that share a scale.
         axis.set_label_coords(0.5, 0.5)
-    tight = axes.get_tightbbox(renderer) if cell.panel.shows is None else None
-    if tight is None:
-        # In a plane nothing else reaches beyond its axes; numbers that are not shown would cost as much as the others.
-        parts = [axis.get_tightbbox(renderer) for axis, _, outer in cell.drawn_axes if outer]
-        parts += [child.get_tightbbox(renderer) for child in axes.child_axes]
-        tight = Bbox.union([axes.bbox, *filter(None, parts)])
+    # Nothing else reaches beyond the axes; numbers that are not shown would cost as much as the others.
+    parts = [axis.get_tightbbox(renderer) for axis, _, outer in cell.drawn_axes if outer]
+    parts += [child.get_tightbbox(renderer) for child in (*axes.child_axes, axes.get_legend()) if child is not None]
+    tight = Bbox.union([axes.bbox, *filter(None, parts)])
     box, dots = axes.bbox, style.dots()
     cell.left, cell.right = (max(0.0, side) / dots for side in (box.x0 - tight.x0, tight.x1 - box.x1))
     cell.below, cell.above = (max(0.0, side) / dots for side in (box.y0 - tight.y0, tight.y1 - box.y1))

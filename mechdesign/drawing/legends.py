@@ -15,6 +15,7 @@ from mechdesign.drawing.marks import Panel
 
 _KEY = 18  # letters of a size and its arrow in a legend
 _LEGEND_LETTERS, _LEGEND_SYMBOL = 14.75, 0.6  # an inch; inches
+_BESIDE_LETTERS, _BESIDE_ROOM = 26, 2.0  # of a name in a legend beside a panel; inches
 _LEGEND_DOT, _LEGEND_MARK = 8.0, 6.0  # points
 _BESIDE_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 _ABOVE_LEGEND: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
@@ -32,15 +33,22 @@ def page_legend(figure: Figure, entries: Mapping[str, Any], symbol: float) -> Le
 def fitting(labels: Sequence[str], width: float | None = None, more: int = 0) -> int:
     """Columns of a legend that a width (inches) holds, that of the page if none is given; `more` letters to each."""
     letters = int(_LEGEND_LETTERS * (width or style.width()))
-    return max(1, min(len(labels), letters // (8 + more + max(map(len, "\n".join(labels).split("\n"))))))
+    return max(1, min(len(labels), letters // (8 + more + max(map(style.letters, "\n".join(labels).split("\n"))))))
 
 
 def panel_legend(axes: Axes, panel: Panel, entries: Mapping[str, Any], width: float) -> None:
     """One of a panel, beside it or inside; on a narrow page above it, in as many columns as a width holds."""
-    outside = _ABOVE_LEGEND | {"ncols": fitting([*entries], width)} if style.narrow() else _BESIDE_LEGEND
+    names = legend_names([*entries])
+    outside = _ABOVE_LEGEND | {"ncols": fitting(names, width)} if style.narrow() else _BESIDE_LEGEND
     place = outside if panel.legend == "beside" else _INSIDE_LEGEND | {"loc": panel.legend}
     heading: dict[str, Any] = {"title": panel.heading or None, "title_fontsize": 9, "alignment": "left"}
-    _enlarge_dots(axes.legend(entries.values(), entries.keys(), **place, **heading))
+    _enlarge_dots(axes.legend(entries.values(), names, **place, **heading))
+
+
+def legend_names(labels: Sequence[str]) -> list[str]:
+    """Entries of a legend beside a panel in few letters, where these tell them apart."""
+    short = [style.folded(style.shortened(label, _BESIDE_LETTERS), 9.0, _BESIDE_ROOM) for label in labels]
+    return short if len({*short}) == len({*labels}) else [style.folded(label, 9.0, _BESIDE_ROOM) for label in labels]
 
 
 def _enlarge_dots(legend: Legend) -> Legend:

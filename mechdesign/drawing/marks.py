@@ -112,7 +112,7 @@ class Bars(PanelMark):
         places = np.arange(len(self.values)) + (self.number + 0.5) * tall - 0.4
         drawn = axes.barh(places, self.values, 0.94 * tall if self.count > 1 else tall, **look)
         if self.written:
-            for words in axes.bar_label(drawn, self.written, padding=2, fontsize=8):
+            for words in axes.bar_label(drawn, self.written, padding=2, fontsize=style.small()):
                 words.set_in_layout(False)
         return drawn
 
@@ -180,7 +180,7 @@ class Words(PanelMark):
         places: dict[str, Any] = {"": "data", "xy": axes.transAxes, "x": axes.get_yaxis_transform(),
                                   "y": axes.get_xaxis_transform()}  # fmt: skip
         words = axes.annotate(self.text, (self.x, self.y), self.shift, places[self.inside], "offset points",
-                              **{"fontsize": 8} | dict(self.look))  # fmt: skip
+                              **{"fontsize": style.small()} | dict(self.look))  # fmt: skip
         words.set_in_layout(False)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.contours import colour_steps, constant, round_levels
 from mechdesign.drawing.marks import Axis, Contours, Panel, PanelMark, Picture
+from mechdesign.ground.numerals import in_powers, numeral, printed, raised, reading
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import TIME, PathRows, Sector, Sectors
@@ -50,7 +51,7 @@ class Along(NamedTuple):
 
     def value(self, at: float) -> str:
         """One of its values with four digits and its unit."""
-        return f"{at:.4g} {style.printed(self.unit)}".rstrip()
+        return f"{numeral(at, 4)} {printed(self.unit)}".rstrip()
 
 
 def along(study: Study, poses: Poses) -> Along | None:
@@ -99,16 +100,23 @@ def coordinate_label(study: Study, name: str) -> str:
 
 def number(value: float) -> str:
     """A probability in three digits."""
-    return f"{value:.3g}" if value == 0 or value >= 1e-3 else style.in_powers(value)
+    return f"{value:.3g}" if value == 0 or value >= 1e-3 else in_powers(value)
 
 
-def quantity(value: float, unit: str) -> str:
-    """A value with three digits and its unit, ``3.74e+07 N/m`` as 3.74·10⁷ N/m; an infinite stiffness in a word."""
+def quantity(value: float, unit: str, beside: float = 0.0) -> str:
+    """A value with three digits and a unit of its size, 3.74e7 N/m as 37.4 MN/m; an infinite stiffness in a word.
+
+    The unit is that of numbers up to `beside`, where it stands beside such.
+    """
     if np.isinf(value):
         return "rigid"
-    if value == 0 or 1e-2 <= abs(value) < 1e5:
-        return f"{value:.3g} {style.printed(unit)}" if abs(value) < 1e3 else f"{value:.0f} {style.printed(unit)}"
-    return f"{style.in_powers(value)} {style.printed(unit)}"
+    exponent, scaled_unit = reading(max(abs(value), beside), unit)
+    if scaled_unit.startswith("10"):
+        if value and not 1e-2 <= abs(value) < 1e5:
+            return f"{in_powers(value)} {printed(unit)}"
+        exponent, scaled_unit = 0, printed(unit)
+    scaled = value / 10.0**exponent
+    return f"{f'{scaled:.0f}' if abs(scaled) >= 1e3 else numeral(scaled, 3)} {scaled_unit}"
 
 
 def round_down(value: float) -> float:
@@ -145,7 +153,7 @@ def plane(study: Study, poses: Poses) -> Plane | None:
     if len(maps) > 1:
         rows = [region.patches[0].rays.start * poses.grid[1] for region in poses.rule.regions]
         units = {name: study.units.label(study.mechanism.quantity(name)) for name in poses.names[2:]}
-        words = [", ".join(f"{name} = {values[name][row]:g} {unit}".rstrip() for name, unit in units.items())
+        words = [", ".join(f"{name} = {numeral(values[name][row])} {unit}".rstrip() for name, unit in units.items())
                  for row in rows]  # fmt: skip
         maps = list(zip(words, poses.rule.regions, strict=True))
     whole = Sectors((Sector(slice(0, len(x)), 0j, x + 1j * y),), ())
@@ -271,5 +279,5 @@ def _power(level: float) -> str:
     if 1e-2 <= level < 1e4:
         return f"{level:g}"
     power = int(np.floor(np.log10(level) + 1e-9))
-    digits, ten = f"{level / 10.0**power:.3g}", f"10{style.raised(power)}"
+    digits, ten = f"{level / 10.0**power:.3g}", f"10{raised(power)}"
     return ten if digits == "1" else f"{digits}\N{MIDDLE DOT}{ten}"

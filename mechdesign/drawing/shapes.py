@@ -193,9 +193,13 @@ def mechanism_shapes(scene: Still) -> list[Shape]:
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
     for outline in scene.outlines:
         shapes += _outline(outline, colors[outline.link])
-    for spring in scene.description.springs.values():
-        shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
-    return shapes
+    return [*shapes, *spring_shapes(scene)]
+
+
+def spring_shapes(scene: Still) -> list[Shape]:
+    """The springs of a mechanism in one pose."""
+    springs = scene.description.springs.values()
+    return [part for one in springs for part in (_torsion if one.turning else _spring)(scene, one)]
 
 
 def _outline(outline: RoundPart, color: Color) -> list[Shape]:

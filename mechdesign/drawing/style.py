@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
+from unicodedata import east_asian_width
 
 import matplotlib
 import numpy as np
@@ -22,9 +23,15 @@ from matplotlib.ticker import LogFormatter, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
+from mechdesign.drawing import fonts
+from mechdesign.ground.numerals import as_written, printed, raised, reading
+
 DPI = 120
-# Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
-DEFLATE_LEVEL = 7
+# Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 9 ms a picture; 9 takes 20 ms more for two hundredths.
+_DEFLATE_LEVEL = 8
+# Of colours in few: the largest distance and its root mean square (of 255 a channel), buckets of 6 bits a channel, and
+# pixels side by side from which on a colour is that of an area.
+_FARTHEST, _MEAN, _SHADES, _AREA = 48, 3.0, 1 << 18, 8
 
 
 class Look(NamedTuple):
@@ -41,6 +48,7 @@ _COLUMN = 88 / 25.4
 _TALLEST = 230 / 25.4
 _REDUCTION = 0.8  # to type of 8 points
 _NARROW = 6.0  # inches
+_LEAST_PRINTED = 6.8  # points
 LOOKS = {
     # 960 pixels, which a README shows at about 800.
     "screen": Look(8.0, math.inf, DPI, 1.0),
@@ -58,23 +66,19 @@ INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
 _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers of ten alone have ticks
-# Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
-_PLAIN = 5e-3, 2e4
 
-_MICROMETRES = re.compile(r"\bum\b")
-_PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
-
-_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
 
 # A name, an equals sign, a number and its unit.
 _EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
-# What a long word may be broken into.
-_PARTS = re.compile(r"[^._]+[._]*|[._]+")
+# What a long word may be broken into: never the value of a name, which would read as two numbers.
+_PARTS = re.compile(r"\xa0?=\xa0.+|[^._\xa0]+[._]*|[._]+|\xa0(?!=)")
+_NAME = re.compile(r"[\w.]+")
+_MOST_LETTERS, _FEWEST_LETTERS = 36, 16  # of a name in a line of text, of a long one in a narrow line
+_LETTER = 0.58  # mean width of a letter in font sizes
 NO_BREAK = "\N{NO-BREAK SPACE}"
 _MINUS = "\N{MINUS SIGN}"
 
 _SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
     "font.size": 10,
     "axes.titlesize": 11,
     # Given: to find it from all that stands above the axes takes as long as a tenth of the picture.
@@ -111,8 +115,8 @@ def context(look: str = "screen") -> Iterator[None]:
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     # As rcdefaults, which reads all styles that come with Matplotlib besides.
     defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
-    with matplotlib.rc_context():
-        matplotlib.rcParams.update(defaults | _SETTINGS | page)
+    with matplotlib.rc_context(), fonts.quiet():
+        matplotlib.rcParams.update(defaults | _SETTINGS | page | {"font.family": fonts.families()})
         yield
 
 
@@ -128,7 +132,7 @@ def dots() -> float:
 
 def tallest() -> float:
     """Greatest height of the page, inches of its layout."""
-    return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
+    return _look().height
 
 
 def narrow() -> bool:
@@ -143,12 +147,22 @@ class NotebookFigure(Figure):
         with context():
             return encoded(self)
 
+    def draw(self, renderer: Any) -> None:
+        """As Matplotlib does; of letters without a font `fonts.lost_letters` tells."""
+        with fonts.quiet():
+            super().draw(renderer)
+
 
 def new_figure(height: float) -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
     figure = NotebookFigure(figsize=(width(), height))
     FigureCanvasAgg(figure)
     return figure
+
+
+def small() -> float:
+    """The least size of type, points of the layout: 6.8 points on paper."""
+    return max(8.0, _LEAST_PRINTED / _look().reduction)
 
 
 def line(size: float) -> float:
@@ -160,9 +174,10 @@ def folded(words: str, size: float, room: float) -> str:
     """Text of a size (points) in lines of at most `room` inches.
 
     ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a word that fits no line is broken after
-    its dots and underscores.
+    its dots and underscores. Long names are shortened.
     """
-    lines: list[str] = []
+    fitting = int(72 * room / (_LETTER * size))
+    words, lines = shortened(words, _MOST_LETTERS, max(_FEWEST_LETTERS, min(_MOST_LETTERS, fitting))), list[str]()
     if max(map(len, words.split("\n"))) * size <= 72 * room:
         return words  # no letter is wider than high
 
@@ -182,11 +197,31 @@ def folded(words: str, size: float, room: float) -> str:
             for part in [word] if fits(word) else _PARTS.findall(word):
                 longer = f"{lines[-1]}{gap if lines[-1] else ''}{part}"
                 if lines[-1] and not fits(longer):
-                    lines.append(part)
+                    lines.append(part.lstrip(NO_BREAK))
                 else:
                     lines[-1] = longer
                 gap = ""
     return "\n".join(lines).replace(NO_BREAK, " ")
+
+
+def shortened(words: str, most: int, left: int = 0) -> str:
+    """Text whose names of more letters than `most` are cut in their middle to as many, or those `left`.
+
+    Beginning and end tell names apart.
+    """
+    left = left or most
+
+    def ends(name: re.Match[str]) -> str:
+        if len(name[0]) <= most:
+            return name[0]
+        return f"{name[0][: left // 2]}\N{HORIZONTAL ELLIPSIS}{name[0][len(name[0]) + left // 2 + 1 - left :]}"
+
+    return _NAME.sub(ends, words)
+
+
+def letters(line: str) -> int:
+    """Letters of a line of text, those of East Asia counted twice, which are as wide as high."""
+    return len(line) + sum(east_asian_width(letter) in "WF" for letter in line) * (not line.isascii())
 
 
 @lru_cache(maxsize=1024)
@@ -211,7 +246,7 @@ class _Powers(LogFormatter):
 
 
 def name_powers(panels: Iterable[Axes]) -> None:
-    """Write the power of ten of an axis into its label, ``force [10\N{SUPERSCRIPT THREE} N]``, once all is drawn.
+    """Write the power of ten of an axis into the unit of its label, ``force [kN]``, once all is drawn.
 
     At the end of the axis, where Matplotlib writes it, it would lie over titles and legends. An axis without a label,
     such as that of a bar of colours below a title, keeps it there.
@@ -229,79 +264,79 @@ def name_powers(panels: Iterable[Axes]) -> None:
             if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
                 continue
             axis.offsetText.set_visible(False)
-            exponent = power(float(np.abs(axis.get_view_interval()).max()))
+            name, bracket, unit = label.rpartition("[")
+            largest = float(np.abs(axis.get_view_interval()).max())
+            exponent, unit = reading(largest, as_written(unit.removesuffix("]")) if bracket else "")
             formatter.set_scientific(exponent != 0)
             if exponent:
                 formatter.set_powerlimits((exponent, exponent))
-                name, bracket, unit = label.rpartition("[")
-                ten = f"10{raised(exponent)}"
-                axis.set_label_text(f"{name}[{ten} {unit}" if bracket else f"{label} [{ten}]")
+            if bracket:
+                axis.set_label_text(f"{name}[{unit}]")
+            elif exponent:
+                axis.set_label_text(f"{label} [{unit}]")
 
 
-def power(largest: float) -> int:
-    """Power of ten, a multiple of three, of which the numbers up to a largest one are written as multiples."""
-    return 0 if _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 else 3 * int(np.floor(np.log10(largest) / 3))
-
-
-def printed(unit: str) -> str:
-    """A unit with powers, products and micrometres as they are set in print."""
-    unit = _MICROMETRES.sub("\N{MICRO SIGN}m", unit)
-    for plain, sign in _PRINTED.items():
-        unit = unit.replace(plain, sign)
-    return unit
-
-
-def in_powers(value: float) -> str:
-    """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}\N{MIDDLE DOT}10{raised(int(power))}"
-
-
-def raised(power: int) -> str:
-    """A whole number as an exponent."""
-    return str(power).translate(_RAISED)
+def show_whole_markers(axes: Axes) -> None:
+    """Markers of curves that end at the edges of a panel are not cut there."""
+    for line in axes.get_lines():
+        places, (low, high) = np.asarray(line.get_xydata(), float), np.sort([axes.get_xlim(), axes.get_ylim()]).T
+        inside = (low <= places) & (places <= high) | np.isnan(places)
+        line.set_clip_on(line.get_marker() in ("", "None") or not inside.all())
 
 
 def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:
     """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made a PDF.
 
-    A PNG has at most 256 colours, a third of the size.
+    A PNG has few colours, a quarter of the size.
     """
     stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
     if kind == "svg":
         figure.savefig(stream, format=kind, metadata={"Date": None})
-        return _reduced(stream.getvalue(), _reduction())
+        return _reduced(stream.getvalue(), _look().reduction)
     if kind == "pdf":
         # Its modules take a fifth of a second to import.
         from mechdesign.drawing.reduced_pdf import pdf
 
-        return pdf(figure, creator, _reduction())
+        return pdf(figure, creator, _look().reduction)
     figure.canvas.draw()
     few = _in_few_colours(np.asarray(cast(Any, figure.canvas).buffer_rgba()))
-    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL)
+    few.save(stream, format="png", dpi=(dots, dots), compress_level=_DEFLATE_LEVEL)
     return stream.getvalue()
 
 
 def _in_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
-    """A picture of pixels (height, width, 4) in at most 256 colours; no colour moves by more than some 15 of 255.
+    """A picture of pixels (height, width, 4) in as few colours as no eye misses, at most 256.
 
-    A run of equal pixels is looked up as one pixel, which takes a third of the time.
+    Areas keep their colours. Of the shades along edges one after another is taken that is farthest from those taken,
+    rare ones last, until none is farther than `_FARTHEST` and all pixels are in the mean nearer than `_MEAN`.
     """
     height, width, _ = pixels.shape
     colours = pixels.view(np.uint32).ravel()
-    begins = np.flatnonzero(np.diff(colours, prepend=~colours[:1]))
-    runs = Image.frombytes("RGBA", (len(begins), 1), colours[begins].tobytes()).convert("RGB")
-    # Of Pillow's ways this one keeps rare colours.
-    few = runs.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    numbers = np.repeat(np.asarray(few).ravel(), np.diff(begins, append=len(colours)))
-    picture = Image.frombytes("P", (width, height), numbers.tobytes())
-    picture.putpalette(few.getpalette() or [])
+    # A run of equal pixels is looked up as one pixel.
+    begins = np.concatenate([[0], np.flatnonzero(colours[1:] != colours[:-1]) + 1])
+    lengths, colours = np.diff(begins, append=len(colours)), colours[begins]
+    shades = colours >> 2 & 0x3F | colours >> 4 & 0xFC0 | colours >> 6 & 0x3F000
+    shown, areas = np.empty(_SHADES, dtype=np.uint32), lengths > _AREA
+    shown[shades], shown[shades[areas]] = colours, colours[areas]
+    counts = np.bincount(shades, lengths, _SHADES)
+    used = np.flatnonzero(counts)
+    counts, colors = counts[used], shown[used].view(np.uint8).reshape(-1, 4)[:, :3].astype(float)
+    far, nearest, taken = np.full(len(used), np.inf), np.zeros(_SHADES, dtype=np.uint8), [int(np.argmax(counts))]
+    while True:
+        distances = np.square(colors - colors[taken[-1]]).sum(axis=1)
+        nearest[used[distances < far]] = len(taken) - 1
+        far = np.minimum(far, distances)
+        if len(taken) == 256 or (far.max() <= _FARTHEST**2 and far @ counts <= _MEAN**2 * height * width):
+            break
+        taken.append(int(np.argmax(far * counts**0.25)))
+    picture = Image.frombytes("P", (width, height), np.repeat(nearest[shades], lengths).tobytes())
+    picture.putpalette(colors[taken].astype(np.uint8).tobytes())
     return picture
 
 
-def _reduction() -> float:
-    """Inches of paper over those of the layout."""
-    return float(matplotlib.rcParams["figure.dpi"] / matplotlib.rcParams["savefig.dpi"])
+def _look() -> Look:
+    """That of the page."""
+    return next((look for look in LOOKS.values() if look.width == width()), LOOKS["screen"])
 
 
 def _reduced(drawing: bytes, share: float) -> bytes:

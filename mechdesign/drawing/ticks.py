@@ -10,7 +10,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis
 
-LABEL, _WORD = 10.0, 8.0  # points, of the name of an axis, of names along it
+LABEL = 10.0  # points, of the name of an axis
 NAMES = 0.4  # of the width, for names beside bars
 # Inches: between a text and what it is of, of a digit, from tick to tick.
 PAD, DIGIT, _UP, _ALONG = 0.06, 0.083, 0.29, 0.47
@@ -25,12 +25,13 @@ def tick(axis: Drawn, declared: Axis, inches: float) -> None:
     if declared.words or len(declared.ticks):
         places = declared.ticks if len(declared.ticks) else range(len(declared.words))
         room = NAMES * style.width() if upright else inches / max(len(declared.words), 1) - PAD
-        words = [style.folded(word, LABEL if upright else _WORD, room) for word in declared.words]
+        words = [style.folded(word, LABEL if upright else style.small(), room) for word in declared.words]
         # Names that have no room side by side stand upright.
-        lies = upright or all(style.length(line, _WORD) <= 72 * room for word in words for line in word.split("\n"))
+        lies = upright or all(style.length(line, style.small()) <= 72 * room
+                              for word in words for line in word.split("\n"))  # fmt: skip
         axis.set_ticks([*places], labels=(words if lies else declared.words) or None)
         if words and not upright:
-            axis.set_tick_params(labelsize=_WORD, labelrotation=0 if lies else 90)
+            axis.set_tick_params(labelsize=style.small(), labelrotation=0 if lies else 90)
     elif declared.scale == "linear":
         low, high = axis.get_view_interval()
         turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > _MUCH_OF_A_TURN

@@ -63,8 +63,14 @@ class Design(Sequence[Changes]):
 
     def named(self, k: int) -> str:
         """A case in words: its number, from 1, its label, if it has one, and its values."""
-        label = self.labels[k] if self.labels else ""
-        return f"case {k + 1} ({label and f'{label}: '}{changes_in_words(self[k])})"
+        return f"case {k + 1} ({self._label(k) and f'{self._label(k)}: '}{changes_in_words(self[k])})"
+
+    def called(self, k: int) -> str:
+        """A case by its number, from 1, and its label, if it has one."""
+        return f"case {k + 1} ({self._label(k)})" if self._label(k) else f"case {k + 1}"
+
+    def _label(self, k: int) -> str:
+        return self.labels[k] if self.labels else ""
 
 
 def _objects(values: Sequence[Any]) -> NDArray[Any]:

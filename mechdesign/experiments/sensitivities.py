@@ -19,6 +19,7 @@ from mechdesign.experiments.schema.sensitivities import Changed
 from mechdesign.family.goals import Goal
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import Problem, StudyError, counted
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.differences import STEPS, slope
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Result, Table
@@ -163,7 +164,8 @@ def _doubt(found: Sequence[float], middle: float, number: Changing, reason: str)
     """Why a derivative is unknown or uncertain, with its error and the slopes on both sides; empty if it is neither."""
     value, error, below, above = found
     if not math.isnan(below):
-        return f"has a kink here; its slope is {below:.6g} below {number.value:g} and {above:.6g} above"
+        slopes = f"{numeral(below)} below {numeral(number.value)} and {numeral(above)} above"
+        return f"has a kink here; its slope is {slopes}"
     if math.isnan(value):
         return f"is not known near {number.value:g}: {reason or 'it is nan there'}"
     if error <= max(_UNCERTAIN * abs(value), abs(middle) * _NOTHING / number.step):
@@ -171,6 +173,6 @@ def _doubt(found: Sequence[float], middle: float, number: Changing, reason: str)
     # Noise needs longer steps, strong curvature shorter ones.
     other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
     return (
-        f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
-        f"(few samples); another step may help, {{parameter: {number.given}, step: {other:g}}}"
+        f"differences do not agree: {numeral(value, 4)} with an error of {numeral(error, 2)}; it may jump here or be "
+        f"rough (few samples); another step may help, {{parameter: {number.given}, step: {other:g}}}"
     )

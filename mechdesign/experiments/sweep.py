@@ -176,7 +176,7 @@ def _drawn(study: Study, cases: Design, whole: Answered, numbers: Sequence[Goal]
     """The entries that vary, the results with what is required of them, and which are goals."""
     entries = [*cases.columns]
     verdicts = tuple(
-        over_cases(worst.verdict, cases.named(worst.case), worst.unmet, len(whole), worst.first)
+        over_cases(worst.verdict, cases.named(worst.case), worst.unmet, len(whole), cases.called(worst.first))
         for worst in whole.worst
     )
     own = _limits_of_cases(study, entries)
@@ -275,7 +275,9 @@ def _warnings(study: Study, cases: Design, whole: Answered, ranked: Flags | None
         twice = [(k, prior) for k, case in enumerate(cases) if (prior := first.setdefault(json.dumps(case), k)) != k]
         if twice:
             k, prior = twice[0]
-            words = f"{len(twice)} of {len(cases)} cases are repeated; {cases.named(k)} is case {prior + 1} once more"
+            words = (
+                f"{len(twice)} of {len(cases)} cases are repeated; {cases.named(k)} is {cases.called(prior)} once more"
+            )
             yield Caution("suspect", words, "sweep", pose=cases.named(k))
     for kind, warned in whole.warned.items():
         case = cases.named(warned.case)

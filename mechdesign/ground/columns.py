@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,8 @@ class ColumnKind:
     meaning: str  #: one line
     unit: str = ""  #: kind of quantity, several with ``or``, or, after ``as``, what has its unit; empty: none
     formula: str = ""
+    #: whether it is the probability of what is rare, of which no size is rounding
+    tail: bool = field(default=False, kw_only=True)
 
     @property
     def names(self) -> list[str]:

@@ -27,6 +27,15 @@ EXIT_CODES = {
     130: "interrupted (143 by SIGTERM, 129 by SIGHUP); what was finished is whole",
 }
 
+# What became of a question or a case, in a word or two.
+OUTCOMES = {
+    0: "done",
+    1: "requirement not met",
+    2: "wrong study",
+    3: "cannot be assembled",
+    4: "failed",
+    130: "interrupted",
+}
 
 # Most mistakes listed in one message, most misspelt names compared with the known ones, and most characters of a
 # quoted text.

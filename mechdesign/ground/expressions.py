@@ -22,6 +22,7 @@ from mechdesign.ground.functions import (
     OfOneNumber,
     Repeated,
     Rise,
+    Share,
     Tabulated,
     arity,
     chained,
@@ -102,7 +103,7 @@ class Expression:
 
     def repeated(self, name: str, first: float, period: float) -> Expression:
         """The expression with its values in a period of a variable, from `first` on, again in every other period."""
-        again: Step = ("call", Repeated(first, period, kept=True))
+        again: Step = ("call", Repeated(first, period))
         program = [part for step in self.program for part in ((step, again) if step == ("name", name) else (step,))]
         return replace(self, program=tuple(program))
 
@@ -309,6 +310,8 @@ def _corners(
         yield inner[0], tuple(place for place, _ in function.rows), function.period, False
     elif isinstance(function, Rise):
         yield inner[0], function.places, 0.0, False
+    elif isinstance(function, Share):
+        yield inner[0], (0.0,) if function.period else (), function.period, False
     elif isinstance(function, Repeated):
         yield inner[0], (function.first,), function.period, False
     elif function in ("min", "max"):

@@ -204,11 +204,28 @@ class Tabulated(OfOneNumber):
 
 
 @dataclass(frozen=True)
-class Rise(OfOneNumber):
-    """The rise of a motion law from 0 to 1: 0 before the way from 0 to 1, and 1 beyond it.
+class Share(OfOneNumber):
+    """What has passed of a way of some `length` from its `begin` on, as a part of it; with a `period` again in each.
 
-    At its end counts what follows. `falls` is the way of a move to a smaller value.
+    By less than rounding it does not miss 0 or 1. At the end of a period counts the begin of the next.
     """
+
+    begin: float = 0.0
+    length: float = 1.0
+    period: float = 0.0
+
+    def _at(self, x: Any, order: int) -> Any:
+        if order:
+            return 1.0 / self.length if order == 1 else 0.0
+        passed = x - self.period * np.floor(x / self.period + SAME_PLACE) if self.period else x
+        share = (passed - self.begin) / self.length
+        end = np.where(share > 0.5, 1.0, 0.0)
+        return np.where(np.abs(share - end) <= SAME_PLACE, end, share)
+
+
+@dataclass(frozen=True)
+class Rise(OfOneNumber):
+    """The rise of a motion law over its way from 0 to 1, of a move to a smaller value where it `falls`."""
 
     law: str
     falls: bool = False
@@ -219,33 +236,27 @@ class Rise(OfOneNumber):
 
     @cached_property
     def places(self) -> tuple[float, ...]:
-        """Where its phases begin, and its end."""
-        return (*(phase.begin for phase in LAWS[self.law].phases), 1.0)
+        """Where its phases behind the first begin."""
+        return tuple(phase.begin for phase in LAWS[self.law].phases[1:])
 
     def _at(self, x: Any, order: int) -> Any:
-        phase = np.searchsorted(self.places[1:-1], np.add(x, SAME_PLACE), side="right")
-        s = self._phases.take(phase).rise(np.clip(x, 0.0, 1.0), order)
-        return np.where(np.abs(np.subtract(x, 0.5) + SAME_PLACE) <= 0.5, s, 0.0) if order else s
+        row = np.searchsorted(self.places, np.add(x, SAME_PLACE), side="right") if self.places else 0
+        return self._phases.take(row).rise(np.asarray(x), order)
 
 
 @dataclass(frozen=True)
 class Repeated(OfOneNumber):
-    """A number within a period from `first` on, whole periods aside: what follows from it repeats.
-
-    The last place of the first period is the first one again, unless it is `kept`.
-    """
+    """A number within a period from `first` on, whole periods aside: what follows from it repeats."""
 
     first: float
     period: float
-    kept: bool = False
 
     def _at(self, x: Any, order: int) -> Any:
+        """Both ends of the first period are kept."""
         if order:
             return float(order == 1)
         away = np.subtract(x, self.first)
-        if self.kept:
-            return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
-        return self.first + away - self.period * np.floor(away / self.period + SAME_PLACE)
+        return np.where((away >= 0) & (away <= self.period), x, self.first + np.mod(away, self.period))
 
 
 def meanings() -> dict[str, tuple[str, str]]:

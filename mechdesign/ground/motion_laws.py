@@ -50,7 +50,7 @@ class PhaseTable:
         """Polynomials, shape (phases, powers)."""
         return cls(powers, np.empty((len(powers), 0), dtype=complex), np.empty((len(powers), 0)))
 
-    def take(self, rows: Ints) -> PhaseTable:
+    def take(self, rows: Ints | int) -> PhaseTable:
         """Those of some rows."""
         return PhaseTable(self.powers[rows], self.waves[rows], self.frequencies[rows])
 

@@ -26,12 +26,11 @@ from mechdesign.ground.statistics import (
     no_value,
     no_value_along,
 )  # fmt: skip
+from mechdesign.ground.table_text import IN_UNIT
 
 if TYPE_CHECKING:
     from mechdesign.motion.followed import Followed
 
-# Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.
-IN_UNIT = "in `unit`"
 # Number of rows that a message names.
 MOST_ROWS = 8
 

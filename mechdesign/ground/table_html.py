@@ -7,17 +7,17 @@ from html import escape
 
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import counted, cut, printable
-from mechdesign.ground.table_text import readable
+from mechdesign.ground.table_text import ReadColumn, readable
 
 ROWS = 24  # at most
 
 
 def table_html(name: str, meaning: str, columns: Sequence[Column], shown: Sequence[Column], more: int) -> str:
     """The first rows of a table, all its columns, and that so many rows are left; colours are the notebook's own."""
-    numeric = [column.numeric for column in shown]
-    head = _row("th", map(_head, shown), numeric)
-    texts = zip(*readable(columns, shown), strict=True)
-    rows = "".join(_row("td", map(_text, row), numeric) for row in texts)
+    read = readable(columns, shown)
+    numeric = [column.numeric for column in read]
+    head = _row("th", map(_head, read), numeric)
+    rows = "".join(_row("td", map(_text, row), numeric) for row in zip(*(column.cells for column in read), strict=True))
     title = f"{_text(name)}: {_text(meaning)}" if meaning else _text(name)
     left = f"<div>and {counted(more, 'more row')}</div>" if more else ""
     return (
@@ -32,7 +32,7 @@ def _row(tag: str, cells: Iterable[str], numeric: Iterable[bool]) -> str:
     return f"<tr>{inner}</tr>"
 
 
-def _head(column: Column) -> str:
+def _head(column: ReadColumn) -> str:
     unit = f"<br>[{_text(column.unit)}]" if column.unit else ""
     return f'<span title="{_text(column.meaning)}">{_text(column.name)}</span>{unit}'
 

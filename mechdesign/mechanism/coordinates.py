@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.ground.errors import MechanismError, suggestion
 from mechdesign.ground.expressions import Corner, Expression
-from mechdesign.ground.functions import Repeated, Tabulated
+from mechdesign.ground.functions import Share, Tabulated
 from mechdesign.ground.notation import Step
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.elements.couplings import MEASURED, Coupling, play
@@ -198,7 +198,7 @@ def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupl
 def _cam_law(coupling: Coupling, description: Description, graph: Graph) -> Expression:
     """What a coupling gives; the law of a cam that ends after a turn as it begins, with every turn of the cam again."""
     law, cam = coupling.function, coupling.cam
-    periodic = any(isinstance(step, Tabulated | Repeated) for _, step in law.program)
+    periodic = any(isinstance(step, Tabulated | Share) for _, step in law.program)
     if cam is None or periodic or abs(cam.range[1] - cam.range[0] - TURN) > LIKE_A_TURN * TURN:
         return law
     parts, unit = _parts(law, description, graph), law.angle_unit

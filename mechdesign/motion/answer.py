@@ -9,6 +9,7 @@ import numpy as np
 from mechdesign.ground.errors import AssemblyError
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Result, Scope
+from mechdesign.motion.failures import failures
 from mechdesign.motion.followed import Courses
 from mechdesign.motion.group import DesignEnd, DesignGroup
 from mechdesign.motion.passage import pass_over
@@ -73,7 +74,7 @@ def _end(passage: Passage, design: int) -> DesignEnd:
     motion, reason = question.motion, passage.reason.reshape(question.poses.designs, -1)[design]
     counts = {"poses": len(reason), "invalid": int(np.count_nonzero(reason))}
     try:
-        warnings, failed = motion.failures(reason, design * len(reason), question.lead)
+        warnings, failed = failures(motion, reason, design * len(reason), question.lead)
     except AssemblyError as error:
         return DesignEnd(counts=counts, error=error)
     more, gaps = question.say(passage, design)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.ground.statistics import Request
@@ -96,7 +97,7 @@ class Followed:
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""
         swept, coordinates = self.along.curve.poses.swept, self.pose(place)
-        return ", ".join(f"{name} {coordinates[name]:.6g}" for name in (coordinates if swept is None else [swept]))
+        return ", ".join(f"{name} {numeral(coordinates[name])}" for name in (coordinates if swept is None else [swept]))
 
     def end(self, sign: int) -> Floats:
         """The largest value, or with the sign -1 the smallest."""

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.ground.cautions import Caution
 from mechdesign.ground.columns import Column, ColumnKind
-from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Ints
 from mechdesign.ground.results import Scope, Table
 from mechdesign.mechanism import Configuration, Mechanism, Reason
@@ -49,40 +48,10 @@ class Motion:
     def in_words(self, row: int, digits: int = 6) -> str:
         """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row, with its time along a motion over time."""
         return ", ".join(
-            f"{name} = {values[row] + 0.0:.{digits}g} {self.unit_of(name)}".rstrip()
+            f"{name} = {numeral(values[row], digits)} {self.unit_of(name)}".rstrip()
             for name, values in self.poses.named.items()
             if np.isfinite(values[row])
         )
-
-    def failures(self, reason: NDArray[np.int8], begin: int = 0, table: str = "") -> tuple[list[Caution], str]:
-        """Warnings for poses of a design that failed, and the message where that is an error (exit code 3).
-
-        Parameters
-        ----------
-        reason : int8 array, shape (poses of the design,)
-            See `mechdesign.mechanism.Reason`.
-        begin : int
-            Row of its first pose.
-        table : str
-            The table whose rows are the poses of the design, if there is one.
-
-        Raises
-        ------
-        AssemblyError
-            If every pose failed.
-        """
-        bad = np.flatnonzero(reason)
-        if not len(bad):
-            return [], ""
-        invalid, why = self.invalid_in_words(reason), self.mechanism.why
-        named = [f"{self.in_words(begin + int(row))}: {why(int(reason[row]))}" for row in bad[:5]]
-        if len(bad) == len(reason):
-            more = "; ..." if len(bad) > len(named) else ""
-            raise AssemblyError(f"no pose is valid; {'; '.join(named)}{more}")
-        place = (table, int(bad[0]) if table else None, self.in_words(begin + int(bad[0])))
-        if self.poses.listed:
-            return [Caution("unassembled", invalid, *place)], f"pose {'; pose '.join(named)}"
-        return [Caution("unassembled", f"{invalid}; the first: {named[0]}", *place)], ""
 
     def invalid_in_words(self, reason: NDArray[np.int8]) -> str:
         """How many poses are not valid, and why; empty where all are."""

@@ -143,6 +143,11 @@ class Study:
         return {**self.mechanism.nominal, **self.parameters.nominal}
 
     @property
+    def size(self) -> tuple[float, str]:
+        """The size of its mechanism with the unit, beside which numbers are rounding."""
+        return self.mechanism.size, self.units.label("length")
+
+    @property
     def label(self) -> str:
         """The name of its folder of results, that of its file or else its own."""
         return printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or UNNAMED

@@ -31,6 +31,28 @@ def test_a_word_is_told(word, told, invoke):
     assert "\x1b" not in done.stdout
 
 
+@pytest.mark.parametrize(("word", "told"), [
+    ("counterweight", "docs/howto/moving_torque.md (page)"), ("balancing", "a counterweight balances"),
+    ("planetary", "configs/gallery/planetary.yaml (shipped study)"), ("gears", "docs/howto/gears_and_cams.md (page)"),
+    ("transmission angle", "docs/theory/kinematics.md (page)"),
+    ("synthesis", "configs/gallery/path_synthesis.yaml (shipped study)"),
+])  # fmt: skip
+def test_a_word_of_a_page_leads_to_the_page_with_a_sentence_of_it(word, told, invoke):
+    done = invoke("docs", word)
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert told in done.stdout
+    assert word.removesuffix("s").removesuffix("ing") in done.stdout.casefold()
+
+
+@pytest.mark.parametrize("word", ["spatial", "3D", "3d", "ball joint", "ball joints", "spherical"])
+def test_a_word_that_is_out_of_scope_says_so_and_where_to_go(word, invoke):
+    done = invoke("docs", word)
+    assert done.exit_code == 0
+    assert "planar mechanisms only" in done.stdout
+    assert "MuJoCo" in done.stdout
+    assert "docs/theory/limits.md" in done.stdout
+
+
 def test_every_command_and_option_is_found_with_what_it_does():
     group = typer.main.get_command(app).commands
     known = entries(commands(group))

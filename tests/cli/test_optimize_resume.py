@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -259,3 +260,16 @@ def test_api_gives_the_finished_part_with_the_interrupt(study, interrupt):
     with pytest.raises(mechdesign.ground.errors.Interrupted) as stopped:
         mechdesign.optimize(mechdesign.load(study()))
     assert len(stopped.value.result.tables["designs"]) == 384
+
+
+def test_resume_says_how_often_what_is_finished_is_kept(study, invoke, interrupt):
+    arguments = ("optimize", study(), "--no-plots", "--jobs", 1, "--out", "out")
+    interrupt(2)
+    invoke(*arguments)
+    interrupt(10**9)
+    done = invoke(*arguments, "--resume")
+    assert re.search(r"optimize: goes on after \d+ designs; what is finished is kept every 30 s\n", done.stderr)
+    assert "nothing to resume" not in done.stderr
+    (Path("out") / "optimum.csv").unlink()
+    done = invoke(*arguments, "--resume")
+    assert "optimize: nothing to resume, as what is finished is kept every 30 s; begins anew\n" in done.stderr

@@ -23,7 +23,7 @@ def failing(*arguments, **options):
     [
         ("questions.kinematics.figures.curves", "motion_curves", "motion.png", "motion"),
         ("questions.kinematics.figures.paths", "paths_panel", "paths.png", "paths"),
-        ("report.figures.mechanism", "mechanism_picture", "mechanism.png", "mechanism.png"),
+        ("drawing.mechanism", "mechanism_picture", "mechanism.png", "mechanism.png"),
         ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
     ],
 )

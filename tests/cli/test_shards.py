@@ -130,7 +130,7 @@ def test_shards_that_cannot_be_merged(studies, invoke):
     invoke("sweep", *asked, "--shard", "2/3", "--seed", 5)
     told = invoke("merge", *asked)
     assert told.exit_code == 2
-    assert "shard_2_of_3/answers.npz: is a shard of something else; other than here: seed, study" in told.stderr
+    assert "shard_2_of_3/answers.npz: is a shard of something else: seed is 5, here 0\n" in told.stderr
     invoke("sweep", *asked, "--shard", "2/3")
     kept = studies / "parts/shard_2_of_3" / FILE
     whole = kept.read_bytes()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.door.cli import terminal
+from mechdesign.door.cli import live_table, terminal
 from mechdesign.door.cli.live_table import LiveTable, ProgressNote
 from mechdesign.door.cli.outcome import Outcome
 from mechdesign.door.cli.summary import summary
@@ -183,13 +183,36 @@ def test_a_reader_that_has_had_enough_is_no_error(tmp_path):
 def test_a_great_job_is_announced_without_a_bar(folder, analysis, invoke):
     def great(study, *, progress, **options):
         progress.start(999_999, "poses")
-        progress.start(3_000_000, "designs")
+        progress.start(3_000_000, "samples")
         return answer()
 
     analysis(great)
     arguments = ("kinematics", "slider.yaml", "--no-plots")
-    assert invoke(*arguments).stderr.splitlines()[0] == "3000000 designs to compute; Ctrl-C ends it"
+    assert invoke(*arguments).stderr.splitlines()[0] == "3000000 samples to compute; Ctrl-C ends it"
     assert invoke(*arguments, "--quiet").stderr == ""
+
+
+def test_a_long_search_announces_its_designs_and_shows_how_far_it_is_in_a_file(folder, analysis, invoke, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(live_table.time, "monotonic", lambda: now[0])
+
+    def long(study, *, progress, **options):
+        progress.start(20_000, "designs")
+        for _ in range(8):
+            now[0] += 9.0
+            progress.update(100)
+        return answer()
+
+    analysis(long, "optimize")
+    lines = invoke("optimize", "slider.yaml", "--no-plots").stderr.splitlines()
+    ending = "Ctrl-C ends it, and --resume goes on: what is finished is kept every 30 s"
+    assert lines[:4] == [
+        f"20000 designs to compute; {ending}",
+        f"slider: optimize: 200 of 20000 designs after 18 s; {ending}",
+        "slider: optimize: 600 of 20000 designs after 54 s",
+        "slider: optimize: 3 rows in results/slider/optimize",
+    ]
+    assert invoke("optimize", "slider.yaml", "--no-plots", "--quiet").stderr == ""
 
 
 def one_picture(*given):
@@ -202,7 +225,7 @@ def one_picture(*given):
 @pytest.mark.nightly
 def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeypatch):
     monkeypatch.setattr(pictures, "figures", one_picture)
-    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    monkeypatch.setattr(terminal, "is_terminal", lambda: True)
     (folder / "swing it.yaml").write_text(SLIDER)
     swing = "results/swing it"
     asked = {
@@ -218,7 +241,7 @@ def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeyp
         assert invoke(*arguments).stderr.splitlines()[-1] == last
     for arguments in (("--no-plots",), ("--quiet",), ("--json",)):
         assert "open " not in invoke("kinematics", "slider.yaml", *arguments).stderr
-    monkeypatch.setattr(terminal, "_is_terminal", lambda: False)
+    monkeypatch.setattr(terminal, "is_terminal", lambda: False)
     assert "open " not in invoke("kinematics", "slider.yaml").stderr
 
 
@@ -264,9 +287,9 @@ def test_no_line_is_broken_inside_a_word(width, monkeypatch):
     assert terminal.folded(words, io.StringIO()) == words
 
 
-def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monkeypatch):
+def test_a_sweep_shows_what_varies_and_the_verdict_first_in_80_columns(folder, invoke, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    monkeypatch.setattr(terminal, "is_terminal", lambda: True)
     judged = SLIDER + "requirements: [{result: kinematics.extremes.B.x.max, at_most: 200}]\n"
     (folder / "slider.yaml").write_text(judged.replace("step: 45}}", "step: 45}}\n  outputs: [B.x, rod.angle]"))
     asked = "kinematics.extremes.B.x.range,kinematics.rod.angle.peak"
@@ -276,15 +299,30 @@ def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monke
     head = [line.split() for line in table]
     assert max(map(len, table)) <= 80
     assert head[:3] == [
-        ["mechanism.", "mechanism.links.", "kinematics.", "kinematics.rod."],
-        ["parameters.r", "rod.2", "extremes.B.x.range", "angle.peak"],
-        ["case", "[mm]", "[mm]", "[mm]", "[deg]"],
+        ["kinematics.", "kinematics.rod."],
+        ["r", "links.rod.2", "extremes.B.x.range", "angle.peak"],
+        ["case", "[mm]", "[mm]", "verdict", "[mm]", "[deg]"],
     ]
+    assert [line[:4] for line in head[3:7]] == [
+        ["1", "38", "110", "met"], ["2", "38", "120", "met"], ["3", "40", "110", "met"], ["4", "40", "120", "met"]
+    ]  # fmt: skip
+
+
+def test_run_says_the_rows_and_the_folder_of_an_answer_once(folder, analysis, invoke, monkeypatch):
+    piped = invoke("run", "slider.yaml", "--no-plots")
+    assert "slider: kinematics: 3 rows in results/slider/kinematics" in piped.stderr
+    monkeypatch.setattr(terminal, "is_terminal", lambda: True)
+    shown = invoke("run", "slider.yaml", "--no-plots")
+    assert "3 rows" not in shown.stderr
+    assert shown.stderr.splitlines()[-1] == "results in results/slider"
+    assert [line.split()[:3] for line in shown.stdout.splitlines()[:2]] == [
+        ["study", "command", "outcome"], ["slider", "kinematics", "done"]
+    ]  # fmt: skip
 
 
 def test_what_does_not_fit_is_listed_without_a_break_in_a_word(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
-    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    monkeypatch.setattr(terminal, "is_terminal", lambda: True)
     rest = Path("a-folder-with-a-long-name") / "motion-of-the-crank-and-the-rod.csv"
     terminal.show(summary([Outcome("s", "kinematics", Path(), 1, 0)]), as_json=False, rest=rest)
     assert str(rest) in capsys.readouterr().out.splitlines()

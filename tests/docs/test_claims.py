@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import gallery
 import pytest
 
 import mechdesign
@@ -132,3 +133,9 @@ def test_pages_of_results_show_every_study_of_the_gallery_and_pictures_that_exis
     for page in ("results/README.md", "results/gallery/README.md"):
         for path in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", read(page)):
             assert ((ROOT / page).parent / path).exists(), path
+
+
+def test_every_howto_and_every_page_of_the_gallery_has_a_picture() -> None:
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "howto").glob("*.md")}
+    pages |= {name: gallery.page(path) for name, path in gallery.studies().items()}
+    assert [name for name, text in pages.items() if name != "index" and not re.search(r"!\[[^\]]+\]\(", text)] == []

@@ -17,6 +17,8 @@ from mechdesign.drawing import style
 SHARED = 2.0
 # Of a letter's height: the part of a box that letters without strokes above and below leave free.
 LOOSE = 0.15
+# Points on paper, of the least type.
+LEAST = 6.75
 # Letters of a number along an axis.
 MOST_DIGITS = 8
 # Inches by which a picture may exceed the height of its page.
@@ -25,8 +27,12 @@ HIGHER = 0.05
 FLAT = 0.02
 
 
-def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
-    """Every text that is drawn, its box in pixels and its angle; a turned text's box is that of its ends."""
+def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float, float]]:
+    """Every text that is drawn, its box in pixels, its angle and its type in points on paper.
+
+    A turned text's box is that of its ends.
+    """
+    printed = min(look.reduction for look in style.LOOKS.values() if look.width >= figure.get_figwidth() - HIGHER)
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     # Tick labels beyond the limits of their axis are there, but not drawn.
     hidden: set[Text] = set()
@@ -44,7 +50,7 @@ def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
         if np.isfinite(box.extents).all():
             spare = LOOSE * min(box.width, box.height)
             box = Bbox.from_extents(box.x0, box.y0 + spare, box.x1, box.y1 - spare)
-            yield text.get_text(), box, text.get_rotation()
+            yield text.get_text(), box, text.get_rotation(), printed * text.get_fontsize()
 
 
 def faults(figure: Figure) -> Iterator[str]:
@@ -53,10 +59,12 @@ def faults(figure: Figure) -> Iterator[str]:
     page = figure.bbox
     if figure.get_figheight() > style.tallest() + HIGHER:
         yield f"{figure.get_figheight():.2f} inches high on a page of {style.tallest():.2f}"
-    for words, box, _ in found:
+    for words, box, _, size in found:
+        if size < LEAST:
+            yield f"{words!r} in type of {size:.2g} points"
         if box.x0 < -SHARED or box.y0 < -SHARED or box.x1 > page.width + SHARED or box.y1 > page.height + SHARED:
             yield f"{words!r} leaves the page"
-    for (one, a, turn), (other, b, also) in combinations(found, 2):
+    for (one, a, turn, _), (other, b, also, _) in combinations(found, 2):
         across, down = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
         if across > SHARED and down > SHARED and turn % 90 == 0 and also % 90 == 0:
             yield f"{one!r} over {other!r}"
@@ -68,7 +76,7 @@ def faults(figure: Figure) -> Iterator[str]:
         if (
             _place(labels)
             and axes.get_aspect() != 1.0
-            and not any("times larger" in " ".join(words.split()) for words, _, _ in found)
+            and not any("times larger" in " ".join(words.split()) for words, *_ in found)
         ):
             yield f"unequal axes of a place: {' and '.join(labels)}"
 
@@ -94,11 +102,12 @@ def lost_curves(figure: Figure) -> Iterator[str]:
 
 
 def _lost_digits(axes: Axes) -> Iterator[str]:
-    """Axes with a label whose power of ten stands apart from it, numbers that are alike, and those of many digits."""
+    """Axes whose power of ten stands apart from their label, numbers that are alike, and those of many digits."""
     for axis in (axes.xaxis, axes.yaxis) if axes.get_visible() and axes.name != "3d" else ():
         label = axis.get_label_text()
-        if label and axis.offsetText.get_visible() and axis.offsetText.get_text():
-            yield f"{axis.offsetText.get_text()!r} apart from {label!r}"
+        power = axis.offsetText.get_text() if axis.offsetText.get_visible() else ""
+        if power and (label or "e" in power):
+            yield f"{power!r} apart from {label!r}"
         drawn = [tick.label1.get_text() for tick in axis._update_ticks() if tick.label1.get_visible()]
         numbers = [text for text in drawn if text.strip("-\N{MINUS SIGN}.0123456789") == "" and text]
         if len(set(numbers)) < len(numbers) or any(len(text) > MOST_DIGITS for text in numbers):

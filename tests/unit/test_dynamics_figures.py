@@ -164,6 +164,14 @@ def test_a_load_on_the_pin_of_several_links_is_drawn_on_the_pin_and_one_on_the_g
     assert 5j in [own.force for own in shown["ground"] if own.kind == "load"]
 
 
+@pytest.mark.slow
+def test_what_acts_between_moving_links_alone_is_not_drawn_on_the_whole() -> None:
+    # A coupling turns the wheel against the output.
+    shown = bodies("one_tooth_difference")
+    assert "coupling" in {own.kind for own in shown["wheel"]}
+    assert "coupling" not in {own.kind for own in shown["Mechanism"]}
+
+
 def test_a_cylinder_says_how_hard_it_pushes_or_pulls() -> None:
     titles = [*bodies("excavator_lift")]
     assert any(title.startswith("boom_cylinder, pushes 607") for title in titles)

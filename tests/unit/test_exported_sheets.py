@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from helpers.command_line import ask, exported
 from helpers.studies import SLIDER_CRANK
+from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.drawing import style
 
 SLIDER = (
     SLIDER_CRANK
@@ -127,3 +129,127 @@ def test_a_sheet_is_the_same_bytes_and_has_the_size_of_its_paper():
     box = data.split(b"/MediaBox [")[1].split(b"]")[0].split()
     assert [float(side) * 25.4 / 72 for side in box[2:]] == pytest.approx([210, 297], abs=0.01)
     assert "--paper is A4 or A3, not 'A5'" in refused("sheet.pdf", SLIDER, paper="A5")
+
+
+PRESS = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 20], C: [-60, 0]}
+    crank: {from: O, to: A, length: 30, width: 14}
+    coupler: {from: A, to: B, length: 90, points: {P: [45, 25]}}
+    rocker: {from: D, to: B, length: 60}
+    pinion: {points: {C: [0, 0], M: [12, 0]}}
+  drives: {theta: {angle: pinion}}
+  couplings: {gears: {set: crank, of: theta, ratio: -0.5, module: 2 mm}}
+  sketch: {A: [0, 30], B: [75, 55], M: [-50, 0]}
+  plates: {width: 16, pin: 6, kerf: 0.2, thickness: 5, general_tolerance: ISO 2768-m}
+kinematics: {sweep: {theta: {from: 0, to: 720, step: 15}}, outputs: [P]}
+reliability:
+  poses: [{theta: 30}]
+  outputs: [P]
+  dimensions: {crank.length: 0.05, rocker.length: {tolerance: [-0.1, 0.2]}, ground.D.x: 0.02}
+"""
+CAM = """
+mechanism:
+  links: {ground: {O: [0, 0]}, disc: [O, N, 20], stem: {F: [0, 0], T: [60, 0]}}
+  joints: {valve: {prismatic: [ground, stem], through: O, direction: 90, point: F}}
+  drives: {cam: {angle: disc}}
+  couplings:
+    lift: {set: valve, of: cam, law: [{to: 60, over: 120, law: cycloidal}, {dwell: 60}, {to: 40, over: 180}],
+      cam: {link: disc, roller: F, radius: 8}}
+  sketch: {N: [20, 0], F: [0, 40], T: [0, 100]}
+kinematics: {sweep: {cam: {from: 0, to: 360, step: 10}}, outputs: [F.y]}
+"""
+
+
+def drawn(text, monkeypatch):
+    """The figure of a sheet as it is written."""
+    figures = []
+
+    def kept(figure, *options):
+        figures.append(figure)
+        return encoded(figure, *options)
+
+    encoded = style.encoded
+    monkeypatch.setattr(style, "encoded", kept)
+    exported("sheet.pdf", text)
+    return figures[0]
+
+
+def rows_on(figure):
+    """The words on the page outside of the drawing, line by line, and those at dimensions."""
+    page, drawing = figure.axes[0], figure.axes[1]
+    lines = {}
+    for words in page.texts:
+        if words.get_text():
+            lines.setdefault(round(words.get_position()[1], 2), []).append(words.get_text())
+    return list(lines.values()), [words.get_text() for words in drawing.texts if words.get_text()]
+
+
+@pytest.mark.slow
+def test_a_sheet_has_what_a_workshop_needs_of_plates_pivots_and_gears(monkeypatch):
+    rows, numbers = rows_on(drawn(PRESS, monkeypatch))
+    flat = [" ".join(row) for row in rows]
+
+    def stands(*words):
+        return any(" ".join(words) in line for line in flat)
+
+    # By hand: 60 mm apart, twice as many teeth: 20 and 40 mm, so 20 and 40 teeth of 2 mm.
+    assert stands("wheels", "link", "teeth", "module", "pitch radius", "centre distance", "pressure angle")
+    assert stands("gears", "crank", "40", "2", "40", "60", "20\N{DEGREE SIGN}")
+    assert stands("pinion", "20", "2", "20")
+    assert stands("pivot", "x", "y")
+    for pivot in (("O", "0", "0"), ("D", "100 \N{PLUS-MINUS SIGN}0.02", "20"), ("C", "-60", "0")):
+        assert stands(*pivot)
+    assert stands("plate", "width", "thickness")
+    assert stands("ground, coupler, rocker, pinion", "16", "5")
+    assert stands("crank", "14", "5")
+    assert stands("ISO 2768-m")
+    assert any("plates to scale" in line for line in flat)
+    # Tolerances stand at their dimensions, and pivots are apart in x and y.
+    assert {"30 \N{PLUS-MINUS SIGN}0.05", "60 +0.2 / -0.1", "100", "20"} <= {*numbers}
+    assert not any("\N{ANGLE}" in number for number in numbers)
+
+
+@pytest.mark.slow
+def test_plates_are_drawn_as_wide_as_they_are(monkeypatch):
+    figure = drawn(PRESS.replace("width: 14", "width: 24"), monkeypatch)
+    lines = [line.get_xydata() @ [1, 1j] for line in figure.axes[1].lines if len(line.get_xdata()) > 40]
+    # The crank's wheel of 84 mm tip diameter about O, and the end of the rocker's plate about D.
+    assert any(np.allclose(np.abs(line), 42, atol=1e-9) for line in lines)
+    assert any(np.abs(np.abs(line - (100 + 20j)) - 8).min() < 1e-9 for line in lines)
+
+
+@pytest.mark.slow
+def test_a_sheet_without_plates_says_that_it_is_schematic_and_has_the_sizes_of_cams(monkeypatch):
+    rows, _ = rows_on(drawn(CAM, monkeypatch))
+    flat = [" ".join(row) for row in rows]
+    assert any("schematic, as the study has no plates" in line for line in flat)
+    assert any("cam link base radius follower from to lift" in line for line in flat)
+    # The base circle of the profile: 40 mm to the roller's centre, less its radius.
+    assert any("lift disc 32 roller of radius 8 40 mm 60 mm 20 mm" in line for line in flat)
+    assert any(
+        "valve.slide: to 60 over 120 by cycloidal, dwell 60, to 40 over 180 by polynomial345" in line for line in flat
+    )
+    assert any("none is given" in line for line in flat)
+
+
+@pytest.mark.slow
+def test_a_class_that_all_dimensions_have_is_the_general_tolerance(monkeypatch):
+    text = SLIDER + "reliability: {dimensions: {'*.length': ISO 2768-f}, outputs: [B.x], poses: [{theta: 20}]}\n"
+    rows, numbers = rows_on(drawn(text, monkeypatch))
+    assert any("ISO 2768-f" in row for row in rows)
+    assert "30 \N{PLUS-MINUS SIGN}0.1" in numbers
+
+
+@pytest.mark.slow
+def test_nothing_on_a_sheet_is_in_smaller_type_than_six_points(monkeypatch):
+    """Long names once made tables of five points."""
+    name = "pleuelstange_der_übergroßen_schmiedepresse_mit_schwungrad_ab"
+    drawn = []
+    monkeypatch.setattr(style, "encoded", lambda figure, *said: drawn.append(figure) or b"")
+    exported("sheet.pdf", SLIDER.replace("rod", name))
+    (sheet,) = drawn
+    words = [text for text in sheet.findobj(Text) if text.get_visible() and text.get_text()]
+    assert min(text.get_fontsize() for text in words) >= 6
+    assert not any(name in text.get_text() for text in words)

@@ -83,9 +83,9 @@ def test_every_file_is_told_of_on_its_page():
 
 
 def test_a_wrong_name_lists_those_there_are():
-    done = ask("export", "-", "--to", "mechanism.dfx", study=FOUR_BAR)
+    done = ask("export", "-", "--to", "gcode", study=FOUR_BAR)
     assert done.exit_code == 2
-    assert "there is no 'mechanism.dfx' to export; did you mean 'mechanism.dxf'" in done.stderr
+    assert "there is no 'gcode' to export; what there is: " in done.stderr
     assert tuple(sorted(re.findall(r"([\w.]+) \([^()]*(?:\([^()]*\)[^()]*)*\)", done.stderr))) == FILES
 
 
@@ -460,3 +460,16 @@ def test_a_study_without_plates_or_motion_says_what_is_taken():
     assert "links are taken as 5 mm wide; give {width: 5 mm}" in assumed
     assert assumed.endswith("[assumed]")
     assert incomplete.endswith("[incomplete]")
+
+
+@pytest.mark.slow
+def test_a_drawing_of_a_large_mechanism_is_shown_on_a_screen_and_that_of_its_parts_at_full_size():
+    """A crank-rocker of 9 m was 33,000 pixels wide in a browser."""
+    large = "units: {length: dm}" + FOUR_BAR.split("reliability:")[0]
+    shown, parts = text_of(large, "mechanism.svg"), text_of(large, "parts.svg")
+    wide, in_units = (float(re.search(pattern, shown)[1]) for pattern in (r'width="([\d.]+)mm"', r"([\d.]+) [\d.]+\">"))
+    assert wide <= 420 < in_units
+    scale = int(re.search(r"<title>.*, shown at 1:(\d+)</title>", shown)[1])
+    assert wide * scale == pytest.approx(in_units, abs=1e-3)
+    box = [float(number) for number in re.search(r'viewBox="([^"]+)"', parts)[1].split()]
+    assert float(re.search(r'width="([\d.]+)mm"', parts)[1]) == pytest.approx(box[2])

@@ -40,7 +40,7 @@ def ask(forward: str = "", more: str = "", mass: str = ", mass: 1", limits: str 
         ({"mass": ""}, "no inertia"),
         ({"forward": "efforts: {arm: 'log(time)'}"}, "ended early: the effort of arm is not finite at 0 s"),
         ({"limits": "limits: [{drive: arm, min: 10, max: 50}]", "forward": "start: {arm: 0}"},
-         "limit; arm is 0 deg, beyond limits.0"),
+         "limit of drive arm: 0 deg where 10 to 50 deg is allowed"),
         (
             {"limits": "limits: [{drive: arm, min: -5, max: 50}]", "forward": "start: {arm_velocity: -300}"},
             "ended: limit limits.0 is reached at 0.016",

@@ -19,6 +19,7 @@ from helpers import command_line
 from matplotlib.figure import Figure
 
 import mechdesign
+from mechdesign.ground.columns import ColumnKind
 
 DATA = {
     "mechanism": {
@@ -336,12 +337,32 @@ def hold(told: object, name: str) -> None:
 def test_the_readme_says_what_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = README.read_text(encoding="utf-8")
-    blocks = dict(re.findall(r"```(yaml|python)\n(.*?)```", text, re.DOTALL)[:2])
-    Path("study.yaml").write_text(blocks["yaml"])
+    (_, study), (python, *_) = (re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("yaml", "python"))
+    Path("study.yaml").write_text(study)
     names: dict[str, object] = {}
-    exec(blocks["python"].replace(".to_pandas()", ""), names)
+    exec(python.replace(".to_pandas()", ""), names)
     assert isinstance(names["result"], mechdesign.Answer)
     assert Path("results/study/kinematics/manifest.json").exists()
+
+
+def test_the_readme_begins_with_three_lines_one_command_its_verdict_and_the_linkage_moving() -> None:
+    text = README.read_text(encoding="utf-8")
+    study, told, picture = re.findall(
+        r"```yaml\n(.*?)```.*?```console\n\$ (.*?)```.*?!\[[^]]*\]\((.*?)\)", text, re.DOTALL
+    )[0]
+    assert study.count("\n") == 3
+    command, verdict = told.splitlines()
+    assert command.startswith("mechdesign run leg.yaml ")
+    (judged,) = mechdesign.kinematics(mechdesign.load(text=study)).verdicts
+    assert f"{judged.requirement}: met, worst {judged.worst:.6g}" in verdict
+    assert judged.met
+    assert (README.parent / picture).read_bytes().startswith(b"GIF89a")
+
+
+def test_code_of_the_readme_fits_its_box() -> None:
+    text = README.read_text(encoding="utf-8")
+    lines = [line for block in re.findall(r"```\w+\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    assert max(map(len, lines)) <= 95
 
 
 def test_a_table_shows_its_first_rows_with_units():
@@ -363,8 +384,9 @@ def test_a_table_shows_no_rounding_error():
         mechdesign.Column("x", np.array([1.0, 6.1e-17, np.nan]), "mm"),
         mechdesign.Column("y", np.array([-3e-16, 2.0, np.inf]), "mm"),
         mechdesign.Column("part", np.array([1.0, 6.1e-17, 0.5])),
+        ColumnKind("failure", "of what is rare", tail=True).column(np.array([1.0, 6.1e-17, 0.5])),
     )
     rows = Page(mechdesign.Table("motion", columns)._repr_html_()).all("tr")
     assert len(rows) == 4
     text = Page(mechdesign.Table("motion", columns)._repr_html_()).text
-    assert text.endswith("part101026.1e-17\N{EN DASH}\N{INFINITY}0.5")
+    assert text.endswith("failure10110206.1·10⁻¹⁷\N{EN DASH}\N{INFINITY}0.50.5")

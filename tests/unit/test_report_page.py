@@ -92,8 +92,8 @@ def test_what_is_large_as_lines_is_a_picture_of_pixels() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"), (53541.2, "53 541"), (-0.0486353, "−0.04864"), (100.0, "100"), (9.99996, "10"), (1e-9, "1·10⁻⁹"),
-        (-2.5681e-4, "−2.568·10⁻⁴"), (2e9, "2·10⁹"), (float("nan"), "none"), (float("inf"), "infinite"),
+        (0.0, "0"), (53541.2, "53 541"), (-0.0486353, "−0.04864"), (100.0, "100"), (9.99996, "10"), (1e-9, "10⁻⁹"),
+        (-2.5681e-5, "−2.568·10⁻⁵"), (2e9, "2·10⁹"), (float("nan"), "none"), (float("inf"), "infinite"),
     ],
 )  # fmt: skip
 def test_numbers_for_people(value: float, text: str) -> None:

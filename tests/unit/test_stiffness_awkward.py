@@ -343,7 +343,7 @@ def test_poses_near_where_the_legs_meet_are_told() -> None:
         assert result.tables["stiffness"]["rank"].tolist() == [3, 3]
         (warning,) = map(str, result.warnings)
         assert warning.startswith("1 of 2 poses are nearly under-constrained")
-        assert "P.x = 1e-05" in warning
+        assert "P.x = 10⁻⁵" in warning
         assert matrix(result, "C", 1)[2, 2] > 1e6 * matrix(result, "C", 0)[2, 2]
 
 

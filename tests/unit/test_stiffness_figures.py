@@ -134,10 +134,11 @@ def test_the_stiffness_of_a_spring_stands_beside_its_middle_away_from_the_others
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (37409110.8, "3.74·10⁷ N/m"),
-        (25958.86, "25959 N/m"),
+        (37409110.8, "37.4 MN/m"),
+        (25958.86, "26 kN/m"),
+        (15958.86, "15959 N/m"),
         (474.93, "475 N/m"),
-        (2e-4, "2.00·10⁻⁴ N/m"),
+        (2e-4, "200 µN/m"),
         (np.inf, "rigid"),
     ],
 )

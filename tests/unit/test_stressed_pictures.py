@@ -78,7 +78,7 @@ GOALS = (
 optimize:
   method: pareto
   variables: {a: {from: 25, to: 35}, b: {from: 85, to: 95}, c: {from: 55, to: 65}}
-  minimize: [kinematics.rocker.angle_error, b, c]
+  minimize: [kinematics.rocker.angle_error, a, b, c]
   evaluations: 120
 """
 )
@@ -115,6 +115,53 @@ mechanism:
   sketch: {{A: [0, 30]}}
 kinematics: {{sweep: {{crank: {{from: 0, to: 360, step: 15}}}}, outputs: [crank.angle, A, {", ".join(TIPS)}]}}
 """
+O_LEFT, A, B, D = (f"{noun}_zwischen_gestell_und_übergroßer_schwinge_der_presse_{side}"
+              for noun, side in (("lager", "li"), ("bolzen", "li"), ("bolzen", "re"), ("lager", "re")))  # fmt: skip
+P = "messpunkt_auf_der_übergroßen_pleuelstange_der_schmiedepresse"
+WHEEL, BAR, SWING = (f"{noun}_der_übergroßen_schmiedepresse_mit_bremse_und_antrieb"
+                     for noun in ("schwungrad", "pleuel", "schwinge"))  # fmt: skip
+LONG = f"""
+mechanism:
+  links:
+    ground: {{{O_LEFT}: [0, 0], {D}: [100, 0]}}
+    {WHEEL}: {{from: {O_LEFT}, to: {A}, length: 30, mass: 1 kg, center: [15, 0], inertia: 100 kg*mm^2}}
+    {BAR}: {{from: {A}, to: {B}, length: 90, mass: 2 kg, center: [45, 0], inertia: 500 kg*mm^2,
+      points: {{{P}: [45, 20]}}}}
+    {SWING}: {{from: {D}, to: {B}, length: 60, mass: 1 kg, center: [30, 0], inertia: 300 kg*mm^2}}
+  drives: {{antriebswinkel_der_übergroßen_schmiedepresse_mit_schwungrad: {{angle: {WHEEL}}}}}
+  sketch: {{{A}: [0, 30], {B}: [75, 55]}}
+"""
+TURN = "antriebswinkel_der_übergroßen_schmiedepresse_mit_schwungrad: {from: 0, to: 360, step: 20}"
+LONG_MOTION = f"""{LONG}
+kinematics:
+  outputs: [{P}, {SWING}.angle]
+  sweep: {{{TURN}}}
+  rates: {{antriebswinkel_der_übergroßen_schmiedepresse_mit_schwungrad: 60 rpm}}
+"""
+LONG_FORCES = f"""{LONG}
+dynamics:
+  sweep: {{{TURN}}}
+  rates: {{antriebswinkel_der_übergroßen_schmiedepresse_mit_schwungrad: 60 rpm}}
+"""
+STAGES = range(10)
+SCISSORS = "\n".join((
+    "mechanism:", "  links:", "    ground: {Q0: [0, 0]}",
+    *(f"    left_{k}: {{from: Q{k}, to: R{k + 1}, length: 100, points: {{M{k}: [50, 0]}}}}\n"
+      f"    right_{k}: {{from: R{k}, to: Q{k + 1}, length: 100, points: {{M{k}: [50, 0]}}}}" for k in STAGES),
+    "  joints: {floor: {slot: ground, point: R0}}", "  drives: {angle: {angle: left_0}}",
+    "  sketch: {" + ", ".join(f"M{k}: [40, {60 * k + 30}], R{k}: [80, {60 * k}], Q{k + 1}: [0, {60 * k + 60}]"
+                              for k in STAGES) + ", R10: [80, 600]}",
+    "kinematics: {outputs: [Q10], rates: {angle: 10 deg/s}, sweep: {angle: {from: 20, to: 60, step: 4}}}",
+))  # fmt: skip
+RING = """
+mechanism:
+  links: {ground: {O: [0, 0]}, inner: [O, A, 250], outer: [A, P, 200]}
+  drives: {q1: {angle: inner}, q2: {angle: outer}}
+  sketch: {A: [250, 0], P: [250, 200]}
+workspace: {point: P, scan: {rays: 61}, indices: inverse_condition}
+"""
+COLLISIONS = FOUR_BAR.replace("  targets", "  plates: {width: 40, pin: 4}\n  targets").replace(
+    "outputs:", "collisions: [[crank, rocker]], outputs:")  # fmt: skip
 LOADS = (
     FOUR_BAR
     + """
@@ -148,9 +195,16 @@ def answered(command: str, text: str) -> tuple[mechdesign.Study, mechdesign.Answ
         ("optimize", GOALS, {"CPI", "designs", "pareto", "hypervolume", "optimum"}),
         ("sweep", CASES, {"main_effects", "scatter", "response"}),
         ("sensitivities", SLOPES, {"sensitivities"}),
+        ("kinematics", LONG_MOTION, {"motion", "paths", "poses", "transmission"}),
+        ("dynamics", LONG_FORCES, {"efforts", "free_bodies", "joint_forces", "bearings", "energies", "shaking"}),
+        ("kinematics", SCISSORS, {"motion", "paths", "poses", "transmission"}),
+        ("kinematics", COLLISIONS, {"motion", "paths", "poses", "transmission", "collisions"}),
+        ("workspace", RING, {"workspace", "inscribed", "drives", "joint_space", "ellipses", "inverse_condition",
+                               "resistivity"}),
     ],
-    ids=["seven orientations", "a thin strip", "a large press with small clearances", "three goals", "200 cases",
-         "a parameter of many letters"],
+    ids=["seven orientations", "a thin strip", "a large press with small clearances", "four goals", "200 cases",
+         "a parameter of many letters", "names of sixty letters", "forces in joints of sixty letters", "twenty links",
+         "a collision", "a ring"],
 )  # fmt: skip
 def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expected: set[str], look: str) -> None:
     given, result = answered(command, study)

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import mechdesign
-from mechdesign.study.text.unit_table import listed
+from mechdesign.ground.unit_table import listed
 from mechdesign.study.text.units import QUANTITY, QuantityError, Units, measure
 
 MM = Units("mm", "deg", "s", "N")

@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.pages import faults
+from helpers.pictures import figure_of
 
 import mechdesign
+from mechdesign.door.report.page.headlines import headlines
+from mechdesign.drawing import style
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE = "kinematics.extremes.B.x.range"
@@ -179,3 +183,49 @@ def test_pictures_show_means_ranges_limits_and_cases_that_miss_them():
     met = (swing <= 25) & (np.array([[25], [35], [45]]) * 2 >= 70)
     points = {line.get_marker(): len(line.get_xdata()) for line in result.figure("scatter").axes[-1].lines}
     assert (points["o"], points["X"]) == (met.sum(), (~met).sum())
+
+
+def labelled(tmp_path: Path) -> tuple[mechdesign.Study, mechdesign.Answer]:
+    """Cases of a file with names."""
+    (tmp_path / "press.yaml").write_text(SLIDER_CRANK)
+    (tmp_path / "built.csv").write_text(f"label,{R},{L}\nM\u00fcller,40,120\nhall B,30,118\nspare,42,110\n")
+    goals = {"minimize": "kinematics.rod.angle.max", "maximize": STROKE}
+    study = mechdesign.load(tmp_path / "press.yaml", overrides={"matrix": {"cases": "built.csv", "best": goals}})
+    return study, mechdesign.sweep(study)
+
+
+def test_cases_are_called_by_their_labels_in_tables_and_verdicts(tmp_path: Path):
+    _, result = labelled(tmp_path)
+    assert result.main["label"].tolist() == ["M\u00fcller", "hall B", "spare"]
+    stroke = next(verdict for verdict in result.verdicts if not verdict.met)
+    assert stroke.place.startswith("case 2 (hall B: ")
+    assert stroke.place.endswith("the first is case 2 (hall B)")
+    best = next(number for number in headlines(result) if number.label == "best case")
+    assert best.value in ("1 (M\u00fcller)", "3 (spare)")
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["response", "scatter", "main_effects"])
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_cases_are_called_by_their_labels_in_pictures(tmp_path: Path, name: str, look: str):
+    study, result = labelled(tmp_path)
+    with style.context(look):
+        figure = figure_of(study, result, name)
+        style.encoded(figure)
+        assert not list(faults(figure))
+    for axes in figure.axes:
+        if axes.lines and axes.get_label() != "<colorbar>":
+            assert {text.get_text() for text in axes.texts} >= {"M\u00fcller", "hall B", "spare"}
+
+
+@pytest.mark.slow
+def test_of_many_cases_the_best_alone_are_called_by_their_labels(tmp_path: Path):
+    rows = "".join(f"case of {k},{30 + k / 10},120\n" for k in range(60))
+    (tmp_path / "press.yaml").write_text(SLIDER_CRANK)
+    (tmp_path / "built.csv").write_text(f"label,{R},{L}\n{rows}")
+    matrix = {"cases": "built.csv", "best": {"maximize": STROKE}}
+    study = mechdesign.load(tmp_path / "press.yaml", overrides={"matrix": matrix})
+    with style.context():
+        figure = figure_of(study, mechdesign.sweep(study), "scatter")
+    assert "case of 59" in [text.get_text() for text in figure.axes[0].texts]
+    assert len(figure.axes[0].texts) < 5

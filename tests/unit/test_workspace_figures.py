@@ -20,6 +20,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.pictures import figures
 from mechdesign.ground.columns import Column
+from mechdesign.ground.numerals import power
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.results import Result, Table
 from mechdesign.questions.workspace.figures.boundary import inscribed_picture
@@ -132,7 +133,7 @@ def test_every_name_of_a_level_stands_where_the_index_has_that_value(
             page.canvas.draw()
         (axes,) = page.axes
         (bar,) = axes.child_axes
-        ten = 10.0 ** style.power(float(bar.get_yticks().max()))
+        ten = 10.0 ** power(float(bar.get_yticks().max()))
         for words in axes.texts:
             box = words.get_window_extent()
             about = (box.min + box.max) @ np.array([0.5, 0.5j]) + disc * page.dpi / 72
@@ -360,6 +361,53 @@ def test_the_plane_of_drives_that_turn_is_cut_open_once() -> None:
         q1, q2 = curves[color].T
         assert abs(q2) == pytest.approx(elbow, abs=1e-4)
         assert np.ptp(q1) == pytest.approx(360, abs=1e-3)
+
+
+RING = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    arm: [O, A, 200]
+    forearm: [A, P, 150]
+    motor: [O, M, 20]
+  drives: [arm, motor]
+  couplings: {elbow: {set: forearm, of: motor, ratio: 1, phase: 0, wheels: belt, radius: 20}}
+  sketch: {M: [10, 17], A: [190, 60], P: [260, 190]}
+workspace: {point: P, scan: {rays: 61}, indices: []}
+"""
+
+
+@pytest.mark.slow
+def test_a_ring_is_a_strip_in_the_plane_of_the_drives_without_fins() -> None:
+    # P is reached with an elbow that opens by 0 < motor - arm < 180 degrees, whatever the arm's angle.
+    curves, words = joint_space(RING)
+    assert "cut open at arm = -180 and 180 deg" in words
+    for color, elbow in ((style.BLUE, 0.0), (style.PURPLE, 180.0)):
+        arm, motor = curves[color].T
+        assert motor - arm == pytest.approx(elbow, abs=1e-3)
+        assert (arm.min(), arm.max()) == pytest.approx((-180, 180), abs=1e-3)
+    study = study_of(RING)
+    with style.context():
+        (axes,) = figure_of(study, mechdesign.workspace(study), "joint_space").axes
+    cells = [path.vertices[:4] for drawn in axes.collections for path in drawn.get_paths()]
+    arm, motor = np.stack(cells, axis=-1).transpose(1, 0, 2)
+    area = np.abs(np.sum(arm * np.roll(motor, -1, axis=0) - np.roll(arm, -1, axis=0) * motor, axis=0)) / 2
+    inside = (arm.min(axis=0) >= -180) & (arm.max(axis=0) <= 180)
+    assert ((motor - arm > -1e-3) & (motor - arm < 180 + 1e-3)).all()
+    assert area[inside].sum() == pytest.approx(360 * 180, rel=0.05)
+
+
+@pytest.mark.slow
+def test_drives_along_a_boundary_are_over_its_length_the_circle_of_a_hole_by_itself() -> None:
+    study = study_of(RING)
+    with style.context():
+        outer, inner = figure_of(study, mechdesign.workspace(study), "drives").axes
+    for axes, words, radius, elbow in ((outer, "outer", 350, 0), (inner, "inner", 50, 180)):
+        assert axes.get_title(loc="left").startswith(f"{words} boundary")
+        arm, motor = (np.asarray(line.get_xydata()) for line in axes.lines[:2])
+        assert arm[-1, 0] == pytest.approx(2 * np.pi * radius, rel=3e-3)
+        assert motor[:, 1] - arm[:, 1] == pytest.approx(elbow, abs=1e-3)
+        assert np.degrees(arm[:, 0] / radius) == pytest.approx(arm[:, 1] - arm[0, 1], abs=1)
 
 
 @pytest.mark.slow

@@ -14,8 +14,8 @@ from mechdesign.commands import QUESTIONS
 from mechdesign.door.report.page.headlines import headlines
 from mechdesign.door.report.page.pages import harmless
 from mechdesign.door.report.requirements import Verdict
-from mechdesign.drawing.style import printed
 from mechdesign.ground.errors import counted
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.results import Result, Table
 from mechdesign.ground.table_text import readable
 from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_words
@@ -88,7 +88,7 @@ def answer_html(
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,
-        beginning=None if main is None else _beginning(main),
+        beginning=None if main is None else _beginning(main, study.size),
         others=others,
         also={"pictures": figures, "files": list(answer.files)},
     )
@@ -136,7 +136,7 @@ def _link(link: LinkWords, unit: str) -> str:
     return f"{link.name} ({', '.join(link.points)}{length})"
 
 
-def _beginning(table: Table) -> _Beginning:
+def _beginning(table: Table, size: tuple[float, str]) -> _Beginning:
     # The units of rows of several quantities are never left out.
     first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
     columns = [column for column in table.columns if column in first or column.name == _UNIT]
@@ -147,5 +147,6 @@ def _beginning(table: Table) -> _Beginning:
         left.append(counted(len(table) - ROWS, "more row"))
     if more := [column.name for column in table.columns if column not in columns]:
         left.append(f"{counted(len(more), 'more column')} ({', '.join(more)})")
-    heads = [(column.name, printed(column.unit), column.meaning, column.numeric) for column in columns]
-    return _Beginning(heads, [*zip(*readable(table.seen.columns, shown.columns), strict=True)], left)
+    read = readable(table.seen.columns, shown.columns, size)
+    heads = [(column.name, printed(column.unit), column.meaning, column.numeric) for column in read]
+    return _Beginning(heads, [*zip(*(column.cells for column in read), strict=True)], left)

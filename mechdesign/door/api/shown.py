@@ -210,6 +210,7 @@ class Answer(Result):
     def _drawn(self, name: str | None = None) -> Gallery:
         """All its pictures, and last the mechanism, or that of one name; none of an interrupted computation."""
         from mechdesign.drawing import style
+        from mechdesign.drawing.fonts import lost_letters
         from mechdesign.drawing.mechanism import mechanism_picture
         from mechdesign.drawing.pictures import figures
         from mechdesign.drawing.rendering import Gallery
@@ -220,6 +221,8 @@ class Answer(Result):
             drawn = figures(self.study, self, name=name)
             if name in (None, MECHANISM):
                 drawn.add(MECHANISM, mechanism_picture, self.study, self.seen)
+        if why := lost_letters(str(self.study.resolved)):
+            warnings.warn(why, stacklevel=2)
         return drawn
 
 

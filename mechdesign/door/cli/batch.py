@@ -336,7 +336,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     try:
         with owned(directory):
             outcome = answer(study, command, directory, options, progress)
-        tell(outcome, study, options)
+        tell(outcome, study, options, listed=terminal.is_terminal() and not options.json)
     except Exception as error:
         return failure(study.label, command, directory, error, study)
     return replace(outcome, table=None)

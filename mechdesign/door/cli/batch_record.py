@@ -172,6 +172,9 @@ class BatchRecord:
         if self.summed and any(outcome.written for outcome in outcomes):
             self._file(self._root / SUMMARY, to_csv(table).encode())
         terminal.show(table, as_json=options.json)
+        if terminal.is_terminal() and any(outcome.written for outcome in outcomes):
+            root = self._root if self.several else self._tasks[0].root
+            terminal.say(f"results in {root}", quiet=options.quiet or options.json)
         first = self._first_to_open()
         if any(entry.link for entry in self._entries.values()):
             path = self._root / pages.INDEX

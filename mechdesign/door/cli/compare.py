@@ -76,7 +76,7 @@ def verify(options: Options) -> int:
     if options.junit is not None:
         check_replaceable(options.junit)
     root = path.parent if path.name == manifest.NAME else path
-    recorded = comparison.results(path)
+    recorded = comparison.results(path, "--verify")
     if not recorded:
         raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
     total, code = Comparison(), 0

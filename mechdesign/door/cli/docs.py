@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 from mechdesign.door.cli.terminal import emit_words
-from mechdesign.door.reference import Entry, below, entries, find, holding, near, place
+from mechdesign.door.reference import Entry, below, entries, find, holding, near, pages, place
 from mechdesign.ground.errors import AssemblyError, StudyError, explain
 from mechdesign.mechanism.configuration import REASONS
 
@@ -20,7 +20,8 @@ _INDENT = "  "
 _NAMED = 3
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a column, a command, an option, one of the words below, or a text to look for (in quotes)."
+    "part (sweep), a column, a command, an option, one of the words below, or a text to look for (in quotes); and "
+    "which pages and studies are about it."
 )
 
 
@@ -44,9 +45,11 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
 
 
 def _found(index: Sequence[Entry], word: str) -> list[Entry]:
-    """Entries of a word; those whose texts hold it, where it is none but a reason why a pose fails."""
+    """Entries of a word; those whose texts hold it, where it is none but a reason why a pose fails; pages about it."""
     hits = find(index, word)
-    return hits if any(hit.word not in REASONS for hit in hits) else [*hits, *holding(index, word)]
+    if not any(hit.word not in REASONS for hit in hits):
+        hits = [*hits, *holding(index, word)]
+    return [*hits, *pages(word, subjects=bool(hits))]
 
 
 def explained(error: Exception) -> tuple[int, str]:

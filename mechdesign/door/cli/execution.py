@@ -22,7 +22,8 @@ from mechdesign.door.cli.options import PDF, Options
 from mechdesign.door.cli.outcome import Outcome
 from mechdesign.door.cli.places import RESUMED, extras, folder, place
 from mechdesign.door.report import manifest, requirements, writer
-from mechdesign.door.report.cases import best_of, telling_columns
+from mechdesign.door.report.cases import best_of, telling
+from mechdesign.door.report.closing import FAILURES, closing_words
 from mechdesign.door.report.manifest import Extras
 from mechdesign.door.report.page import pages
 from mechdesign.door.report.requirements import Verdict, judged_again, judged_by, on_warnings
@@ -35,7 +36,7 @@ from mechdesign.ground.progress import Progress
 from mechdesign.ground.results import LongTable, Result, Table
 from mechdesign.ground.work import ahead, shards
 from mechdesign.ground.work.chunks import worker_count
-from mechdesign.ground.work.journal import NAME, Journal
+from mechdesign.ground.work.journal import INTERVAL, NAME, Journal
 from mechdesign.ground.work.shards import Shard
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.look import is_long
@@ -160,7 +161,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     code, seconds = exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, table=result.main, reached=result.reached,
+        written=True, table=result.main, reached=result.reached, closing=closing_words(result.tables.get(FAILURES)),
     )  # fmt: skip
 
 
@@ -200,7 +201,8 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"][: len(judged_by(study, command))]
         ]
-        table = _main_table(directory, content)
+        table = _written_table(directory, content)
+        failures = _written_table(directory, content, FAILURES) if f"{FAILURES}.csv" in content["tables"] else None
         warnings, failed = [Caution(**warning) for warning in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
         # The manifest was changed by hand.
@@ -212,7 +214,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
     code = exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
-        written=True, table=table,
+        written=True, table=table, closing=closing_words(failures),
     )  # fmt: skip
 
 
@@ -228,9 +230,9 @@ def exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
-def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
-    """The main table of a folder with this manifest; its rows are read from the file when they are needed."""
-    file, about = next(iter(content["tables"].items()))
+def _written_table(directory: Path, content: Mapping[str, Any], name: str = "") -> Table:
+    """A table of a folder with this manifest, the main one or that of a name; its rows are read when needed."""
+    file, about = next((file, about) for file, about in content["tables"].items() if name in ("", Path(file).stem))
 
     def blocks() -> Iterator[Table]:
         with (directory / file).open(encoding="utf-8") as stream:
@@ -263,14 +265,23 @@ def _judged_and_written(
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
     """Journal of finished designs or cases; with --resume it begins with those of the earlier run."""
     journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
-    if options.resume and not journal.usable:
-        there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study.label}: {command}: {there}; begins anew", quiet=options.quiet)
+    if options.resume:
+        noun, every = "case" if command == SWEEP.name else "design", f"kept every {INTERVAL:g} s"
+        if journal.usable:
+            words = f"goes on after {counted(journal.kept, noun)}; what is finished is {every}"
+        elif journal.path.exists():
+            words = f"{journal.path} is of another study, seed or version; begins anew"
+        else:
+            words = f"nothing to resume, as what is finished is {every}; begins anew"
+        terminal.say(f"{study.label}: {command}: {words}", quiet=options.quiet)
     return journal
 
 
-def tell(outcome: Outcome, study: Study, options: Options) -> None:
-    """Report an outcome on stderr and to GitHub; with --quiet only failures and requirements that are not met."""
+def tell(outcome: Outcome, study: Study, options: Options, *, listed: bool = False) -> None:
+    """Report an outcome on stderr and to GitHub; with --quiet only failures and requirements that are not met.
+
+    `listed` is whether a table follows that has its rows and its folder.
+    """
     who = f"{outcome.study}: {outcome.command}:"
     for warning in outcome.warnings:
         terminal.say(f"{who} warning: {warning} [{warning.kind}]", quiet=options.quiet)
@@ -289,7 +300,10 @@ def tell(outcome: Outcome, study: Study, options: Options) -> None:
         terminal.say(f"{who} {outcome.shard}", quiet=options.quiet)
         return
     kept = "; they are whole, and not computed again" if outcome.kept else ""
-    terminal.say(f"{who} {counted(outcome.rows, 'row')} in {outcome.directory}{kept}", quiet=options.quiet)
+    if not listed or kept:
+        terminal.say(f"{who} {counted(outcome.rows, 'row')} in {outcome.directory}{kept}", quiet=options.quiet)
+    for words in outcome.closing:
+        terminal.say(f"{who} {words}", quiet=options.quiet)
 
 
 def write_report(
@@ -371,8 +385,10 @@ def ask(options: Options) -> Outcome:
         tell(outcome, study, options)
         return outcome
     assert outcome.table is not None
-    first = telling_columns(outcome.table) if command == SWEEP.name else ()
-    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", first=first)
+    terminal.show(
+        outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", size=study.size,
+        arranged=telling if command == SWEEP.name else None,
+    )  # fmt: skip
     tell(outcome, study, options)
     best_seen = directory / pages.REPORT if options.report else outcome.picture
     terminal.suggest(best_seen, quiet=options.quiet or options.json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -9,14 +10,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mechdesign.door.cli import terminal
+from mechdesign.door.cli.places import RESUMED
 from mechdesign.ground.progress import Progress
 from mechdesign.ground.work import interrupts
+from mechdesign.ground.work.journal import INTERVAL
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Rows
     from rich.progress import TaskID
 
-_GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
+_GREAT, _MANY = 1_000_000, 10_000  # poses or samples, and designs, from which a stage is announced
+# Seconds after which a stage is long, and between two lines about it where no table is shown.
+_LONG, _EVERY = 10.0, 30.0
+_DESIGNS = "designs"
 _OFTEN = 0.1  # seconds between two progress notes, and between two updates of the table
 _LAST = 5  # number of questions shown that were answered last
 _WIDTH = 16  # of a bar, in characters
@@ -34,8 +40,14 @@ class ProgressNote:
     @property
     def announcement(self) -> str:
         """What is said of a long stage when it begins, even without a terminal; else empty."""
-        great = self.total >= _GREAT and not self.done
-        return f"{self.total} {self.stage} to compute; Ctrl-C ends it" * great
+        great = self.total >= (_MANY if self.stage == _DESIGNS else _GREAT) and not self.done
+        return f"{self.total} {self.stage} to compute; {self.ending}" * great
+
+    @property
+    def ending(self) -> str:
+        """What ends a long stage, and what is left of it then."""
+        kept = f", and --resume goes on: what is finished is kept every {INTERVAL:g} s" * (self.command in RESUMED)
+        return f"Ctrl-C ends it{kept}"
 
 
 class Reported(Progress):
@@ -87,12 +99,14 @@ class Bar(Reported):
 class LiveTable:
     """The table: of several studies how many have ended, then questions that failed, answered last, and under way.
 
-    It is on stderr, only on a terminal, and appears after a second; messages go above it. Use it as a context.
+    It is on stderr, only on a terminal, and appears after a second; messages go above it. Elsewhere, as in a file, a
+    long stage has a line every half minute. Use it as a context.
     """
 
     def __init__(self, *, quiet: bool) -> None:
         # sys.stderr may be redirected later.
-        self._stream = sys.stderr
+        self._stream, self._quiet = sys.stderr, quiet
+        self._stages: dict[tuple[int, str, str], tuple[float, float]] = {}  # when they began and are told of next
         self._begun = time.monotonic()
         self._refreshed = 0.0
         self._labels: Sequence[str] = ()
@@ -125,6 +139,9 @@ class LiveTable:
     def __exit__(self, *_: object) -> None:
         if self._rows is not None and self._rows.live.is_started:
             try:
+                # What is shown last is the summary, and not these rows above it.
+                for row in self._rows.task_ids:
+                    self._rows.remove_task(row)
                 self._rows.stop()
             finally:
                 self._rows.console.show_cursor()
@@ -137,7 +154,14 @@ class LiveTable:
             self._count()
 
     def advance(self, index: int, how: ProgressNote) -> None:
-        """Record the progress of a study's question."""
+        """Record the progress of a study's question, and tell of a long stage how far it is."""
+        now, key = time.monotonic(), (index, how.command, how.stage)
+        begun, due = self._stages.setdefault(key, (now, now + _LONG))
+        if how.total and now >= due and not self._quiet:
+            first, once = due == begun + _LONG, self._rows is not None
+            self._stages[key] = begun, math.inf if once else now + _EVERY
+            words = f"{how.done} of {how.total} {how.stage} after {now - begun:.0f} s{f'; {how.ending}' * first}"
+            self.say(f"{self._labels[index]}: {how.command}: {words}\n")
         if self._rows is not None:
             row = self._row(self._rows, index, how.command)
             stage = how.stage.replace("[", r"\[")

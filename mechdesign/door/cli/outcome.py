@@ -9,18 +9,9 @@ from pathlib import Path
 from mechdesign.door.report import manifest
 from mechdesign.door.report.requirements import Verdict
 from mechdesign.ground.cautions import Caution
-from mechdesign.ground.errors import Interrupted
+from mechdesign.ground.errors import OUTCOMES
 from mechdesign.ground.files import FORMATS
 from mechdesign.ground.results import Table
-
-OUTCOMES = {
-    0: "done",
-    1: "requirement not met",
-    2: "wrong study",
-    3: "cannot be assembled",
-    4: "failed",
-    Interrupted.exit_code: "interrupted",
-}
 
 
 @dataclass(frozen=True)
@@ -39,6 +30,7 @@ class Outcome:
     kept: bool = False
     written: bool = False  # whether the results are in the directory
     table: Table | None = None  # the main table
+    closing: Sequence[str] = ()  # what is told last, in words
     shard: str = ""  # what became of the shard, with --shard
     left: bool = False  # whether the run ended before this question
     reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
+from mechdesign.ground.numerals import plain_powers, writable
 from mechdesign.ground.work.interrupts import Signals
 
 _NOT_WRITTEN = 4  # exit code where results could not be written
@@ -107,4 +108,13 @@ def _stream(raw: _Unfailing, old: TextIO | None) -> TextIO:
     encoding = old.encoding if old is not None else "utf-8"
     buffer = io.BufferedWriter(raw)
     at_once = raw.fileno() == 2 or buffer.isatty()
-    return io.TextIOWrapper(buffer, encoding, errors="replace", line_buffering=at_once)
+    kind = io.TextIOWrapper if writable(encoding) else _PlainPowers
+    return kind(buffer, encoding, errors="replace", line_buffering=at_once)
+
+
+class _PlainPowers(io.TextIOWrapper):
+    """A stream whose encoding lacks raised digits: without them a number would lose its power of ten."""
+
+    def write(self, text: str) -> int:
+        super().write(plain_powers(text))
+        return len(text)

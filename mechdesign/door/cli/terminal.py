@@ -7,7 +7,7 @@ import re
 import shlex
 import shutil
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
@@ -15,12 +15,13 @@ from typing import Literal, TextIO
 
 import numpy as np
 
-from mechdesign.door.report.tables import cells, csv_blocks, json_blocks
-from mechdesign.ground.errors import printable_lines
+from mechdesign.door.report.tables import csv_blocks, json_blocks
+from mechdesign.ground.columns import Column
+from mechdesign.ground.errors import counted, printable_lines
 from mechdesign.ground.results import Table
+from mechdesign.ground.table_text import readable as read
 
 _ROWS = 24  # rows shown on a terminal
-_DIGITS = 6  # significant digits of its numbers
 _PIECE = 1 << 20  # characters copied at a time from a file
 _NAMES = 6  # most names listed of columns that do not fit
 _HEAD = 18  # characters in a line of a column's head, unless a word is longer
@@ -65,13 +66,14 @@ def coloured(text: str, stream: TextIO) -> str:
     return _VERDICT.sub(lambda match: f"{match[1]}{_GREEN if match[2] == 'met' else _RED}{match[2]}{_PLAIN}", text)
 
 
-def _is_terminal() -> bool:
+def is_terminal() -> bool:
+    """Whether tables are shown to a person."""
     return sys.stdout.isatty()
 
 
 def suggest(path: Path | None, *, quiet: bool) -> None:
     """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
-    if path is not None and _is_terminal():
+    if path is not None and is_terminal():
         line = f"open {shlex.quote(str(path))}"
         if not quiet:
             print(printable_lines(line), file=sys.stderr, flush=True)
@@ -94,15 +96,18 @@ def emit_all(texts: Iterable[str]) -> None:
     sys.stdout.flush()
 
 
-def show(table: Table, *, as_json: bool, rest: Path | None = None, first: Sequence[str] = ()) -> None:
+def show(
+    table: Table, *, as_json: bool, rest: Path | None = None, size: tuple[float, str] = (0.0, ""),
+    arranged: Callable[[Table], Sequence[Column]] | None = None,
+) -> None:  # fmt: skip
     """Write a table to stdout: as JSON, as CSV in a pipe, or on a terminal what fits and the file of the `rest`.
 
-    Where not all columns fit, those named `first` go before the others.
+    There columns are `arranged`, the most telling first; `size` is the mechanism's, beside which numbers are rounding.
     """
     if as_json:
         emit_all(json_blocks(table))
-    elif _is_terminal():
-        _show_to_people(table, rest, first)
+    elif is_terminal():
+        _show_to_people(table, rest, arranged or _columns, size)
     elif rest is not None:
         with rest.open(encoding="utf-8", newline="") as stream:
             emit_all(iter(partial(stream.read, _PIECE), ""))
@@ -118,44 +123,43 @@ def show_lines(lines: Sequence[str]) -> None:
         emit_words(f"... {more} more; --out DIR writes all of them\n")
 
 
-def _show_to_people(table: Table, rest: Path | None, first: Sequence[str]) -> None:
+def _columns(table: Table) -> Sequence[Column]:
+    return table.columns
+
+
+def _show_to_people(
+    table: Table, rest: Path | None, arranged: Callable[[Table], Sequence[Column]], size: tuple[float, str]
+) -> None:  # fmt: skip
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text
 
     console = Console()
-    columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
-    heads = [[*_in_lines(column.name), *([f"[{column.unit}]"] if column.unit else [])] for column in table.columns]
+    columns = read(table.seen.columns, arranged(table.take(np.arange(min(len(table), _ROWS)))), size)
+    heads = [[*_in_lines(column.name), *([f"[{column.unit}]"] if column.unit else [])] for column in columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
     # A long word leaves room for other columns.
     room, widest = console.width, console.width // 2
-    shown: list[int] = []
-    for k in sorted(range(len(columns)), key=lambda k: _place(table.names[k], first)):
-        room -= 2 + min(widest, max(len(text) for text in (*heads[k], *columns[k])))
+    shown = 0
+    for column, head in zip(columns, heads, strict=True):
+        room -= 2 + min(widest, max(len(text) for text in (*head, *column.cells)))
         if room < 0 and shown:
             break
-        shown.append(k)
-    shown.sort()
-    for k in shown:
-        justify: Literal["right", "left"] = "right" if table.columns[k].numeric else "left"
-        grid.add_column(Text("\n".join(heads[k])), justify=justify, no_wrap=True, max_width=widest)
-    for row in zip(*(columns[k] for k in shown), strict=True):
+        justify: Literal["right", "left"] = "right" if column.numeric else "left"
+        grid.add_column(Text("\n".join(head)), justify=justify, no_wrap=True, max_width=widest)
+        shown += 1
+    for row in zip(*(column.cells for column in columns[:shown]), strict=True):
         grid.add_row(*(Text(text) for text in row))
     console.print(grid)
     left = []
     if len(table) > _ROWS:
-        left.append(f"{len(table) - _ROWS} more rows")
-    if hidden := [name for k, name in enumerate(table.names) if k not in shown]:
+        left.append(counted(len(table) - _ROWS, "more row"))
+    if hidden := [column.name for column in columns[shown:]]:
         names = [*hidden[:_NAMES], *(["..."] if len(hidden) > _NAMES else [])]
-        left.append(f"{len(hidden)} more columns ({', '.join(names)})")
+        left.append(f"{counted(len(hidden), 'more column')} ({', '.join(names)})")
     if left:
         words = f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"
         console.print(Text(_fold(words, console.width, further=0)), style="dim", soft_wrap=True)
-
-
-def _place(name: str, first: Sequence[str]) -> int:
-    """Place of a column among those that go first; all others have the last place."""
-    return first.index(name) if name in first else len(first)
 
 
 def _in_lines(name: str) -> list[str]:

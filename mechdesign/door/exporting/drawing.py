@@ -11,6 +11,9 @@ from typing import Self
 
 from mechdesign.mechanism.plates import hull
 
+# Sides of a circle as which it is drawn.
+ROUND = 96
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -141,11 +144,15 @@ Shape = Path | DrawnCircle | CentreMark | Text
 
 @dataclass(frozen=True)
 class Drawing:
-    """Shapes, those in one group together under its name; `title` and `remarks` say what it is."""
+    """Shapes, those in one group together under its name; `title` and `remarks` say what it is.
+
+    `longest` is the length (mm) of its longer side on a screen, beyond which it is shown reduced.
+    """
 
     title: str
     groups: Mapping[str, Sequence[Shape]]
     remarks: Sequence[str] = ()
+    longest: float = math.inf
 
     @property
     def shapes(self) -> list[Shape]:
@@ -176,6 +183,21 @@ def arc(begin: complex, end: complex, bulge: float) -> tuple[complex, float]:
     chord = end - begin
     center = (begin + end) / 2 + 1j * chord * (1 / bulge - bulge) / 4
     return center, abs(chord) * (1 + bulge * bulge) / (4 * abs(bulge))
+
+
+def traced(shape: Path | DrawnCircle) -> list[complex]:
+    """Places along an outline, from its begin to its end, so close that arcs look round."""
+    if isinstance(shape, DrawnCircle):
+        return [shape.place + cmath.rect(shape.radius, 2 * math.pi * k / ROUND) for k in range(ROUND + 1)]
+    places = [shape.corners[0]]
+    for begin, end, bulge in shape.pieces():
+        if bulge:
+            center, _ = arc(begin, end, bulge)
+            steps = max(1, round(ROUND * abs(4 * math.atan(bulge)) / (2 * math.pi)))
+            turn = cmath.rect(1.0, 4 * math.atan(bulge) / steps)
+            places += [center + (begin - center) * turn**k for k in range(1, steps)]
+        places.append(end)
+    return places
 
 
 def roomiest(places: Sequence[complex], holes: Iterable[tuple[complex, float]], empty: float) -> tuple[complex, float]:

@@ -93,10 +93,11 @@ def export_named(name: str) -> Export:
     Raises
     ------
     StudyError
-        If there is none; the message lists all.
+        If there is none; the message has the most similar name, or else all of them.
     """
     listed = exports()
     if name not in listed:
         there = ", ".join(f"{other} ({export.meaning})" for other, export in listed.items())
-        raise StudyError(f"--to: there is no {name!r} to export{suggestion(name, listed)}; what there is: {there}")
+        hint = suggestion(name, listed) or f"; what there is: {there}"
+        raise StudyError(f"--to: there is no {name!r} to export{hint}")
     return listed[name]

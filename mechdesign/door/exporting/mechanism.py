@@ -1,4 +1,4 @@
-"""The mechanism in a pose at full size, with the paths of its points over the motion."""
+"""The mechanism in a pose, with the paths of its points over the motion."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mechdesign.mechanism.plates import joined
 
 # Height of letters as a part of the mechanism's size, and the least one (mm).
 LETTERS, SMALLEST = 0.04, 1.0
+LONGEST = 420.0  # mm, of a sheet A3, about as much as a screen shows
 
 
 def mechanism_drawing(view: PosedStudy) -> Drawing:
@@ -55,7 +56,7 @@ def mechanism_drawing(view: PosedStudy) -> Drawing:
             last = np.flatnonzero(~view.track.follows)
             curves = [part for part in np.split(places, last + 1) if len(part) > 1]
             groups[f"path of {point}"] = [Path.line("curves", curve.tolist()) for curve in curves]
-    return Drawing(f"{view.study.name}: the mechanism at {view.posed}", groups)
+    return Drawing(f"{view.study.name}: the mechanism at {view.posed}", groups, longest=LONGEST)
 
 
 mechanism_dxf, mechanism_svg = drawings(

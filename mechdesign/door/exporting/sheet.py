@@ -5,7 +5,7 @@ Frame and margins are those of ISO 5457, the fields of the title block those of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,17 +17,20 @@ from matplotlib.text import Annotation, Text
 from matplotlib.textpath import text_to_path
 
 from mechdesign import __version__
+from mechdesign.door.exporting.drawing import DrawnCircle, Path, traced
 from mechdesign.door.exporting.exports import Content, export
+from mechdesign.door.exporting.mechanism import mechanism_drawing
+from mechdesign.door.exporting.sheet_tables import Rows, general_tolerance, sheet_tables
 from mechdesign.door.exporting.view import PosedStudy
-from mechdesign.door.report.requirements import requirements
 from mechdesign.drawing import style
-from mechdesign.drawing.dimensions import draw_dimensions, table_rows
+from mechdesign.drawing.dimensions import draw_lines, workshop_lengths
+from mechdesign.drawing.drawing import Posed, draw
 from mechdesign.drawing.framing import extent
 from mechdesign.drawing.scene import Still, pose
+from mechdesign.drawing.shapes import link_colors, spring_shapes
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import MechdesignError, StudyError, printable
 from mechdesign.ground.results import Result
-from mechdesign.mechanism.plates import pins_of
 from mechdesign.questions.kinematics.analysis import kinematics
 
 INCH = 25.4
@@ -40,21 +43,19 @@ WIDTH, BLOCK = 180.0, (9.0, 15.0, 10.0)
 ROW, GAP, LEAST = 4.2, 3.5, 110.0
 # Room for each point of a mechanism below which a larger paper is taken (mm^2).
 CROWDED = 400.0
-# Part of the size of the mechanism, or of a turn, below which a number is rounding.
-ROUNDING = 1e-12
+# Opacity of plates.
+PALE = 0.12
 # Around the mechanism, for dimension lines and names (mm).
 PAD = 22.0
-# Sizes of type, of labels, tables and values (points), and the least part to which a table's is reduced.
-LABEL, CELL, VALUE, REDUCED = 4.6, 6.6, 8.5, 0.75
+# Sizes of type, of labels, tables and values (points); letters of a name in a table.
+LABEL, CELL, VALUE = 6.0, 6.8, 8.5
+MOST_LETTERS = 30
+# How much wider bold letters are.
+BOLD = 1.15
 # Between columns of a table (mm).
 COLUMN = 3.0
-# Rows of a table at most.
-MOST = {"links": 20, "pins": 12, "motion": 16, "requirements": 10}
 # Scales larger and smaller than life.
 SCALES = [f * 10.0**k for k in range(4, -7, -1) for f in (5.0, 2.0, 1.0)]
-
-# Rows of a table, of which the first is its head.
-Rows = Sequence[Sequence[str]]
 
 
 @export(
@@ -69,7 +70,8 @@ def sheet_pdf(view: PosedStudy) -> Content:
     scene = pose(mechanism, view.pose)
     assert scene is not None
     result, warnings = _motion(view)
-    tables = [_shortened(name, rows) for name, rows in _tables(view, scene, result) if rows]
+    tables = [[[style.shortened(words, MOST_LETTERS) for words in row] for row in rows]
+              for rows in sheet_tables(view, scene, result)]  # fmt: skip
     with style.context():
         bands = _bands(tables)
         sheet = PaperSheet.of(view, scene, sum(band.height for band in bands))
@@ -83,70 +85,6 @@ def _motion(view: PosedStudy) -> tuple[Result | None, tuple[Caution, ...]]:
         return kinematics(view.study), ()
     except MechdesignError as error:
         return None, (Caution("incomplete", f"numbers of the motion are not on the sheet: {error}"),)
-
-
-def _tables(view: PosedStudy, scene: Still, result: Result | None) -> Iterator[tuple[str, Rows]]:
-    """Links with tolerances, pins with fits, the motion's extremes, and what is required."""
-    study, label = view.study, view.study.units.label
-    scales = {label("length"): view.mechanism.size, label("angle"): 2 * np.pi / study.units.angle_factor}
-    yield "links", table_rows(study, scene)
-    yield "pins", _pins(view)
-    if result is None:
-        return
-    rows: list[tuple[str, ...]] = [("motion", "from", "to", "range", "unit")]
-    poses = result.tables["motion"]
-    for name in view.mechanism.drives:
-        if name in poses.names:
-            values = poses[name]
-            low, high = float(np.nanmin(values)), float(np.nanmax(values))
-            unit = style.printed(poses.column(name).unit)
-            rows.append((f"drive {name}", f"{low:.5g}", f"{high:.5g}", f"{high - low:.5g}", unit))
-    if "extremes" in result.tables:
-        table = result.tables["extremes"]
-        for row in table:
-            if not str(row["output"]).endswith(("_velocity", "_acceleration", "_error")):
-                rounding = ROUNDING * scales.get(str(row["unit"]), 0.0)
-                extremes = (float(row[key]) for key in ("min", "max", "range"))
-                numbers = (f"{0.0 if abs(value) < rounding else value:.5g}" for value in extremes)
-                rows.append((str(row["output"]), *numbers, style.printed(str(row["unit"]))))
-    if "loops" in result.tables:
-        for row in result.tables["loops"]:
-            least = f"{row['transmission_min']:.4g}"
-            rows.append((f"least transmission angle, {row['joints']}", least, "", "", style.printed(label("angle"))))
-    yield "motion", rows if len(rows) > 1 else []
-    verdicts = [
-        (verdict.requirement, "met" if verdict.met else "NOT MET", f"{own.worst:.5g} {style.printed(own.unit)}")
-        for verdict in requirements(study, result)
-        for own in [verdict.as_required]
-    ]
-    yield "requirements", [("requirement", "", "worst"), *verdicts] if verdicts else []
-
-
-def _pins(view: PosedStudy) -> list[tuple[str, ...]]:
-    """Pins of plates, with fits and clearances of the study."""
-    study, description = view.study, view.mechanism.description
-    clearances = study.reliability.clearances if study.reliability is not None else {}
-    if description.plates is None and not clearances:
-        return []
-    rows: list[tuple[str, ...]] = [("pin", "joins", "diameter", "fit or clearance")]
-    for pin in pins_of(description):
-        clearance = clearances.get(pin.name)
-        fit = ""
-        if clearance is not None:
-            fit = clearance.fit.text if clearance.fit is not None else f"radial {float(clearance.radius):.5g}"
-        size = f"\N{DIAMETER SIGN}{2 * float(view.sizes.pin(pin.name)):.5g}" if description.plates is not None else ""
-        rows.append((pin.name, ", ".join(pin.links), size, fit))
-    kept = [k for k in range(4) if any(row[k] for row in rows[1:])]
-    return [tuple(row[k] for k in kept) for row in rows]
-
-
-def _shortened(name: str, rows: Rows) -> Rows:
-    """A table with at most so many rows; the last one says how many more there are."""
-    most = MOST[name] + 1
-    if len(rows) <= most:
-        return rows
-    more = [f"and {len(rows) - most + 1} more", *([""] * (len(rows[0]) - 1))]
-    return [*rows[: most - 1], more]
 
 
 @dataclass(frozen=True)
@@ -234,11 +172,20 @@ class PaperSheet:
         half = complex(across, up) / 2 / self.scale / view.millimetres
         axes.set_xlim(middle.real - half.real, middle.real + half.real)
         axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
-        draw_dimensions(scene, axes)
+        plates = view.mechanism.description.plates is not None
+        if plates:
+            _draw_plates(axes, view)
+            centres = np.array([*scene.points.values()])
+            axes.plot(centres.real, centres.imag, "+", color=style.INK, markersize=6, markeredgewidth=0.6)
+            draw(axes, spring_shapes(scene))
+        else:
+            Posed(scene, names=False, drives=False).draw(axes)
+        draw_lines(scene, axes, workshop_lengths(view.study, scene), bars=not plates)
         _keep_inside(axes)
         unit = view.study.units.label("length")
-        words = f"Dimensions{f' in {unit}' if unit else ''}, at {view.posed}"
-        words += "; lengths of guides are not to scale" * bool(scene.guides)
+        words = f"Dimensions{f' in {unit}' if unit else ''}, at {view.posed}; "
+        schematic = "schematic, as the study has no plates: widths are not to scale"
+        words += "plates to scale" if plates else schematic + ", nor lengths of guides" * bool(scene.guides)
         page.text(left + 4, low + up - 6, words, fontsize=CELL, color=style.INK)
 
     def _title(self, page: Axes, view: PosedStudy, left: float) -> None:
@@ -246,7 +193,8 @@ class PaperSheet:
         unit = study.units.label("length") or "none (as mm)"
         rows = (
             (("Legal owner", "", 60.0), ("Created by", "", 40.0), ("Approved by", "", 40.0), ("Date", "", 40.0)),
-            (("Title", printable(study.name), 110.0), ("Document type", "Mechanism with its dimensions", 70.0)),
+            (("Title", printable(study.name), 95.0), ("Document type", "Mechanism with its dimensions", 50.0),
+             ("General tolerance", general_tolerance(study), 35.0)),
             (("Scale", self.words, 25.0), ("Unit of length", unit, 30.0), ("Paper", self.paper, 15.0),
              ("Sheet", "1 / 1", 15.0), ("Identification (SHA-256 of the study)", study.text_sha256[:16], 55.0),
              ("Made with", f"mechdesign {__version__}", 40.0)),
@@ -259,9 +207,24 @@ class PaperSheet:
                 _box(page, x, top, width, height, 0.25)
                 page.text(x + 1, top + height - 1, label, fontsize=LABEL, va="top", color=style.INK)
                 size = VALUE if label != "Title" else 1.4 * VALUE
-                size *= min(1.0, (width - 3) / max(_width(value, size), 1e-9))
-                page.text(x + 1.5, top + 0.38 * height, value, fontsize=size, va="center", color=style.INK)
+                size = max(CELL, size * min(1.0, (width - 3) / max(_width(value, size), 1e-9)))
+                shown = _cut(value, size, width - 3)
+                page.text(x + 1.5, top + 0.38 * height, shown, fontsize=size, va="center", color=style.INK)
                 x += width
+
+
+def _draw_plates(axes: Axes, view: PosedStudy) -> None:
+    """Draw every plate with its holes and slots, and what is on it, in the pose that is shown."""
+    colors = link_colors(view.mechanism.description)
+    for rank, (name, group) in enumerate(mechanism_drawing(view).groups.items()):
+        shapes = [shape for shape in group if isinstance(shape, Path | DrawnCircle) and shape.layer != "curves"]
+        for k, shape in enumerate(shapes):
+            places = np.array(traced(shape)) / view.millimetres
+            thin = shape.layer == "engrave"
+            axes.plot(places.real, places.imag, color=colors.get(name, style.INK), zorder=2 + 0.01 * rank,
+                      linewidth=0.5 if thin else 1.2, linestyle=(0, (9, 3, 2, 3)) if thin else "-")  # fmt: skip
+            if k == 0 and name in colors:
+                axes.fill(places.real, places.imag, color=colors[name], alpha=PALE, linewidth=0, zorder=1)
 
 
 def _keep_inside(axes: Axes) -> None:
@@ -294,7 +257,8 @@ def _height(rows: Rows) -> float:
 
 def _widths(rows: Rows) -> list[float]:
     """Widths of the columns (mm)."""
-    return [max(_width(row[k], 1.05 * CELL) for row in rows) for k in range(len(rows[0]))]
+    sizes = [BOLD * CELL, *[1.05 * CELL] * (len(rows) - 1)]
+    return [max(_width(row[k], size) for row, size in zip(rows, sizes, strict=True)) for k in range(len(rows[0]))]
 
 
 @dataclass(frozen=True)
@@ -314,7 +278,7 @@ def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
     """Tables in two columns where they are narrow enough, in their order; what is wider has its own band."""
     room = WIDTH - 4.0
     half = room / 2 - COLUMN
-    narrow = [rows for rows in tables if REDUCED * sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
+    narrow = [rows for rows in tables if sum(_widths(rows)) + COLUMN * (len(rows[0]) - 1) <= half]
     bands = [TableColumns([[rows]], room) for rows in tables if rows not in narrow]
     if len(narrow) < 2:
         return [TableColumns([[rows]], room) for rows in tables]
@@ -324,11 +288,9 @@ def _bands(tables: Sequence[Rows]) -> list[TableColumns]:
 
 
 def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) -> None:
-    """Draw a table, reduced where it is wider than the room; words without room are cut."""
+    """Draw a table; words without room are cut."""
     widths = _widths(rows)
     gaps = COLUMN * (len(widths) - 1)
-    share = max(REDUCED, min(1.0, (room - gaps) / sum(widths)))
-    widths = [share * width for width in widths]
     # The widest column gives up what is still missing.
     widest = int(np.argmax(widths))
     widths[widest] -= max(0.0, sum(widths) + gaps - room)
@@ -336,7 +298,7 @@ def _draw_table(page: Axes, left: float, top: float, rows: Rows, room: float) ->
     for number, row in enumerate(rows):
         y = top - (number + 0.5) * ROW
         for x, words, width in zip(starts, row, widths, strict=True):
-            page.text(x, y, _cut(words, share * CELL, width), fontsize=share * CELL, va="center", color=style.INK,
+            page.text(x, y, _cut(words, CELL, width), fontsize=CELL, va="center", color=style.INK,
                       fontweight="bold" if number == 0 else "normal")  # fmt: skip
     page.plot([left, left + room], [top - ROW] * 2, color=style.INK, linewidth=0.25 * 72 / INCH)
 

@@ -1,8 +1,9 @@
-"""Drawings as SVG at full size: a group a layer, sizes in millimetres."""
+"""Drawings as SVG at full size, or shown reduced: a group a layer, sizes in millimetres."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import count
 from xml.sax.saxutils import escape, quoteattr
 
 from mechdesign.door.exporting.drawing import CentreMark, Drawing, DrawnCircle, Path, Shape, Text, arc
@@ -17,15 +18,17 @@ def to_svg(drawing: Drawing) -> str:
     """The drawing as the text of an SVG file, one unit of which is a millimetre."""
     low, high = drawing.box
     corner, size = complex(low.real, -high.imag) - MARGIN * (1 + 1j), high - low + 2 * MARGIN * (1 + 1j)
-    stroke = max(STROKE, max(size.real, size.imag) / LINES)
-    remarks = "\n".join((drawing.title, "made by mechdesign; one unit is 1 mm", *drawing.remarks))
+    scale = next(scale for scale in _scales() if max(size.real, size.imag) <= scale * drawing.longest)
+    stroke = max(scale * STROKE, max(size.real, size.imag) / LINES)
+    title = drawing.title + f", shown at 1:{scale}" * (scale > 1)
+    remarks = "\n".join((title, "made by mechdesign; one unit is 1 mm", *drawing.remarks))
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f"<!-- {escape(printable_lines(remarks)).replace('--', '- -')} -->",
         f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
-        f'width="{_n(size.real)}mm" height="{_n(size.imag)}mm" '
+        f'width="{_n(size.real / scale)}mm" height="{_n(size.imag / scale)}mm" '
         f'viewBox="{_n(corner.real)} {_n(corner.imag)} {_n(size.real)} {_n(size.imag)}">',
-        f"<title>{escape(printable(drawing.title))}</title>",
+        f"<title>{escape(printable(title))}</title>",
     ]
     for layer in drawing.layers:
         look = f'fill="none" stroke="{layer.color}" stroke-width="{stroke:.3g}"'
@@ -34,6 +37,11 @@ def to_svg(drawing: Drawing) -> str:
             lines += _group(name, [shape for shape in group if shape.layer == layer.name], layer.color)
         lines.append("</g>")
     return "\n".join([*lines, "</svg>", ""])
+
+
+def _scales() -> Iterator[int]:
+    """Those of ISO 5455: 1, 2, 5, 10, 20, 50, 100."""
+    return (digit * 10**power for power in count() for digit in (1, 2, 5))
 
 
 def _group(name: str, shapes: Sequence[Shape], color: str) -> list[str]:

@@ -30,7 +30,7 @@ def find(entries: Sequence[Entry], word: str) -> list[Entry]:
         matches = next(([*pair] for pair in pairs if word == pair[0].word.removesuffix("-") + pair[1].word), [])
     if not matches and (above := place(word)):
         matches = [entry for entry in entries if entry.kind == KIND and entry.plain == above]
-    return matches
+    return matches or (find(entries, folded[:-1]) if folded.endswith("s") else [])
 
 
 def holding(entries: Sequence[Entry], words: str) -> list[Entry]:

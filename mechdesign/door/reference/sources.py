@@ -14,9 +14,9 @@ from mechdesign.ground.errors import EXIT_CODES
 from mechdesign.ground.functions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.ground.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
 from mechdesign.ground.statistics import STATISTICS as WORDS
+from mechdesign.ground.unit_table import listed
 from mechdesign.mechanism.configuration import REASONS
 from mechdesign.study.text.forms import TERMS
-from mechdesign.study.text.unit_table import listed
 
 
 def terms() -> Iterator[Entry]:

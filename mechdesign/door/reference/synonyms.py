@@ -1,4 +1,4 @@
-"""The field's words for what the reference has under another name."""
+"""The field's words for what the reference has under another name, and for what is beyond the tool."""
 
 from __future__ import annotations
 
@@ -28,7 +28,22 @@ SYNONYMS: Mapping[str, tuple[str, str]] = {
 }
 
 
+# Words of what is beyond the tool, and why.
+BEYOND: Mapping[str, str] = dict.fromkeys(
+    (
+        "spatial", "spatial mechanism", "3D", "three-dimensional", "ball joint", "spherical", "spherical joint",
+        "universal joint", "cardan joint", "cylindrical joint", "screw joint", "Stewart platform", "delta robot",
+    ),
+    "planar mechanisms only: every link moves in one plane, with pins and slides. A mechanism in space is for a "
+    "program of multibody dynamics, such as MuJoCo, MBDyn, Project Chrono or Simscape Multibody; what of it moves "
+    "in a plane goes on from here by 'mechdesign export --to model.xml' (docs/howto/simulate_elsewhere.md). How far "
+    "a question goes: docs/theory/limits.md",
+)  # fmt: skip
+
+
 def entries() -> Iterator[Entry]:
-    """Words of the field, and what they are called here."""
+    """Words of the field, and what they are called here, or why there is nothing of theirs."""
     for word, (own, meaning) in SYNONYMS.items():
         yield Entry(word, "other word", f"see {own}: {meaning}")
+    for word, why in BEYOND.items():
+        yield Entry(word, "out of scope", why)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.ground.columns import CHOSEN, VARIED
-from mechdesign.ground.errors import counted
+from mechdesign.ground.columns import CHOSEN, VARIED, Column
+from mechdesign.ground.errors import OUTCOMES, counted
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import Table
 from mechdesign.study.text.document import in_yaml
 
@@ -24,7 +25,7 @@ def short(name: str) -> str:
 def text_of(value: Any) -> str:
     """A value in words."""
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return numeral(value)
     return value if isinstance(value, str) else in_yaml(value)
 
 
@@ -41,6 +42,8 @@ class Best:
     ----------
     case : int
         Its number, from 1; of equals the first.
+    label : str
+        What the file of cases calls it.
     changes : str
         Its values in words.
     ranked, equals, front : int
@@ -48,6 +51,7 @@ class Best:
     """
 
     case: int
+    label: str
     changes: str
     ranked: int
     equals: int
@@ -57,26 +61,40 @@ class Best:
     def words(self) -> str:
         """``case 17 (r 35, l 120)``."""
         more = f" and {self.equals - 1} more as good" if self.equals > 1 else ""
-        return f"case {self.case} ({self.changes}){more}"
+        return f"case {self.case} ({f'{self.label}: ' * bool(self.label)}{self.changes}){more}"
+
+    @property
+    def name(self) -> str:
+        """Its number and label, ``17 (spare)``."""
+        return f"{self.case} ({self.label})" if self.label else f"{self.case}"
 
     def __str__(self) -> str:
         front = f"; {self.front} of them are on the Pareto front" if self.front > self.equals else ""
         return f"best of {counted(self.ranked, 'ranked case')} is {self.words}{front}"
 
 
-def telling_columns(table: Table) -> list[str]:
-    """Columns of a sweep that are shown first: the case, the results asked for, what varies, and what is required."""
-    chosen = [column.name for column in table.columns if column.meaning == CHOSEN]
-    varied = [column.name for column in table.columns if column.meaning == VARIED]
+def telling(table: Table) -> list[Column]:
+    """Columns of a sweep as people read them: the case, what varies, the verdict in words, results, and all others."""
     required = [name for name in table.names if f"{name}_met" in table]
-    return ["case", *(["label"] if "label" in table else []), *chosen, *varied, *required]
+    kept = {1: "NOT MET", 0: "met"} if required else {}
+    codes = table["exit_code"].tolist() if "exit_code" in table else []
+    words = np.array([kept.get(code) or OUTCOMES[code] for code in codes])
+    first = [column for column in table.columns if column.name in ("case", "label")]
+    varied = [column for column in table.columns if column.meaning == VARIED]
+    first += [Column(short(column.name), column.values, column.unit, column.meaning, column.kind) for column in varied]
+    first += [Column("verdict", words, meaning="what became of the case")] * bool(codes)
+    first += [column for column in table.columns if column.name == RANK]
+    first += [column for column in table.columns if column.meaning == CHOSEN]
+    first += [column for column in table.columns if column.name in required]
+    rest = [column for column in table.columns if column not in (*first, *varied) and column.name != "exit_code"]
+    return [*first, *rest]
 
 
 def best_of(table: Table) -> Best | None:
     """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
     if FRONT not in table:
         return None
-    best: tuple[int, str] | None = None
+    best: tuple[int, str, str] | None = None
     numbers = np.zeros(3, dtype=np.intp)
     for part in table.blocks():
         rank = part[RANK]
@@ -86,7 +104,7 @@ def best_of(table: Table) -> Best | None:
             changes = [
                 (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
             ]
-            label = f"{part['label'][row]}: " if "label" in part and part["label"][row] else ""
-            best = int(part["case"][row]), label + changes_in_words(changes)
+            label = str(part["label"][row]) if "label" in part else ""
+            best = int(part["case"][row]), label, changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
     return None if best is None else Best(*best, *numbers.tolist())

@@ -172,7 +172,7 @@ def compare(old: Path, new: Path, tolerance: Allowance) -> Comparison:
     return comparison
 
 
-def results(root: Path) -> dict[str, dict[str, Any]]:
+def results(root: Path, taker: str = "compare") -> dict[str, dict[str, Any]]:
     """Manifests in and below a folder by the relative paths of their folders, ``.`` for the folder itself.
 
     Of a manifest, itself alone.
@@ -185,7 +185,9 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
     if root.name == manifest.NAME and root.is_file():
         return {".": results(root.parent)["."]}
     if not root.is_dir():
-        raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
+        if root.exists():
+            raise StudyError(f"{root}: is no folder: {taker} takes folders of results")
+        raise StudyError(f"{root}: there is no such folder of results")
     folders = [path.parent for path in sorted(root.rglob(manifest.NAME))]
     return {folder.relative_to(root).as_posix(): manifest.whole(folder) for folder in folders}
 

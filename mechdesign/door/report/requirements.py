@@ -14,9 +14,11 @@ from mechdesign.door.report.row_words import place_of
 from mechdesign.family.judge import Judgement, along, by_rows, judge
 from mechdesign.ground.cautions import ALL, Caution, fails
 from mechdesign.ground.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import POSES_ONLY, Drawn, Result
 from mechdesign.ground.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.ground.statistics import AT_END, STATISTICS
+from mechdesign.ground.table_text import Rounding
 from mechdesign.ground.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.ground.terms import command_of as command_named
 from mechdesign.mechanism.plates import CLEARANCE
@@ -27,6 +29,8 @@ from mechdesign.study.text.units import QUANTITY, Amount, text_of, written
 Limits = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
 Check = Callable[[Result], Iterable[Problem]]
+# Larger values are looked at for rounding by no verdict: it takes a look at all columns of a table.
+_SMALL = 1e-6
 # Place of a verdict where the motion never enters the part that a requirement is about.
 _OUTSIDE = "no place of the motion"
 
@@ -69,7 +73,7 @@ class Verdict:
         place, note = f" at {self.place}" if self.place else "", f" ({self.note})" if self.note else ""
         own = self.as_required
         unit = f" {self.limit_unit}" if self.limit_unit and not np.isnan(self.worst) else ""
-        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {own.worst:.6g}{unit}{place}{note}"
+        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {numeral(own.worst)}{unit}{place}{note}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,6 +332,10 @@ def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Limits:
 
 def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Chosen | Sum) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
+    if isinstance(terms, Chosen) and terms.values.dtype.kind == "f" and 0 < abs(judged.values[0]) < _SMALL:
+        column = terms.table.column(terms.column)
+        if abs(judged.values[0]) <= Rounding.of(terms.table.seen.columns).still(column, terms.unit):
+            judged = Judgement.of(np.zeros(1), _bounds(terms, requirement))
     value, margin = float(judged.values[0]), float(judged.margins[0])
     scopes = [chosen.table.scope for chosen in terms.parts]
     missing = [gap for chosen in terms.parts for gap in chosen.gaps]
@@ -343,14 +351,14 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
 
 
-def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) -> Verdict:
+def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: str) -> Verdict:
     """The verdict on a requirement over cases: that of the worst, named in words, and how many of them miss it.
 
-    `first` is the number of the first one that does, from 0.
+    `first` is the first one that does.
     """
     place = ", ".join(filter(None, (name, worst.place)))
     if unmet:
-        place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is case {first + 1}"
+        place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is {first}"
     return replace(worst, met=not unmet, place=place)
 
 

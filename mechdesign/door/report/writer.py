@@ -167,6 +167,7 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
     check_writable(directory)
     from mechdesign.drawing import style
     from mechdesign.drawing.dimensions import dimensions_picture
+    from mechdesign.drawing.fonts import lost_letters
     from mechdesign.drawing.layout import draw
     from mechdesign.drawing.mechanism import sketch_picture
 
@@ -185,6 +186,7 @@ def write_sketch(directory: Path, study: Study, output: Extras) -> str:
         for path, data in drawn.items():
             write_file(path, data)
         messages.append(f"{sentence} in {', '.join(map(str, paths))}")
+    messages += [f"warning: {why}" for why in [lost_letters(str(study.resolved))] if why]
     return "; ".join(messages)
 
 
@@ -207,6 +209,7 @@ def pictures(
     """
     from mechdesign.door.report.page import vector
     from mechdesign.drawing import style
+    from mechdesign.drawing.fonts import lost_letters
     from mechdesign.drawing.layout import draw
     from mechdesign.drawing.mechanism import mechanism_picture
     from mechdesign.drawing.pictures import figures
@@ -241,6 +244,7 @@ def pictures(
     if drawn.get(ANIMATION) == b"":
         del drawn[ANIMATION]
         warnings.append(Caution("undrawn", "no animation: it needs a sweep of one coordinate or a path"))
+    warnings += [Caution("undrawn", why) for why in [lost_letters(str(study.resolved))] if why]
     return drawn, tuple(warnings)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Bars, Lines, Panel, PanelMark, Picture, Words
 from mechdesign.drawing.pictures import View, picture
+from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Table
 
@@ -51,8 +52,8 @@ def _panel(table: Table, rows: Ints, *, last: bool) -> Panel:
         marks.append(Bars(np.where(some, sizes, 0.0), look={"color": color, "hatch": hatch, "zorder": 2}))
     look: dict[str, Any] = {"ha": "right", "va": "center"}
     marks += [Words(1.0, place, _figures(table, row), inside="x", look=look) for place, row in enumerate(rows.tolist())]
-    unit = style.printed(str(table["value_unit"][rows[0]]))
-    title = f"{table['result'][rows[0]]} = {table['value'][rows[0]]:.6g} {unit}".rstrip()
+    unit = printed(str(table["value_unit"][rows[0]]))
+    title = f"{table['result'][rows[0]]} = {numeral(table['value'][rows[0]])} {unit}".rstrip()
     words = "change of the result, in % of its size, for 1 % of the number more" if last else ""
     names = Axis(words=[str(name).removeprefix("mechanism.") for name in table["parameter"][rows]])
     return Panel(marks, Axis(words, ends=(low, low + (high - low) / (1 - _WORDS))), names, title, "derivative")
@@ -60,10 +61,10 @@ def _panel(table: Table, rows: Ints, *, last: bool) -> Panel:
 
 def _figures(table: Table, row: int) -> str:
     """The derivative as text; at a kink both one-sided ones."""
-    unit = style.printed(str(table["unit"][row]))
+    unit = printed(str(table["unit"][row]))
     if np.isfinite(table["below"][row]):
-        return f"kink: {table['below'][row]:.4g} below, {table['above'][row]:.4g} above {unit}".rstrip()
+        return f"kink: {numeral(table['below'][row], 4)} below, {numeral(table['above'][row], 4)} above {unit}".rstrip()
     if np.isnan(table["derivative"][row]):
         return "not known here"
     error = "" if table["settled"][row] else f" \N{PLUS-MINUS SIGN} {table['error'][row]:.1g}"
-    return f"{table['derivative'][row]:.4g}{error} {unit}".rstrip()
+    return f"{numeral(table['derivative'][row], 4)}{error} {unit}".rstrip()

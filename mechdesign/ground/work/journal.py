@@ -23,7 +23,7 @@ from mechdesign.ground.work.blocks import packed, unpacked
 
 NAME = "unfinished.npz"
 # Least seconds between two versions of the file, and the least ratio of this time to that of writing it.
-_INTERVAL = 30.0
+INTERVAL = 30.0
 _MIN_RATIO = 20.0
 
 
@@ -39,7 +39,7 @@ class Journal:
     """Finished batches in a file, written whole or not at all by `save` and every half minute.
 
     `origin` decides the results: study, overrides, seed, versions. With `resume` a file of the same origin is read;
-    `usable` is whether there is one.
+    `usable` is whether there is one, and `kept` how many designs or cases it has.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, Any], *, resume: bool = False) -> None:
@@ -50,8 +50,9 @@ class Journal:
         self._stored: list[tuple[bytes, Floats]] = []
         self.words: list[str] = []
         self._written = time.monotonic()
-        self._patience = _INTERVAL
+        self._patience = INTERVAL
         self.usable = resume and self._read()
+        self.kept = sum(len(rows) for _, rows in self._stored)
 
     def _read(self) -> bool:
         try:
@@ -105,7 +106,7 @@ class Journal:
         except OSError as error:
             raise OutputError(f"{self.path}: could not be written: {error.strerror or error}") from error
         self._written = time.monotonic()
-        self._patience = max(_INTERVAL, _MIN_RATIO * (self._written - begun))
+        self._patience = max(INTERVAL, _MIN_RATIO * (self._written - begun))
 
     def discard(self) -> None:
         """Remove the file: the computation is finished, or begins anew."""

@@ -15,7 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mechdesign.ground.errors import OutputError, StudyError
+from mechdesign.ground.errors import OutputError, StudyError, cut
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.records import remove_recorded, write_recorded
 from mechdesign.ground.work.blocks import packed, unpacked
@@ -25,6 +25,10 @@ Block = tuple[Floats, str]
 """Answers of a batch: a row of numbers for each case, and what is not a number."""
 
 FILE = "answers.npz"  # in a folder of its own
+# Of what decides the answers: the numbers and words of the study, and what gives them.
+_RESOLVED = re.compile(r"^study\.resolved\.")
+_AS_GIVEN = ("study", "overrides")
+_SHOWN = 40  # characters of a value in a message
 _SHARD = re.compile(r"([1-9]\d{0,5})/([1-9]\d{0,5})")
 
 
@@ -116,9 +120,9 @@ def merge(directory: Path, origin: Mapping[str, Any]) -> list[Block]:
     origin = json.loads(json.dumps(origin))
     for path in files_in(directory):
         kept = _read(path)
-        other = [key for key in origin.keys() | kept.origin.keys() if origin.get(key) != kept.origin.get(key)]
-        if other:
-            raise StudyError(f"{path}: is a shard of something else; other than here: {', '.join(sorted(other))}")
+        if kept.origin != origin:
+            other = ", ".join(_differences(kept.origin, origin))
+            raise StudyError(f"{path}: is a shard of something else: {other}")
         counts[kept.shard.count] = path
         if len(counts) > 1:
             raise StudyError(f"{path}: there are shards of {' and of '.join(map(str, counts))}; remove those of one")
@@ -132,6 +136,27 @@ def merge(directory: Path, origin: Mapping[str, Any]) -> list[Block]:
     if any(len(parts[k]) != len(range(k - 1, total, count)) for k in parts):
         raise StudyError(f"{directory}: the shards do not fit together; compute them anew")
     return [parts[k % count + 1][k // count] for k in range(total)]
+
+
+def _differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """What decides the answers of a shard and is another here: ``seed is 5, here 0``.
+
+    That the text of the study or the overrides differ is said only where no number or word of the study does.
+    """
+    one, other = ({_RESOLVED.sub("", key): value for key, value in _leaves(origin)} for origin in (there, here))
+    differing = [key for key in {**one, **other} if one.get(key) != other.get(key)]
+    telling = [key for key in differing if key.split(".")[0] not in _AS_GIVEN]
+    return [" is ".join((key, ", here ".join(cut(str(part.get(key, "left out")), _SHOWN) for part in (one, other))))
+            for key in telling or differing]  # fmt: skip
+
+
+def _leaves(part: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """The numbers, words and lists in nested mappings by their dotted keys."""
+    if isinstance(part, Mapping):
+        for name, inner in part.items():
+            yield from _leaves(inner, f"{key}.{name}" if key else str(name))
+    else:
+        yield key, part
 
 
 def remove(directory: Path) -> None:

@@ -9,6 +9,15 @@ from typing import Annotated
 from mechdesign.mechanism.elements import declared
 from mechdesign.mechanism.elements.declared import Element, Term
 
+NO_CLASS = "none"
+_CLASSES = {
+    NO_CLASS: "that of `reliability` where its dimensions are of one such class, else none",
+    "ISO 2768-f": "fine: 0.05 mm of lengths up to 6 mm, 0.1 up to 30 mm, 0.15 up to 120 mm, 0.2 up to 400 mm",
+    "ISO 2768-m": "medium: 0.1 mm of lengths up to 6 mm, 0.2 up to 30 mm, 0.3 up to 120 mm, 0.5 up to 400 mm",
+    "ISO 2768-c": "coarse: 0.3 mm of lengths up to 6 mm, 0.5 up to 30 mm, 0.8 up to 120 mm, 1.2 up to 400 mm",
+    "ISO 2768-v": "very coarse: 0.5 mm of lengths up to 6 mm, 1 up to 30 mm, 1.5 up to 120 mm, 2.5 up to 400 mm",
+}
+
 
 @dataclass(frozen=True)
 class Plates(Element):
@@ -30,5 +39,7 @@ class Plates(Element):
     """
     sheet: declared.PositiveLength | None = None
     """Width of the sheet on which the parts lie in rows. Left out: 600 mm. Example: 300 mm"""
+    general_tolerance: Annotated[str, declared.Choice(_CLASSES, "general tolerance")] = NO_CLASS
+    """Tolerance of every dimension on the drawing sheet that has none of its own. Example: ISO 2768-m"""
     widths: Mapping[str, Term] = field(default_factory=dict)  # of links that have one
     layers: Mapping[str, int] = field(default_factory=dict)  # of links that have one, from 1 on

@@ -33,6 +33,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.mechanism.stick_slip import accelerate
 from mechdesign.motion.curve import from_sketch
+from mechdesign.motion.failures import passed_limits
 from mechdesign.motion.motion import in_study_units, radians
 from mechdesign.motion.rows import Poses, instants
 from mechdesign.motion.rules import GivenRows
@@ -159,8 +160,8 @@ class EquationsOfMotion:
             speeds.append(float(radians(study.units, drive, given.get(f"{name}{VELOCITY}", 0.0))))
         pose = mechanism.forward.solve(values)
         if not pose.valid:
-            reason = mechanism.why(int(pose.reason))
-            raise AssemblyError(f"the start of dynamics.forward: {reason}{self._beyond_limits(pose)}")
+            why = "; ".join(passed_limits(mechanism, study.units, pose)) or mechanism.why(int(pose.reason))
+            raise AssemblyError(f"the start of dynamics.forward: {why}")
         linear = mechanism.linearize(pose)
         if regularity_of_drives(linear) < STALLED:
             raise AssemblyError(
@@ -168,17 +169,6 @@ class EquationsOfMotion:
                 "mechanism moves; start beside it"
             )
         return pose, linear, np.array(speeds)
-
-    def _beyond_limits(self, pose: Configuration) -> str:
-        """Limits that a pose is beyond, with the values there."""
-        study, mechanism, places = self.study, self.study.mechanism, self.study.mechanism.nominal
-        parts = []
-        for bound in mechanism.bounds:
-            labels = [label for label, margin in bound.margins(pose, places) if float(margin) < 0]
-            value = in_study_units(study.units, bound.coordinate, pose.value(bound.coordinate))
-            unit = f" {study.units.label(bound.coordinate.quantity)}".rstrip()
-            parts += [f"; {bound.coordinate.name} is {float(value):.6g}{unit}, beyond {label}" for label in labels]
-        return "".join(parts)
 
     @quiet
     def slopes(self, linear: Linearization) -> Floats:

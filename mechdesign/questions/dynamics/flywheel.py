@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import Table
 from mechdesign.ground.statistics import Request, no_value_along
 from mechdesign.mechanism.algebra import Vector, quiet
@@ -106,8 +107,8 @@ def _another(question: MovedQuestion, along: KinematicAlong) -> str:
     k, unit = int(gap.argmax()), study.units.label("moment")
     first, second = (float(some[k]) * way / end for some in (work, again))
     return (
-        f"over the next {_degrees(question, end)} the effort is another, with a work of {second:.6g} {unit} in the "
-        f"first {_degrees(question, places[k])} in place of {first:.6g}"
+        f"over the next {_degrees(question, end)} the effort is another, with a work of {numeral(second)} {unit} in "
+        f"the first {_degrees(question, places[k])} in place of {numeral(first)}"
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.columns import Column
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Floats, evenly
 from mechdesign.ground.numerics.sign_changes import Resolved
 from mechdesign.ground.progress import Progress
@@ -71,7 +72,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, PoseValues, Shown
 
 
 def _at(study: Study, time: float) -> str:
-    return f"{time:.6g} {study.units.label('time')}"
+    return f"{numeral(time)} {study.units.label('time')}"
 
 
 def _scope(integration: Integration) -> Scope:

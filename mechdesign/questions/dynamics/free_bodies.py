@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,9 +12,9 @@ from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
-from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import PIN, Contact
-from mechdesign.mechanism.outputs import pulled
+from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.wheels import Mesh
 from mechdesign.motion.question import PoseValues
 from mechdesign.questions.dynamics.question import COUPLING
@@ -103,7 +104,7 @@ class _Poses:
         yield from self._springs()
         yield from pushes
         shaking = [self.motion.arrays[name][self.rows] for name in ("shaking.x", "shaking.y", "shaking_moment")]
-        force, place = -shaking[0] - 1j * shaking[1], self._base(GROUND)
+        force, place = -shaking[0] - 1j * shaking[1], self.configuration.nodes[self.configuration.graph.bases[GROUND]]
         moment = -shaking[2] - (np.conj(place) * force).imag
         yield self._acting("foundation", "foundation", GROUND, place, force, moment, reaction=True)
 
@@ -117,7 +118,10 @@ class _Poses:
 
     def _joints(self, pushes: Sequence[Acting]) -> Iterator[Acting]:
         """Contact forces: without what is pushed along their slides."""
-        pushed = {push.joint: push.force for push in pushes if push.joint and not push.reaction}
+        pushed = defaultdict[str, Vector](complex)
+        for push in pushes:
+            if push.joint and not push.reaction:
+                pushed[push.joint] = pushed[push.joint] + push.force
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
             place, sides = contact.place(self.configuration), _sides(contact)
@@ -125,7 +129,7 @@ class _Poses:
                 place = self.motion.arrays[f"{name}.x"][self.rows] + 1j * self.motion.arrays[f"{name}.y"][self.rows]
             if sides[0] != sides[1]:
                 for k, (side, sign) in enumerate(zip(sides, (1, -1), strict=True)):
-                    force = sign * (x + 1j * y - pushed.get(contact.joint, 0.0))
+                    force = sign * (x + 1j * y - pushed[contact.joint])
                     pair, at = contact.engaged, place
                     if isinstance(pair, Mesh) and pair.belt:
                         # Where the belt leaves this wheel: nearest to its axis.
@@ -135,45 +139,24 @@ class _Poses:
 
     def _masses(self) -> Iterator[Acting]:
         geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section)
-        factor, still = self.study.units.inertia_factor, Moving()
-        gravity = section.gravity[0] + 1j * section.gravity[1]
-        for body, mass in self.question.masses(self.poses, self.configuration.places).items():
-            for kind, fall, moving in (("weight", gravity, still), ("inertia", 0j, self.moving)):
-                forces = Forces(self.configuration)
-                inertia(forces, geometry, {body: mass}, moving, fall, factor)
-                force, moment = forces.bodies[body]
-                place = center(forces, geometry, body, mass)
-                arm = place - self.configuration.nodes[forces.bases[body]]
-                yield self._acting(kind, kind, _link(body), place, force, moment - (np.conj(arm) * force).imag)
+        factor, gravity = self.study.units.inertia_factor, section.gravity[0] + 1j * section.gravity[1]
+        masses = self.question.masses(self.poses, self.configuration.places)
+        for kind, fall, moving in (("weight", gravity, Moving()), ("inertia", 0j, self.moving)):
+            forces = Forces(self.configuration)
+            inertia(forces, geometry, masses, moving, fall, factor)
+            yield from self._parts(kind, kind, forces)
 
     def _loads(self) -> Iterator[Acting]:
         for load in self.question.section.loads:
             forces = Forces(self.configuration)
             Loading(self.study, [load], self.poses).add(forces, self.moving)
-            ends = (load.at,) if load.at is not None else load.between or ()
-            yield from self._at_points("load", "load", forces, ends)
-            if load.link is not None:
-                yield self._acting("load", "load", load.link, self._base(load.link), 0j, forces.bodies[load.link][1])
+            yield from self._parts("load", "load", forces)
 
     def _springs(self) -> Iterator[Acting]:
-        mechanism = self.study.mechanism
-        for name, spring in mechanism.description.springs.items():
+        for name, spring in self.study.mechanism.description.springs.items():
             forces = Forces(self.configuration)
-            springs(forces, mechanism.geometry, [spring], self.moving)
-            if not spring.turning:
-                yield from self._at_points("spring", name, forces, spring.between)
-                continue
-            for link in spring.between:
-                yield self._acting("spring", name, link, self._base(link), 0j, forces.bodies[link][1])
-
-    def _at_points(self, kind: str, name: str, forces: Forces, ends: Sequence[str]) -> Iterator[Acting]:
-        """Forces at points: of one link, or of the pin there."""
-        graph = self.configuration.graph
-        for end in ends:
-            node, link = graph.node(end), end.rpartition(".")[0]
-            body = link if link in forces.bodies or not link else rod_of(link)
-            force = forces.bodies[body][0] if link else forces.nodes[node]
-            yield self._acting(kind, name, _link(body) if link else self._holder(node), self._node(node), force)
+            springs(forces, self.study.mechanism.geometry, [spring], self.moving)
+            yield from self._parts("spring", name, forces)
 
     def _efforts(self) -> Iterator[Acting]:
         """What drives do, and couplings that no wheels make: moments on links, pushes along slides, forces on pins."""
@@ -182,25 +165,31 @@ class _Poses:
         pulls += [("coupling", name, gap, arrays[f"{COUPLING} {name}"])
                   for name, (_, gap) in self.question.without_wheels.items()]  # fmt: skip
         for kind, name, coordinate, effort in pulls:
-            pull = pulled(self.configuration, coordinate, effort[self.rows])
-            for body, moment in pull.bodies.items():
-                yield self._acting(kind, name, _link(body), self._base(body), 0j, moment)
-            for node, force in pull.nodes.items():
-                yield self._acting(kind, name, self._holder(node), self._node(node), force)
-            for slide, push in pull.slides.items():
-                yield from self._along(kind, name, slide, push)
+            forces = Forces(self.configuration)
+            forces.on_coordinate(coordinate, effort[self.rows])
+            yield from self._parts(kind, name, forces)
+
+    def _parts(self, kind: str, name: str, forces: Forces) -> Iterator[Acting]:
+        """What forces are added up from: those on pins and links, and those along slides."""
+        nodes = self.configuration.nodes
+        for node, force in enumerate(forces.nodes):
+            if not nothing(force):
+                yield self._acting(kind, name, self._holder(node), nodes[node], force)
+        for body, force, moment, arm in forces.parts:
+            yield self._acting(kind, name, _link(body), nodes[forces.bases[body]] + arm, force, moment)
+        for slide, push in forces.slides.items():
+            yield from self._along(kind, name, slide, push)
 
     def _along(self, kind: str, name: str, slide: int, push: Value) -> Iterator[Acting]:
         """A push along a slide: on what slides, and against it on the guide; none where both are one link."""
         graph = self.configuration.graph
         joint = graph.slides[slide]
-        contact = next(contact for contact in self.question.joints.contacts if contact.joint == joint)
         (number,) = (k for k, edge in enumerate(graph.edges) if edge.slide == slide)
-        sides = _sides(contact)
-        for side, sign in zip(sides, (1, -1), strict=True) if sides[0] != sides[1] else ():
-            force = sign * push * self.linear.direction(number)
-            acting = self._acting(kind, name, side, self._node(contact.node), force, reaction=sign < 0)
-            yield replace(acting, joint=joint)
+        for contact in (own for own in self.question.joints.contacts if own.joint == joint):
+            sides, place = _sides(contact), self.configuration.nodes[contact.node]
+            for side, sign in zip(sides, (1, -1), strict=True) if sides[0] != sides[1] else ():
+                force = sign * push * self.linear.direction(number)
+                yield replace(self._acting(kind, name, side, place, force, reaction=sign < 0), joint=joint)
 
     def _holder(self, node: int) -> str:
         """What bears a force at a node: the pin of several links, the one link there, or the ground."""
@@ -209,13 +198,6 @@ class _Poses:
         if any(pin in (contact.on, contact.by) for contact in joints.contacts):
             return pin
         return _link(joints.sole.get(node, GROUND))
-
-    def _node(self, node: int) -> Vector:
-        return self.configuration.nodes[node]
-
-    def _base(self, link: str) -> Vector:
-        bases = self.configuration.graph.bases
-        return self.configuration.nodes[bases[link]] if link in bases else 0j
 
 
 def _all(configuration: Configuration, values: Vector) -> Complexes:

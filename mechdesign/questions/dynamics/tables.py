@@ -82,8 +82,9 @@ def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Coll
         numbers[k] = _of_poses(np.where(valid, values, np.nan), at)
         if along is not None and static.name in along.columns:
             numbers[k] = np.where(
-                along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k], static.size)
-            )
+                along.curve.spent[:, None], numbers[k],
+                _between(along, static.name, numbers[k], static.size, bears=static.name in bearings),
+            )  # fmt: skip
         numbers[k][:, 8] = numbers[k][:, 8] if static.name in bearings else np.nan
         peak = numbers[k][:, [4]]
         values = cleared(numbers[k][:, VALUES], STILL * np.fmax(np.where(np.isfinite(peak), peak, 0.0), static.size))
@@ -116,7 +117,7 @@ def _of_poses(values: Floats, at: Floats) -> Floats:
     return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
 
 
-def _between(along: KinematicAlong, name: str, poses: Floats, size: float) -> Floats:
+def _between(along: KinematicAlong, name: str, poses: Floats, size: float, *, bears: bool) -> Floats:
     """The same over the motion between its poses."""
     lines = np.arange(along.curve.lines)
     still = STILL * np.fmax(np.nan_to_num(poses[:, 4]), size)
@@ -125,6 +126,7 @@ def _between(along: KinematicAlong, name: str, poses: Floats, size: float) -> Fl
     upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
     peak, peak_at = np.where(upper, high, -low), np.where(upper, high_at, low_at)
     ends = [low, along.shown(lines, low_at), high, along.shown(lines, high_at), peak, along.shown(lines, peak_at)]
-    square, cube = (np.maximum(along.mean(name, power), 0.0) for power in (2, 3))
+    square = np.maximum(along.mean(name, 2), 0.0)
+    cube = along.mean(name, 3) if bears else np.full(len(lines), np.nan)
     whole = np.stack([*ends, along.mean(name), np.sqrt(square), np.cbrt(cube)], axis=1)
     return np.where(np.isnan(low)[:, None], poses, whole)

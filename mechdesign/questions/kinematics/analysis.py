@@ -67,7 +67,7 @@ def _modes(
             passage = pass_over(other, NULL, jobs)
         if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
             label = f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label
-            pictured[label] = shown_of(study, passage)
+            pictured[label] = shown_of(passage.question.study, passage)
         passages[assembly.label] = passage
         bad = int(np.count_nonzero(passage.reason))
         if bad:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.ground.results import Table
 from mechdesign.mechanism.margins import Cause
@@ -72,7 +73,7 @@ def place_in_words(along: KinematicAlong, line: int, place: float) -> str:
     """``theta = 30 deg``, or the row and the coordinates of a path."""
     motion, poses, lines, s = along.question.motion, along.question.poses, np.array([line]), np.array([place])
     if poses.swept is not None:
-        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {motion.unit_of(poses.swept)}".rstrip()
+        return f"{poses.swept} = {numeral(along.shown(lines, s)[0])} {motion.unit_of(poses.swept)}".rstrip()
     return f"row {place:.6g} ({motion.at(poses.along(lines, s)).in_words(0)})"
 
 

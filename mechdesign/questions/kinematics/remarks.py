@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.motion.question import PoseValues, Remark
@@ -19,8 +20,8 @@ from mechdesign.questions.kinematics.values import RESTS, SINGULAR
 
 STALLS = Remark(
     "singular", "{lie} at a dead centre or change point, where the drives do not move the mechanism in one way "
-    f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean nothing "
-    "there",
+    f"(conditioning below {numeral(STALLED)}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
+    "nothing there",
 )  # fmt: skip
 LOST = Remark(
     "singular", "{lie} where no drive rates give what is asked: the drives cannot move it in every direction; rates "
@@ -98,7 +99,8 @@ def _singular(question: KinematicQuestion) -> Remark:
     if len(question.drives) == 1:
         still = f"{question.listed[0].name} stands still there, and det_J is 0"
         return Remark("singular", f"{{are}} at a dead centre: {still}", first=False)
-    return Remark("singular", f"{{are}} at or near a singularity (inverse condition below {SINGULAR:g})", first=False)
+    words = f"{{are}} at or near a singularity (inverse condition below {numeral(SINGULAR)})"
+    return Remark("singular", words, first=False)
 
 
 def _near(motion: PoseValues) -> Flags:

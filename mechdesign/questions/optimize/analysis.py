@@ -14,6 +14,7 @@ from mechdesign.family.goals import shape_of
 from mechdesign.family.question import DesignsQuestion
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import AssemblyError, Interrupted, MechdesignError, StudyError
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result
@@ -152,8 +153,9 @@ def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) ->
             lost = f", {len(ends) - len(feasible)} found no feasible design" if len(feasible) < len(ends) else ""
             spread = "nowhere"
             if len(feasible):
-                spread = f"with {objectives[row]} between {abs(feasible).min():.6g} and {abs(feasible).max():.6g}"
-            last = f", and the last steps from the best led to {abs(best):.6g}" * bool(
+                ends_at = " and ".join(numeral(end) for end in (abs(feasible).min(), abs(feasible).max()))
+                spread = f"with {objectives[row]} between {ends_at}"
+            last = f", and the last steps from the best led to {numeral(abs(best))}" * bool(
                 len(feasible) and best < feasible.min() - far
             )
             yield Caution(
@@ -185,11 +187,12 @@ def _nothing_feasible(study: Study, designs: DesignSet, nearest: int | None) -> 
         return AssemblyError(message)
     table = nearest_table(designs, nearest)
     short = [
-        f"{row['condition']} by {row['missing']:.6g} {row['unit']}".rstrip()
-        + f" (it is {row['value']:.6g})" * bool(np.isfinite(row["value"]))
+        f"{row['condition']} by {numeral(row['missing'])} {row['unit']}".rstrip()
+        + f" (it is {numeral(row['value'])})" * bool(np.isfinite(row["value"]))
         for row in table if not row["missing"] <= 0
     ]  # fmt: skip
-    message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
+    if short:
+        message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
     files, wrong = design_files(study, designs, {"nearest": (nearest, f"Nearest to a feasible design of {study.name}")})
     counts = {"designs": len(designs), "infeasible": len(designs)}
     tables = {part.name: part for part in (table, designs_table(designs))}
@@ -232,8 +235,8 @@ def _warnings(question: DesignsQuestion, designs: DesignSet) -> Iterator[Caution
         if len(values) > 1 and np.ptp(values) <= TIE * max(1.0, np.abs(values).max()):
             yield Caution(
                 "suspect",
-                f"all {len(values)} feasible designs tie: {goal.name} is {values[0]:.6g} in each of them; a goal of "
-                "magnitudes says abs: true",
+                f"all {len(values)} feasible designs tie: {goal.name} is {numeral(values[0])} in each of them; a goal "
+                "of magnitudes says abs: true",
                 "designs",
             )
     for goal in filter(lambda goal: goal.unassembled, designs.goals):

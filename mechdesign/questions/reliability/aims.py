@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from mechdesign.ground.expressions import Number
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.engine.problem import WIDTH
@@ -136,7 +137,7 @@ class Capable:
         return measure
 
     def in_words(self, measure: float) -> str:
-        return f"{measure:.6g}"
+        return numeral(measure)
 
     def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
         return _cpk(question, linear.shift(), linear.deviation())

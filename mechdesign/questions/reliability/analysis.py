@@ -14,6 +14,7 @@ from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Result, Table
 from mechdesign.ground.terms import command_of
 from mechdesign.ground.work.threads import keep_freed_memory, one_thread
+from mechdesign.motion.failures import failures
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.assumed import assumed
@@ -51,7 +52,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         warnings += between_poses(task, first_order(errors.at(closer)))
     if kinds_of_forces(study):
         warnings += assumed(study)
-    failures, failed = study.motion(poses).failures(task.reason)
+    failed_poses, failed = failures(study.motion(poses), task.reason)
     task = replace(
         task, settings=_settings(task, errors, solved), seed=study.seed if seed is None else seed,
         samples=section.samples, most=section.samples if "samples" in section.model_fields_set else MAX_SAMPLES,
@@ -79,14 +80,14 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     counts |= {"cycles": cycles} if cycles else {}
     if invalid:
         words = f"{invalid} of {samples} samples cannot be assembled; they count as failures"
-        failures.append(Caution("unassembled", words))
+        failed_poses.append(Caution("unassembled", words))
     named = f"{f'{cycles} whole cycles, ' * bool(cycles)}{', '.join(part.method for part in results)}"
     # Samples of the first method that samples the errors.
     sampled = next((part.sums for part in results if part.sums), {})
     built = [*tables.judged(task, results, indices), *tables.of_drawn(task, sampled)]
     result = Result(
         "reliability", study.motion(poses).of_poses(built, task.reason) | dict(allocated.tables),
-        [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
+        [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failed_poses, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files,
         f"interrupted: {samples} samples, {named}" if stopped else "",
         tables.drawn_errors(task, sampled), reached=bool(failed) or not allocated.failed, allocated=made,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Floats, evenly
 from mechdesign.mechanism.coordinates import corners_of, expressions_of
 from mechdesign.motion.corners import divide
@@ -64,11 +65,14 @@ def between_poses(task: Task, places: Task) -> list[Caution]:
     row, place = int(np.nanargmax(here)), int(np.nanargmax(there))
     if not there[place] > max(FACTOR * here[row], _SMALL):
         return []
-    why = f"{there[place]:.3g} to the first order" if places.assembled[place] else "1, as it cannot be assembled there"
+    why = "1, as it cannot be assembled there"
+    if places.assembled[place]:
+        why = f"{numeral(there[place], 3)} to the first order"
     return [Caution(
         "unconverged",
         f"between the poses, at {places.where(place)}, the probability of failure is {why}, and at the worst pose, "
-        f"{task.where(row)}, {here[row]:.3g}: pose and cycle are judged at the poses alone, so take a finer step",
+        f"{task.where(row)}, {numeral(here[row], 3)}: pose and cycle are judged at the poses alone, so take a "
+        "finer step",
         "reliability", pose=places.where(place),
     )]  # fmt: skip
 

@@ -7,6 +7,12 @@ from mechdesign.ground.results import KeyNumber, TableKind
 from mechdesign.questions.columns import GIVEN, TIMED, VALID
 from mechdesign.questions.reliability.schema.methods import METHODS
 
+
+def _rare(name: str, meaning: str, formula: str = "") -> ColumnKind:
+    """A column of the probability of what is rare."""
+    return ColumnKind(name, meaning, "", formula, tail=True)
+
+
 METHOD = ColumnKind("method", "how it was computed")
 OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")
 ORDER = ColumnKind("order", "position, velocity or acceleration; of efforts and forces 'dynamics'")
@@ -24,15 +30,16 @@ RELIABILITY = TableKind.of("reliability", "probability that the errors keep thei
     ("scope", "a pose by itself, or one made mechanism at all poses, the steps between unseen"), TIMED, GIVEN, METHOD,
     ("reliability", "probability that every limit is kept"), ("low", "lower end of its interval, <kind of interval>"),
     ("high", "upper end of its interval, <kind of interval>"),
-    ("failure", "1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it"),
-    ("failure_low", "lower end of its interval, <kind of interval>; of a cycle's bounds the worst pose's"),
-    ("failure_high", "upper end of its interval, <kind of interval>; of a cycle's bounds the poses' sum"),
-    ("error", "3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
+    _rare("failure",
+          "1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it"),
+    _rare("failure_low", "lower end of its interval, <kind of interval>; of a cycle's bounds the worst pose's"),
+    _rare("failure_high", "upper end of its interval, <kind of interval>; of a cycle's bounds the poses' sum"),
+    _rare("error", "3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
     ("samples", "samples that the value is taken from; 0: none"),
     ("invalid", "samples that cannot be assembled; they are failures"), EVALUATIONS,
     ("used", "where the value comes from: of auto, the method it used"),
     ("sigma_level", "quantile of the standard normal law, without a shift of 1.5 sigma, of the reliability", "",
-     "Phi^-1(reliability)"), ("ppm", "failures in a million", "", "1e6 failure"),
+     "Phi^-1(reliability)"), _rare("ppm", "failures in a million", "1e6 failure"),
     ("rho", "correlation of the two outputs"),
     ("valid", "1 where the nominal pose (all, of a cycle) is valid"))  # fmt: skip
 CAPABILITY = TableKind.of("capability", "process capability of each limited output",
@@ -43,9 +50,9 @@ CAPABILITY = TableKind.of("capability", "process capability of each limited outp
     ("cpk", "distance of the mean from the nearer limit over 3 sigma", "", "min(USL - mean, mean - LSL)/(3 sigma)"),
     ("sigma_level",
      "quantile of the standard normal law, without a shift of 1.5 sigma, of the share within the limits"),
-    ("ppm", "values in a million outside these limits"),
-    ("ppm_low", "lower end of its interval, 99.7 %, where samples are counted"),
-    ("ppm_high", "upper end of its interval, 99.7 %, where samples are counted"),
+    _rare("ppm", "values in a million outside these limits"),
+    _rare("ppm_low", "lower end of its interval, 99.7 %, where samples are counted"),
+    _rare("ppm_high", "upper end of its interval, 99.7 %, where samples are counted"),
     ("unit", "unit of the five columns from lsl to sigma"), VALID)  # fmt: skip
 _INTERVAL = {"": "", "_low": ", lower end of its interval, 99.7 %", "_high": ", upper end of its interval, 99.7 %"}
 _SOBOL = (
@@ -79,9 +86,10 @@ CONVERGENCE = TableKind.of("convergence", "trend of the means with the number of
     TIMED, GIVEN, ("samples", "valid samples so far"), OUTPUT, ORDER, ("mean", "their mean, in `unit`"),
     ("unit", "unit of the mean"))  # fmt: skip
 ESTIMATE = TableKind.of("estimate", "probability of failure with the number of samples",
-    TIMED, GIVEN, ("samples", "samples so far"), ("failure", "share of them that broke a limit or cannot be assembled"),
-    ("failure_low", "lower end of its interval, 99.7 %, Clopper-Pearson"),
-    ("failure_high", "upper end of its interval, 99.7 %, Clopper-Pearson"))  # fmt: skip
+    TIMED, GIVEN, ("samples", "samples so far"),
+    _rare("failure", "share of them that broke a limit or cannot be assembled"),
+    _rare("failure_low", "lower end of its interval, 99.7 %, Clopper-Pearson"),
+    _rare("failure_high", "upper end of its interval, 99.7 %, Clopper-Pearson"))  # fmt: skip
 ALLOCATION = TableKind.of("allocation", "the cheapest tolerances that reach what is asked",
     ("source", "what varies"),
     ("kind",

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import evenly
 from mechdesign.ground.progress import NULL
 from mechdesign.questions.reliability import methods
@@ -50,14 +51,14 @@ def _outside(task: Task) -> list[Caution]:
         pose, scale, unit = int(np.argmax(beyond)), task.scale[band.output], task.labels[2][band.output]
         value = scale * task.nominal[band.output, pose]
         low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
-        between = f"{low:.6g} to {high:.6g}"
+        between = f"{numeral(low)} to {numeral(high)}"
         if not np.isfinite(low) or not np.isfinite(high):
-            between = f"at least {low:.6g}" if np.isfinite(low) else f"at most {high:.6g}"
+            between = f"at least {numeral(low)}" if np.isfinite(low) else f"at most {numeral(high)}"
         several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
         cautions.append(Caution(
             "suspect",
-            f"{task.question.channels[band.output].name}: the nominal value {value:.6g} at {task.where(pose)}{several} "
-            f"lies outside its limits, {between}{f' {unit}' if unit else ''}",
+            f"{task.question.channels[band.output].name}: the nominal value {numeral(value)} at {task.where(pose)}"
+            f"{several} lies outside its limits, {between}{f' {unit}' if unit else ''}",
             pose=task.where(pose),
         ))  # fmt: skip
     return cautions
@@ -99,10 +100,13 @@ def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     }  # fmt: skip
     pose = max(apart, key=apart.__getitem__, default=-1)
     if pose >= 0 and apart[pose] > _CURVED_FACTOR:
-        what = f"the probability of failure is {first[pose].failure:.3g}", f"{other[pose].failure:.3g}"
+        what = f"the probability of failure is {numeral(first[pose].failure, 3)}", f"{numeral(other[pose].failure, 3)}"
     elif (worst := _flat(task, second)) is not None:
         output, pose, sigma, true = worst
-        what = f"the standard deviation of {task.question.channels[output].name} is {sigma:.3g}", f"{true:.3g}"
+        what = (
+            f"the standard deviation of {task.question.channels[output].name} is {numeral(sigma, 3)}",
+            f"{numeral(true, 3)}",
+        )
     else:
         return []
     return [Caution(
@@ -149,8 +153,9 @@ def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
         others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
         warnings.append(Caution(
             "disagree",
-            f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is {one.failure:.3g} by "
-            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}",
+            f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is "
+            f"{numeral(one.failure, 3)} by the one and {numeral(other.failure, 3)} by the other, "
+            f"{times_apart} apart{others}",
             "reliability", pose=task.where(pose),
         ))  # fmt: skip
     return warnings
@@ -196,7 +201,7 @@ def _unreached(results: Sequence[MethodResult], task: Task) -> list[Caution]:
         goal, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
         measure = "the coefficient of variation"
     else:
-        goal, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+        goal, there = (numeral(part, 3) for part in (precision.half_width, short[pose]))
         measure = "half the interval"
     others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
     return [Caution(
@@ -271,8 +276,8 @@ def _of_cycles(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     return warnings + [
         Caution(
             "unconverged",
-            f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at "
-            f"{last.failure:.3g}, not as precise as asked; it ends at {last.samples} made mechanisms, which "
+            f"{method}: half the interval of the whole cycle is {numeral(0.5 * (last.high - last.low), 3)} at "
+            f"{numeral(last.failure, 3)}, not as precise as asked; it ends at {last.samples} made mechanisms, which "
             "reliability.samples sets",
             "reliability",
         )

@@ -7,6 +7,7 @@ from itertools import chain
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import AssemblyError
+from mechdesign.ground.numerals import numeral
 from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.reached import Reached
@@ -97,7 +98,9 @@ def _left_out(study: Study, region: Reached) -> Caution:
     drawn = pieces is not None and pieces.drawn[0]
     one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
     many, unit = len(areas) - 1, study.units.label("area")
-    left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
+    left = (
+        f"{'another' if many == 1 else f'{many} others, together'} of area {numeral(sum(areas[1:]), 4)} {unit}".rstrip()
+    )
     return Caution(
         "incomplete",
         f"the region{region.question.where} has {len(areas)} pieces that do not hang together: indices are {one}; "
@@ -109,7 +112,7 @@ def _left_out(study: Study, region: Reached) -> Caution:
 def _in_other_assembly(study: Study, region: Reached) -> Caution:
     """That more lies in other assemblies than in the piece that is reported, with both areas."""
     unit = study.units.label("area")
-    inside, beyond = (f"{area:.3g} {unit}".rstrip() for area in (sum(region.areas[:1]), region.beyond))
+    inside, beyond = (f"{numeral(area, 3)} {unit}".rstrip() for area in (sum(region.areas[:1]), region.beyond))
     return Caution(
         "incomplete",
         f"more of the region{region.question.where} lies beyond a forward singularity or with other elbows, in another "

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import accumulate
 from typing import Any
 
 from mechdesign.ground.expressions import Expression
-from mechdesign.ground.functions import Repeated, Rise
+from mechdesign.ground.functions import Rise, Share
 from mechdesign.ground.motion_laws import LAWS
 from mechdesign.ground.notation import Called, Step, call_steps, constant_step
 from mechdesign.mechanism.elements.couplings import Coupling
@@ -43,14 +43,9 @@ def law_of(builder: Builder, name: str, segments: Sequence[Any], of: str, kind: 
     ends = {k: number(k, "to", segment.to, kind) for k, segment in enumerate(segments) if segment.to is not None}
     law = before = [*ends.values()][-1] if first is None else number(0, "from", first, kind)
     lengths = [number(k, way(segment), length(segment), over) for k, segment in enumerate(segments)]
-    along: Program = (("name", of),)
-    begins = [*accumulate(lengths, partial(_called, "+"))]
-    if repeats(segments):
-        along = _called("*", _called(Repeated(0.0, 1.0), _called("/", along, begins[-1])), begins[-1])
+    rises = _rises(segments, (("name", of),), lengths)
     for k, end in ends.items():
-        passed = along if k == 0 else _called("-", along, begins[k - 1])
-        share = _called("/", passed, lengths[k])
-        law, before = _called("+", law, _moved(segments[k].law, _called("-", end, before), share)), end
+        law, before = _called("+", law, _moved(_called("-", end, before), rises(k))), end
     return Expression(_words(segments), law, builder.units.angle_factor)
 
 
@@ -62,15 +57,37 @@ def _called(function: Called, *arguments: Program) -> Program:
     return constant_step(float(Expression("", program).evaluate({}))) if known else program
 
 
-def _moved(law: str, step: Program, share: Program) -> Program:
-    """The way of a move by a step, of which a share is passed."""
-    if not LAWS[law].falling:
-        return _called("*", step, _called(Rise(law), share))
-    parts = (
-        _called("*", _called(end, step, constant_step(0.0)), _called(Rise(law, falls), share))
-        for end, falls in (("max", False), ("min", True))
-    )
-    return _called("+", *parts)
+def _rises(segments: Sequence[Any], along: Program, lengths: Sequence[Program]) -> Callable[[int], list[Program]]:
+    """By the number of a move its rise along what is followed, and the way of a fall where that is another one.
+
+    Numbers stand in the functions themselves, and what follows parameters in their arguments. Beyond its corners, where
+    its way begins and ends, a rise goes on smoothly, as whoever integrates over time needs it.
+    """
+    again, begins = repeats(segments), [constant_step(0.0), *accumulate(lengths, partial(_called, "+"))]
+    known = all(length(segment).expression is None for segment in segments)
+    ends = [0.0, *accumulate(float(length(segment)) for segment in segments)]
+    if again and not known:
+        along = _called("*", _called(Share(period=1.0), _called("/", along, begins[-1])), begins[-1])
+
+    def rises(k: int) -> list[Program]:
+        law = segments[k].law
+        if known:
+            share = _called(Share(ends[k], ends[k + 1] - ends[k], ends[-1] if again else 0.0), along)
+        else:
+            share = _called(Share(), _called("/", _called("-", along, begins[k]), lengths[k]))
+        # Of two that are the same `min` and `max` take the slope of the one that is named first: what follows counts.
+        share = _called("min", constant_step(1.0), _called("max", share, constant_step(0.0)))
+        return [_called(Rise(law, falls), share) for falls in ((False, True) if LAWS[law].falling else (False,))]
+
+    return rises
+
+
+def _moved(step: Program, rises: Sequence[Program]) -> Program:
+    """The way of a move by a step."""
+    if len(rises) == 1:
+        return _called("*", step, rises[0])
+    ends = zip(("max", "min"), rises, strict=True)
+    return _called("+", *(_called("*", _called(end, step, constant_step(0.0)), rise) for end, rise in ends))
 
 
 def way(segment: Any) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.mechanism.elements.plates import Plates
+from mechdesign.mechanism.elements.plates import NO_CLASS, Plates
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.document import KeyPath
 
@@ -31,7 +31,8 @@ def build_plates(builder: Builder) -> Plates | None:
             name, builder.section.owners, "point", (*ROOT, "plates", "pins", name), at_key=True
         )
     }
-    plates = Plates("plates", **lengths, widths=widths, pins=pins, layers=layers)
+    general = given.general_tolerance if given is not None else NO_CLASS
+    plates = Plates("plates", **lengths, widths=widths, pins=pins, layers=layers, general_tolerance=general)
     _check_holes(builder, plates)
     return plates
 

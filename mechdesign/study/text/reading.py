@@ -18,9 +18,14 @@ from pydantic_core import PydanticCustomError
 from mechdesign.ground.errors import cut, suggestion
 from mechdesign.ground.expressions import Expression
 from mechdesign.ground.notation import ExpressionError
-from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units
+from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, kind_of
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:\s*[^\W\d].*)?")
+# A number with a unit inside an expression, where a ``*`` is a product.
+_WITH_UNIT = re.compile(
+    r"(?<![\w.])(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?![eE][-+]?\d)[A-Za-zµμ°]+(?:\^?\d)?"
+    r"(?:\s*/\s*[A-Za-zµμ°]+(?:\^?\d)?)?(?![\w(])"
+)
 # Magnitudes beyond which a number is likely a slip, as its powers would overflow: of numbers, and of lengths, which
 # are multiplied with one another more often.
 MAX_NUMBER = 1e60
@@ -49,10 +54,36 @@ class Context:
     fixed: set[str] = field(default_factory=set)
 
     def expression(self, text: str) -> Expression:
-        """Parse an expression in the study's units and note the names in it."""
-        expression = Expression.parse(text, self.units.angle_factor)
+        """Parse an expression in the study's units and note the names in it.
+
+        Raises
+        ------
+        ExpressionError
+            If it cannot be read; of one with units the message has it without them.
+        """
+        try:
+            expression = Expression.parse(text, self.units.angle_factor)
+        except ExpressionError:
+            if bare := self._without_units(text):
+                raise ExpressionError(f"an expression takes no units: write {bare}") from None
+            raise
         self.used.update(expression.names)
         return expression
+
+    def _without_units(self, text: str) -> str:
+        """``1.5 + balance (kg)`` for ``1500 g + balance``, in the study's units; empty where no number has a unit."""
+        labels: dict[str, None] = {}
+
+        def bare(part: re.Match[str]) -> str:
+            try:
+                value, kind = self.units.convert(part[0]), kind_of(part[0])
+            except QuantityError:
+                return part[0]
+            labels[self.units.label(kind) if kind else part[0].removeprefix(part["number"]).strip()] = None
+            return f"{value:.12g}"
+
+        words = _WITH_UNIT.sub(bare, text)
+        return f"{words} ({', '.join(labels)})" if labels else ""
 
 
 LOST = Amount(math.nan)

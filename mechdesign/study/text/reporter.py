@@ -36,13 +36,20 @@ _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 # Keys that are written in place of others.
 _SYNONYMS = {"min": "from", "max": "to", "from": "min", "to": "max"}
+# What no section takes, with where it is asked or why it is not.
+_ELSEWHERE = {
+    **dict.fromkeys(("spherical", "ball", "universal", "cylindrical", "helical"), "planar mechanisms only"),
+    **dict.fromkeys(("clearance", "clearances", "play", "backlash"), "play is asked under reliability: clearances"),
+}
 
 
 def unknown_key(name: str, names: Iterable[str]) -> str:
-    """Message of an unknown key, with the key that is meant the same or is most similar."""
+    """Message of an unknown key, with the key that is meant the same or is most similar, or where it is asked."""
     candidates = [*names]
     meant = _SYNONYMS.get(name)
-    return f"unknown key{suggestion(meant if meant in candidates else name, candidates)}"
+    hint = suggestion(meant if meant in candidates else name, candidates)
+    elsewhere = f"; {_ELSEWHERE[name]}" if name in _ELSEWHERE else ""
+    return f"unknown key{hint or elsewhere}"
 
 
 class Remark(NamedTuple):

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 
 from mechdesign.ground.errors import nearest
 from mechdesign.ground.expressions import Expression, Number
-from mechdesign.study.text.unit_table import Powers, listed, unit_value
+from mechdesign.ground.numerals import numeral
+from mechdesign.ground.unit_table import Powers, listed, unit_value
 
 KINDS: dict[str, Powers] = {
     "none": (0, 0, 0, 0),
@@ -236,7 +237,7 @@ def at(value: float, parameters: Mapping[str, ArrayLike]) -> Number:
 
 def written(value: float) -> str:
     """A number for a message: the quantity as written, or 12 digits."""
-    return text_of(value) or f"{value:.12g}"
+    return text_of(value) or numeral(value, 12)
 
 
 def kind_of(value: object) -> str | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.door.report.cases import RANK, best_of, short, telling_columns, text_of
+from mechdesign.door.report.cases import RANK, best_of, short, telling, text_of
 from mechdesign.door.report.page.headlines import shown
 from mechdesign.door.report.requirements import DrawnCases, Limits
 from mechdesign.ground.columns import Column
@@ -39,7 +39,7 @@ def gates(result: Result) -> dict[str, Any] | None:
             about["kept"] = f"{met.sum()} of {len(table)}"
             about["met"] = bool(met.all()) if row is None else bool(met[row])
         rows.append(about)
-    return {"best": None if best is None else str(best), "case": None if best is None else best.case, "rows": rows}
+    return {"best": None if best is None else str(best), "case": None if best is None else best.name, "rows": rows}
 
 
 def _row(table: Table, row: int | None, name: str) -> dict[str, Any]:
@@ -63,10 +63,8 @@ def _limits(bounds: Limits, column: Column) -> str:
 
 def telling_rows(table: Table) -> tuple[Table, str]:
     """The rows of a sweep's table that a page has, what is asked for in the first columns; in words which they are."""
-    first = telling_columns(table)
-    names = [*first, *(name for name in table.names if name not in first)]
-    ordered = Table(table.name, tuple(map(table.column, names)), table.meaning)
-    most = max(1, MOST_CELLS // len(names))
+    ordered = Table(table.name, tuple(telling(table)), table.meaning)
+    most = max(1, MOST_CELLS // len(ordered.columns))
     if len(table) <= most:
         return ordered, "all"
     if RANK not in table:

@@ -176,7 +176,7 @@ def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[di
     study, poses = sweep.study, sweep.poses
     columns = [Column(name, np.asarray(values), study.units.label(study.mechanism.quantity(name)))
                for name, values in poses.values.items()]  # fmt: skip
-    numbers = ShownNumbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), alike)
+    numbers = ShownNumbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), study.size, alike)
     fields = [[column.name, numbers.cell(column).unit, numbers.add(column)] for column in columns]
     share = (poses.numbers - poses.numbers[0]) / (poses.numbers[-1] - poses.numbers[0])
     return {
@@ -203,7 +203,7 @@ def _numbers(
     names = [*drawn.variables, *(goal.name for goal in drawn.goals if goal.name not in drawn.variables)]
     columns = [table.column(name) for name in names if table.column(name).numeric]
     columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in columns]
-    numbers = ShownNumbers(Table("front", tuple(columns)), rows, begin)
+    numbers = ShownNumbers(Table("front", tuple(columns)), rows, begin, drawn.study.size)
     entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
     fields = []
     for column in columns:

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.door.report.cases import RANK, best_of, short, text_of
 from mechdesign.door.report.requirements import DrawnCases
-from mechdesign.drawing.style import printed, raised
 from mechdesign.ground.columns import VARIED, Column
 from mechdesign.ground.errors import counted
+from mechdesign.ground.numerals import in_watts, numeral, printed
 from mechdesign.ground.numerics.rounding import STILL, cleared, unchanging
 from mechdesign.ground.results import KeyNumber, Result, Table
 from mechdesign.ground.rows import choose, unit_of
+from mechdesign.ground.table_text import Rounding
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
 from mechdesign.questions.optimize.columns import OPTIMUM
@@ -43,6 +43,7 @@ _ABSOLUTE, _LOWEST = ("size", "least"), ("smallest", "least")
 _MINUS = "\N{MINUS SIGN}"
 _TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
+_SHORT = 20  # letters of a name beside which its value has always room
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,7 @@ def shown(value: float) -> str:
     if not np.isfinite(value):
         return "none" if np.isnan(value) else "infinite" if value > 0 else f"{_MINUS}infinite"
     if value and not _SMALL <= abs(value) < _LARGE:
-        mantissa, power = f"{value:.{_DIGITS - 1}e}".split("e")
-        mantissa = mantissa.rstrip("0").rstrip(".").replace("-", _MINUS)
-        return f"{mantissa}\N{MIDDLE DOT}10{raised(int(power))}"
+        return numeral(value, _DIGITS).replace("-", _MINUS)
     places = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(value)))) if value else 0)
     text = f"{value:,.{places}f}".replace(",", _NARROW).replace("-", _MINUS)
     return text.rstrip("0").rstrip(".") if "." in text else text
@@ -109,7 +108,7 @@ def _of_cases(result: Result) -> Iterator[Headline]:
         row = int(np.flatnonzero(table[RANK] == 1)[0])
         more = [f"{best.equals - 1} more as good"] * (best.equals > 1)
         changes = [column for column in table.columns if column.meaning == VARIED]
-        yield Headline("best case", str(best.case), "", "; ".join([_in_words(changes, row), *more]))
+        yield Headline("best case", best.name, "", "; ".join([_in_words(changes, row), *more]))
         for name in [*DrawnCases.of(result).goals][:_MOST_GOALS]:
             yield Headline(f"{name} of the best case", shown(table[name][row]), table.column(name).unit)
         if best.front > best.equals:
@@ -137,11 +136,18 @@ def _of_front(table: Table) -> Iterator[Headline]:
 
 
 def _in_words(columns: Iterable[Column], row: int) -> str:
-    """``r = 35 mm, section = tube``; a line may be broken between the quantities only."""
+    """``r = 35 mm, section = tube``; a line may be broken between quantities, and before the value of a long name."""
     values = [(column, column.values[row].item()) for column in columns]
     words = [f"{short(column.name)} = {shown(value) if column.numeric else text_of(value)} {printed(column.unit)}"
              for column, value in values]  # fmt: skip
-    return ", ".join(word.strip().replace(" ", _TOGETHER) for word in words)
+    return ", ".join(map(_together, words))
+
+
+def _together(words: str) -> str:
+    """``name = 35 mm`` in one line, or where the name is long at least the value with its unit."""
+    name, equals, value = words.strip().partition(" = ")
+    value = f"={_TOGETHER}{value.replace(' ', _TOGETHER)}" if equals else ""
+    return f"{name} {value}".rstrip() if len(name) > _SHORT else f"{name} {value}".rstrip().replace(" ", _TOGETHER)
 
 
 def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:
@@ -167,7 +173,8 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
     valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
     finite = np.flatnonzero(np.isfinite(values) & valid)
-    if rule.row == "size" and values[finite].max(initial=0.0) <= STILL * _scale(table, column.unit, finite):
+    rounding = Rounding.of(table.columns)
+    if rule.row == "size" and values[finite].max(initial=0.0) <= rounding.still(column, column.unit):
         return
     if rule.row in ("first", "each"):
         rows = finite[: 1 if rule.row == "first" else None].tolist()
@@ -186,15 +193,21 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
         if rule.table is EXTREMES and result.tables["motion"].column(words["output"]).kind in _RATES_AND_FORCES:
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
+        still, watts = rounding.still(column, unit), in_watts(unit)
+        unit = "W" if watts else unit
+
+        def told(number: float, still: float = still, factor: float = watts or 1.0) -> str:
+            return shown(0.0 if abs(number) <= still else factor * number)
+
         name = re.sub("_(effort|power|mean)$", "", column.name)
         pair = " and ".join(name.split(".")[:-1])
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning, "pair": pair})
         low, high = (float(table[bound][row]) for bound in rule.bounds or (column.name, column.name))
         if rule.table is EXTREMES and low == high:
             # The motion has a single pose.
-            yield Headline(words["output"], shown(low), unit)
+            yield Headline(words["output"], told(low), unit)
         else:
-            notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
+            notes = [rule.interval.format(low=told(low), high=told(high))] if low < high else []
             alike = [other for other in finite.tolist() if groups[other] == groups[row]]
             constant = bool(unchanging(values[alike].min(), values[alike].max()))
             own = row, values[row], _Pose() if rule.row in ("first", "each") or constant else _pose(table, row)
@@ -202,12 +215,12 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             at = f"at {pose.words}" if pose.words else ""
             notes += [at] * bool(at)
             if rule.several and len(finite) > 1:
-                least = shown(values[finite].min())
+                least = told(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
             # What a label calls by the words of the field needs no other words.
             said = unit or rule.table is EXTREMES or "{name}" not in rule.label
             meaning = "" if said else column.meaning
-            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.coordinates, pose.place, meaning)
+            yield Headline(label, told(value), unit, "; ".join(notes), at, pose.coordinates, pose.place, meaning)
 
 
 def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, float, _Pose] | None:
@@ -236,13 +249,6 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
         for name in ([*pose] if poses.swept is None else [poses.swept])
     ]
     return row, value, _Pose(_in_words(coordinates, 0), pose, at)
-
-
-def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
-    """The largest size of a table's numbers of a unit."""
-    alike = (column.values for column in table.columns if column.numeric and column.unit == unit)
-    sizes = (np.abs(np.asarray(values, dtype=float)[rows]) for values in alike)
-    return max(float(size.max(initial=0.0, where=np.isfinite(size))) for size in sizes)
 
 
 def _pose(table: Table, row: int) -> _Pose:

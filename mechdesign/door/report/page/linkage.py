@@ -17,9 +17,9 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.path import Path
 
-from mechdesign.drawing import callouts, shapes
+from mechdesign.drawing import callouts, shapes, style
 from mechdesign.drawing.framing import fit
-from mechdesign.drawing.labels import Label, Position, net, positions, rows
+from mechdesign.drawing.labels import MOST_LETTERS, Label, Position, net, positions, rows
 from mechdesign.drawing.panels import round_down
 from mechdesign.drawing.scene import Still
 from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut, Symbol
@@ -168,6 +168,7 @@ class Sketcher:
         for label in callouts.link_labels(first, driven=True) if links else ():
             labels.append(replace(label, size=_NAME - 2, optional=False))
             owners.append((first.link_points(label.text)[0], label.text))
+        labels = [replace(label, text=style.shortened(label.text, MOST_LETTERS)) for label in labels]
 
         def anchors(scene: Still, label: Label, point: str, link: str) -> Floats:
             moved = (np.array(label.anchors) - first.points[point]) * scene.rotations[link] / first.rotations[link]

@@ -40,6 +40,7 @@ from mechdesign.drawing.scene import Scene, Still
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Reason
@@ -74,7 +75,7 @@ _ARROWS = {
     "spring": ("Springs", LOOKS["spring"].color),
     "effort": ("Drives", LOOKS["effort"].color),
     "coupling": ("Couplings", LOOKS["coupling"].color),
-    "shaking": ("Shaking force", style.PURPLE),
+    "shaking": ("Shaking force", style.SKY),
 }
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",
@@ -152,7 +153,7 @@ def _motion(
     ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
     earlier = None if before is None else _earlier(DrawnMotion.of(before.result), sweep)
     sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
-    numbers = ShownNumbers(table, sweep.rows, begin)
+    numbers = ShownNumbers(table, sweep.rows, begin, study.size)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
@@ -333,9 +334,7 @@ def _arrows(drawn: DrawnPoses, motion: PoseValues, sweep: Sweep, sheet: Canvas) 
                 shafts = [[words, at if isinstance(at, str) else _track(sheet.all(at)), _track(np.conj(vector * scale))]
                           for words, at, vector in kind.arrows]  # fmt: skip
                 layers.append({"title": title, "color": color, "on": kind.kind != "velocity", "shafts": shafts})
-        groups.append(
-            {"key": [round(length * scale, 1), f"{length:g} {style.printed(unit)}".rstrip()], "layers": layers}
-        )
+        groups.append({"key": [round(length * scale, 1), f"{length:g} {printed(unit)}".rstrip()], "layers": layers})
     return groups
 
 

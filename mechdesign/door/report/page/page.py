@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,7 +17,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from PIL import Image
 
 from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.door.report.manifest import computed_from
@@ -35,6 +33,7 @@ from mechdesign.drawing.layout import draw
 from mechdesign.drawing.mechanism import sketch_picture
 from mechdesign.drawing.scene import sketched
 from mechdesign.ground.errors import counted, explain
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.terms import path_of
 from mechdesign.ground.versions import installed
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
@@ -43,9 +42,8 @@ from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import text_of
 
-# Pixels of the drawings in an index, twice their width on the page, and the number of their colours.
+# Pixels of the drawings in an index, twice their width on the page.
 _THUMBNAIL = (240, 180)
-_FEW_COLORS = 32
 _INDENT = re.compile(r"^[ ]*(?://.*\n)?", re.MULTILINE)  # and a line of comment
 _FIRST_NUMBERS = 5  # at the top of a page
 
@@ -218,12 +216,9 @@ def thumbnail(study: Study) -> str:
             axes.set_xlim(window.middle.real - half.real, window.middle.real + half.real)
             axes.set_ylim(window.middle.imag - half.imag, window.middle.imag + half.imag)
             Posed(scene, names=False, drives=False).draw(axes)
-            drawn = Image.open(io.BytesIO(style.encoded(figure))).convert("RGB")
+            return f"data:image/png;base64,{base64.b64encode(style.encoded(figure)).decode()}"
     except Exception:
         return ""
-    stream = io.BytesIO()
-    drawn.quantize(_FEW_COLORS, dither=Image.Dither.NONE).save(stream, format="png", compress_level=style.DEFLATE_LEVEL)
-    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
 def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] = (), **content: Any) -> bytes:
@@ -233,7 +228,7 @@ def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] =
         finalize=harmless, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
-    environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
+    environment.filters |= {"printed": printed, "counted": counted, "shown": shown}
     styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
     script = "".join(_text(f"{part}.js") for part in (*parts, "page"))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]

@@ -63,7 +63,7 @@ def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
     for region, (rows, configuration) in zip(shown, solved, strict=True):
         table = _table(study, region, rows, configuration)
         begin = int(np.argmax(np.nan_to_num(table["inverse_condition"], nan=-1.0)))
-        numbers = ShownNumbers(table, np.arange(len(rows)), begin, alike)
+        numbers = ShownNumbers(table, np.arange(len(rows)), begin, study.size, alike)
         alike = alike or numbers
         entries = [(column.name, [numbers.cell(column)]) for column in table.columns]
         links = mechanism.description.links

@@ -67,7 +67,9 @@ def section(
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
         "gates": gates(result) if swept else None,
-        "tables": [_cases(table) if swept else _table(table) for table in result.tables.values()],
+        "tables": [
+            _cases(table, study.size) if swept else _table(table, study.size) for table in result.tables.values()
+        ],
         "files": list(result.files),
         "counts": plain(dict(result.counts)),
         "warnings": [*map(str, (*result.warnings, *warnings))],
@@ -90,24 +92,26 @@ def encoded(part: Mapping[str, Any]) -> bytes:
     return (json_text(part, separators=(",", ":")) + "\n").encode()
 
 
-def _table(table: Table) -> dict[str, Any]:
+def _table(table: Table, size: tuple[float, str]) -> dict[str, Any]:
     """A table that is folded; where it is long its first rows alone."""
     count = len(table)
     turned = 0 < count <= FEW_ROWS and len(table.columns) >= MANY_COLUMNS
     first = count if count <= MOST_ROWS else FIRST_ROWS
     which = "all" if first == count else f"the first {first} of"
-    return _part(table, table.take(np.arange(first)), which, turned=turned)
+    return _part(table, table.take(np.arange(first)), which, size, turned=turned)
 
 
-def _cases(table: Table) -> dict[str, Any]:
+def _cases(table: Table, size: tuple[float, str]) -> dict[str, Any]:
     """The table of a sweep, open."""
     some, which = telling_rows(table)
-    return _part(table, some, which, turned=False, opened=True)
+    return _part(table, some, which, size, turned=False, opened=True)
 
 
-def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool = False) -> dict[str, Any]:
+def _part(
+    table: Table, some: Table, which: str, size: tuple[float, str], *, turned: bool, opened: bool = False
+) -> dict[str, Any]:  # fmt: skip
     """Some rows of a table; `which`, in words. All rows and those of an open table can be sorted."""
-    texts = readable(table.seen.columns, some.columns)
+    read = readable(table.seen.columns, some.columns, size)
     return {
         "name": table.name,
         "meaning": table.meaning,
@@ -119,7 +123,9 @@ def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool =
         "sorted": not turned and len(some) > 1 and (opened or len(some) == len(table)),
         "columns": [
             {"name": column.name, "unit": column.unit, "meaning": column.meaning, "numeric": column.numeric}
-            for column in some.columns
+            for column in read
         ],
-        "cells": texts if turned else [list(row) for row in zip(*texts, strict=True)],
+        "cells": [column.cells for column in read]
+        if turned
+        else [*zip(*(column.cells for column in read), strict=True)],
     }

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from mechdesign.door.report.page.linkage import Canvas
-from mechdesign.drawing import style
 from mechdesign.ground.columns import Column
+from mechdesign.ground.numerals import reading
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Table
+from mechdesign.ground.table_text import Rounding
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
@@ -30,8 +31,6 @@ _NOTHING = "."
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
 _COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
-_ROUNDING = 1e-11  # a number that should be zero may be this part of the others of its unit
-_POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
 
 
 @dataclass(frozen=True)
@@ -77,11 +76,14 @@ class MovingPicture:
 class ShownNumbers:
     """Columns as integers in units of their last shown decimal, and the text of each in the pose that is drawn.
 
-    Those of further poses have as many decimals as `alike`, and the same units.
+    Those of further poses have as many decimals as `alike`, and the same units; `size` is that of the mechanism.
     """
 
-    def __init__(self, table: Table, rows: Ints, begin: int, alike: ShownNumbers | None = None) -> None:
+    def __init__(
+        self, table: Table, rows: Ints, begin: int, size: tuple[float, str], alike: ShownNumbers | None = None
+    ) -> None:  # fmt: skip
         self.rows, self.begin, self.alike = rows, begin, alike
+        self.rounding = Rounding.of(table.columns, size)
         self.sizes: dict[str, float] = {}
         for column in table.columns:
             if column.values.dtype.kind == "f":
@@ -95,29 +97,33 @@ class ShownNumbers:
         if column.name in self.scaled:
             return self.scaled[column.name][0]
         values = column.values[self.rows]
-        decimals, power = self._digits(column) if self.alike is None else self.alike.scaled[column.name][1:]
+        if self.alike is None:
+            decimals, power, self.units[column.name] = self._digits(column)
+        else:
+            _, decimals, power = self.alike.scaled[column.name]
+            self.units[column.name] = self.alike.units[column.name]
         self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
         self.scaled[column.name] = len(self.tracks) - 1, decimals, power
-        factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
-        self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
         return len(self.tracks) - 1
 
-    def _digits(self, column: Column) -> tuple[int, int]:
-        """Decimals of a column, and the power of ten of its unit."""
+    def _digits(self, column: Column) -> tuple[int, int, str]:
+        """Decimals of a column, the power of ten of which its numbers are multiples, and the unit that these have."""
         size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
-        if size <= _ROUNDING * max(1.0, largest):
+        still = self.rounding.still(column, column.unit)
+        if size <= still:
             # A column that is constant up to rounding gets as many digits as the columns that vary.
-            size = largest if largest > _ROUNDING else 1.0
-        power = math.floor(math.log10(size))
-        power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
-        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power
+            size = largest if largest > still else 1.0
+        power, unit = reading(size, column.unit)
+        unit = f"\N{MULTIPLICATION SIGN}{unit}" if unit.startswith("10") else unit
+        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power, unit
 
     def cell(self, column: Column) -> Cell:
         """The column's number in the pose drawn."""
         which = self.add(column)
         _, decimals, power = self.scaled[column.name]
         value = float(column.values[self.rows[self.begin]])
-        text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
+        # Adding zero turns -0.0 into 0.0.
+        text = f"{round(value / 10.0**power, decimals) + 0.0:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
         return Cell(which, text, self.units[column.name])
 
 

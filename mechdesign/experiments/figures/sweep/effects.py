@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ from mechdesign.experiments.figures.sweep.quantities import (
     MOST_DRAWN,
     MOST_VALUES,
     CaseAxis,
+    CaseNames,
     kinds_of,
     left_out,
     limit_marks,
+    names_of,
     sample,
     without_number,
 )
@@ -53,11 +56,12 @@ def main_effects(view: CasesView) -> Picture | None:
     panels: list[Panel | None] = []
     for block in blocks:
         for number in down:
-            panels += [_effect(entry, number) for entry in block] + [None] * (columns - len(block))
+            panels += [_effect(entry, number, names_of(view.table, entry, number) if alone else [])
+                       for entry in block] + [None] * (columns - len(block))  # fmt: skip
     return Picture(title, panels, across=columns, share="grid" if len(blocks) == 1 else "")
 
 
-def _effect(entry: CaseAxis, number: CaseAxis) -> Panel:
+def _effect(entry: CaseAxis, number: CaseAxis, names: Sequence[CaseNames]) -> Panel:
     """Mean and range of a result over the cases of each value of an entry."""
     groups = [(x, number.values[which & np.isfinite(number.values)]) for x, which in entry.groups()]
     groups = [(x, values) for x, values in groups if values.size]
@@ -67,7 +71,7 @@ def _effect(entry: CaseAxis, number: CaseAxis) -> Panel:
     dots = {"color": style.BLUE, "markersize": 3 if style.narrow() else 4, "linewidth": 1.2, "zorder": 3,
             "linestyle": "none" if entry.words else "-"}  # fmt: skip
     marks = [*limit_marks(number), Own(lambda axes: axes.vlines(places, low, high, **bars)),
-             Dots(places, [values.mean() for _, values in groups], look=dots)]  # fmt: skip
+             Dots(places, [values.mean() for _, values in groups], look=dots), *names]  # fmt: skip
     return Panel(marks, entry.axis, number.axis)
 
 
@@ -86,8 +90,8 @@ def scatter(view: CasesView) -> Picture | None:
     limits = "; grey: not met" if any(axis.limits for axis in taken) else ""
     omitted = left_out(entries, taken, "entry") + left_out(results, taken, "result")
     panels = [
-        Panel([*limit_marks(x, "x"), *limit_marks(y), *(kind.dots(x, y, drawn, size) for kind in kinds)],
-              x.axis, y.axis)
+        Panel([*limit_marks(x, "x"), *limit_marks(y), *(kind.dots(x, y, drawn, size) for kind in kinds),
+               *names_of(table, x, y)], x.axis, y.axis)
         if column <= row else None
         for row, y in enumerate(taken[1:]) for column, x in enumerate(taken[:-1])
     ]  # fmt: skip

@@ -22,11 +22,13 @@ from mechdesign.experiments.figures.sweep.quantities import (
     CaseAxis,
     kinds_of,
     left_out,
+    names_of,
     number_text,
     sample,
     without_number,
 )
 from mechdesign.experiments.figures.sweep.view import CasesView
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Floats
 
 # Entries of which every two have a map, and maps of a picture, also where none have room side by side.
@@ -77,6 +79,7 @@ def response(view: CasesView) -> Picture | None:
                 Contours([(*np.meshgrid(*plane.fine), np.ma.masked_invalid(field))], norm, everywhere=same),
                 *(_gate_marks(plane, gates[place]) if gates else ()),
                 *(kind.dots(plane.x, plane.y, drawn, size) for kind in kinds),
+                *names_of(table, plane.x, plane.y),
                 *(Trace([], [], label=_limits_in_words(axis), look={"color": style.INK, "linestyle": _dashes(j),
                                                                   "linewidth": 1.4})
                   for j, axis in enumerate(limited) if any(gate.crossed(j) for gate in gates)),
@@ -130,4 +133,4 @@ def _dashes(k: int) -> Any:
 def _limits_in_words(limited: CaseAxis) -> str:
     limits = [("at least", limited.low), ("at most", limited.high)]
     words = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
-    return f"{limited.name} {words} {style.printed(limited.unit)}".rstrip()
+    return f"{limited.name} {words} {printed(limited.unit)}".rstrip()

@@ -8,12 +8,16 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from mechdesign.door.report.cases import FRONT, RANK, best_of, short
 from mechdesign.drawing import style
-from mechdesign.drawing.marks import Axis, Dots, Lines, PanelMark, Zone
+from mechdesign.drawing.drawing import write
+from mechdesign.drawing.labels import Label
+from mechdesign.drawing.marks import Axis, Dots, LateMark, Lines, PanelMark, Zone
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import counted, cut
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.ground.results import Table
 from mechdesign.study.text.units import Amount
@@ -31,6 +35,8 @@ MOST_DRAWN, MOST_OVER_MAP = 5000, 800
 _GOLDEN = 0.5 * (5**0.5 - 1)
 _STAR, _DOT, _SMALL_DOT = 11.0, 4.0, 2.2  # points
 _FEW_DOTS = 400
+LABEL = "label"  # column of the names of cases
+MOST_LABELLED, MOST_IN_LABEL = 30, 20  # cases, letters
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +123,30 @@ class CaseKind:
         return Dots(x.values[rows], y.values[rows], label=self.words, look=look)
 
 
+@dataclass(frozen=True, eq=False)
+class CaseNames(LateMark):
+    """Labels of cases at their places, as far as there is room."""
+
+    x: Floats
+    y: Floats
+    names: Sequence[str]
+
+    def draw(self, axes: Axes) -> None:
+        named = [(name, complex(x, y)) for name, x, y in zip(self.names, self.x, self.y, strict=True)]
+        write(axes, [Label(cut(name, MOST_IN_LABEL), (place,), style.INK, 5.0, None, 7.5, optional=True)
+                     for name, place in named if name and np.isfinite(place)])  # fmt: skip
+
+
+def names_of(table: Table, x: CaseAxis, y: CaseAxis) -> list[CaseNames]:
+    """The labels of the cases of a file; of more than `MOST_LABELLED` those of the best."""
+    if LABEL not in table:
+        return []
+    rows = np.arange(len(table))
+    if len(table) > MOST_LABELLED:
+        rows = np.flatnonzero(table[RANK] == 1)[:MOST_LABELLED] if RANK in table else rows[:0]
+    return [CaseNames(x.values[rows], y.values[rows], table[LABEL][rows].tolist())]
+
+
 def kinds_of(table: Table, *, required: bool) -> list[CaseKind]:
     """Cases by how they ended, and where they are ranked those on the front and the best, the better ones on top."""
     codes = table["exit_code"]
@@ -163,7 +193,7 @@ def limit_marks(of: CaseAxis, at: Literal["x", "y"] = "y") -> Iterator[PanelMark
 
 
 def number_text(value: float) -> str:
-    return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
+    return numeral(value).replace("-", "\N{MINUS SIGN}")
 
 
 def left_out(all_of: Sequence[CaseAxis], shown: Sequence[CaseAxis], noun: str) -> str:

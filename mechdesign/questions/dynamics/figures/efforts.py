@@ -68,6 +68,6 @@ def _panel(view: DynamicsView, name: str, over: Along) -> Panel:
     marks.append(Lines([mean], label="mean", look=_MEAN))
     words = (
         f"peak {quantity(value, unit)} at {place_in_words(view.study, over, place)}, "
-        f"rms {quantity(rms, unit)}, mean {quantity(mean, unit)}"
+        f"rms {quantity(rms, unit, size)}, mean {quantity(mean, unit, size)}"
     )
     return Panel(marks, over.axis, Axis(kind, unit), f"{drive}: {words}")

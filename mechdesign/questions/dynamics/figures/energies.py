@@ -31,8 +31,10 @@ def energies_picture(view: DynamicsView) -> Picture | None:
     if not curves:
         return None
     unit = view.study.units.label("moment")
-    notes = [f"{kind} from {quantity(float(np.nanmin(values)), unit)} to {quantity(float(np.nanmax(values)), unit)}"
-             for kind, values in curves.items()]  # fmt: skip
+    most = max(float(np.nanmax(np.abs(values))) for values in curves.values())
+    ends = {kind: [quantity(float(end(values)), unit, most) for end in (np.nanmin, np.nanmax)]
+            for kind, values in curves.items()}  # fmt: skip
+    notes = [f"{kind} from {low} to {high}" for kind, (low, high) in ends.items()]
     if several := len(curves) > 1:
         curves["sum"] = np.sum([*curves.values()], axis=0)
     broken = "forward" in view.result.tables

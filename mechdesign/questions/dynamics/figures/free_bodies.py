@@ -22,6 +22,7 @@ from mechdesign.drawing.panels import quantity, round_down
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Still, pose
 from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.rounding import STILL
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.joint_contacts import PIN
@@ -78,7 +79,7 @@ def free_bodies_picture(view: DynamicsView) -> Picture | None:
     shown = {name: mine for name, mine in bodies.items() if name in held}
     unit, row = view.study.units.label("force"), int(drawn.shown.rows[index])
     where = pose_in_words(view.study, view.poses, row, 4)
-    words = f"Forces on the links [{style.printed(unit)}] at {where}" + ", where a joint bears most" * (not everywhere)
+    words = f"Forces on the links [{printed(unit)}] at {where}" + ", where a joint bears most" * (not everywhere)
     words += f"; of {len(bodies)} links those {len(shown)} with the largest forces" * (len(shown) < len(bodies))
     whole, centers = shapes.mechanism_shapes(scene), mass_centers(view.study, drawn.shown.configuration, index)
     outside = _telling([action for action in acting if action.link != GROUND and _outside(action, acting)], rounding)
@@ -139,7 +140,8 @@ def _outside(action: Action, acting: Sequence[Action]) -> bool:
     """Whether it comes from outside of the moving links: not from what acts between them alone."""
     if action.kind not in ("joint", "spring", "effort", "coupling"):
         return True
-    return any(other.link == GROUND and (other.kind, other.name) == (action.kind, action.name) for other in acting)
+    same = [other for other in acting if (other.link, other.kind, other.name) == (GROUND, action.kind, action.name)]
+    return any(own.size > LEAST * action.size or abs(own.moment) > LEAST * abs(action.moment) for own in same)
 
 
 def _alone(scene: Still, name: str, whole: Sequence[Shape]) -> list[Shape]:

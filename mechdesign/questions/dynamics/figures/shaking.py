@@ -24,7 +24,7 @@ def shaking_picture(view: DynamicsView) -> Picture | None:
 
     def words(name: str, kind: str, meaning: str) -> str:
         row = extremes.take(extremes.where(output=name))
-        most, rms = (quantity(float(row[key][0]), units.label(kind)) for key in ("peak", "rms"))
+        most, rms = (quantity(float(row[key][0]), units.label(kind), float(row["peak"][0])) for key in ("peak", "rms"))
         return f"Shaking {meaning}\nat most {most}, rms {rms}"
 
     panels = []

@@ -51,7 +51,7 @@ def centrodes_picture(view: MotionView) -> Picture | None:
         marks, shows = list[PanelMark](), [sweep.extent]
         for path, words, (color, dashes) in zip(pair[-2:], ("fixed", "moving"), _LOOKS, strict=True):
             broken = np.where(leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
-            look = {"color": color, "linestyle": dashes, "linewidth": 1.5, "zorder": 2.75}
+            look = {"color": color, "linestyle": dashes, "linewidth": 1.5, "zorder": 4.7}  # above the links
             marks.append(Trace(broken.real, broken.imag, label=f"{words} centrode", look=look))
             shows.append(path[np.abs(path - middle) <= _NEAR * max(sides)])
         marks += [Dots([pair.centre.real], [pair.centre.imag], label="instant centre", look=centre_look()),

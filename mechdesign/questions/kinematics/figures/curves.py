@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
 from mechdesign.drawing.layout import fitting_rows
-from mechdesign.drawing.legends import fitting
+from mechdesign.drawing.legends import fitting, legend_names
 from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
 from mechdesign.drawing.overlay import DASHES, both_named
 from mechdesign.drawing.panels import Along, abscissa, moving_names, times
@@ -24,7 +24,7 @@ from mechdesign.mechanism.plates import CLEARANCE
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
-from mechdesign.study import Study, Units
+from mechdesign.study import Study
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12
@@ -43,7 +43,6 @@ _AROUND = 0.05  # part of the range beyond it
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
-_LEGEND_LETTERS = 26  # of the longest name in a legend
 
 
 class _Curve(NamedTuple):
@@ -62,8 +61,7 @@ class _Curve(NamedTuple):
     @property
     def label(self) -> str:
         """Its name in a legend."""
-        name = ", ".join((self.of, *self.same))
-        return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        return ", ".join((self.of, *self.same))
 
 
 class _Group(NamedTuple):
@@ -76,7 +74,7 @@ class _Group(NamedTuple):
     @property
     def rows(self) -> int:
         """Rows of its legend where that stands above it, on a narrow page."""
-        names = [curve.label for curve in self.curves]
+        names = legend_names([curve.label for curve in self.curves])
         return -(-len(names) // fitting(names)) + bool(self.left_out) if style.narrow() else 0
 
 
@@ -114,7 +112,7 @@ def motion_curves(
         )
     common += both_named(before)
     colors: dict[tuple[str, str], str] = {}
-    panels = [_panel(group, axis, over, study.units, colors, before, common) for group in shown]
+    panels = [_panel(group, axis, over, study, colors, before, common) for group in shown]
     return Picture("", panels, share="x")
 
 
@@ -251,7 +249,7 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
 
 
 def _panel(
-    group: _Group, axis: Axis, over: Along, units: Units, colors: dict[tuple[str, str], str], before: Before | None,
+    group: _Group, axis: Axis, over: Along, study: Study, colors: dict[tuple[str, str], str], before: Before | None,
     common: Sequence[PanelMark],
 ) -> Panel:  # fmt: skip
     """The curves of a group and those of the study before; notes the colour of each."""
@@ -285,12 +283,19 @@ def _panel(
             if curve.column.name in earlier:
                 earlier_look = {"color": color, "linestyle": DASHES, "linewidth": 1.1, "zorder": 1.9}
                 marks.append(Trace(places, earlier[curve.column.name], look=earlier_look))
-    title = first.order.replace("_", " ")
-    if title == "position":
-        kinds = {units.label("angle"): "angle", units.label("length"): "position"}
-        title = kinds.get(first.column.unit, "value")
     more = f"and {group.left_out} more" if group.left_out else ""
-    return Panel(marks, axis, Axis(title, first.column.unit, ends=ends), legend="beside", heading=more)
+    return Panel(marks, axis, Axis(_title(group, study), first.column.unit, ends=ends), legend="beside", heading=more)
+
+
+def _title(group: _Group, study: Study) -> str:
+    """What a panel shows: a kind of quantity, and measures by their names."""
+    first, names = group.curves[0], [curve.of for curve in group.curves]
+    measures = [name for name in names if name in study.mechanism.description.measures]
+    if first.order == "position":
+        kinds = {study.units.label("angle"): "angle", study.units.label("length"): "position"}
+        return ", ".join([kinds.get(first.column.unit, "value")] * (len(measures) < len(names)) + measures)
+    kind = first.order.replace("_", " ")
+    return kind if len(measures) < len(names) else f"{kind} of {', '.join(measures)}"
 
 
 def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:

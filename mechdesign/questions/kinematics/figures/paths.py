@@ -241,12 +241,14 @@ def modes_picture(view: MotionView) -> Picture | None:
     moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
     notes = [f"{len(shown)} of {moving} assemblies"] * (moving > len(shown))
     notes += [f"{count - moving} of {count} assemblies have no valid pose"] * (count > moving)
-    return Picture("Assemblies", [drawn_panel(sweep, title) for title, sweep in shown], ["; ".join(notes)],
-                   across=_MAX_COLUMNS, share="xy")  # fmt: skip
+    panels = [drawn_panel(sweep, title, names=True) for title, sweep in shown]
+    return Picture("Assemblies", panels, ["; ".join(notes)], across=_MAX_COLUMNS, share="xy")
 
 
-def drawn_panel(sweep: Sweep, title: str, more: Sequence[PanelMark] = (), *, followed: bool = False) -> Panel:
-    """The first valid pose without names, and the paths of its points, if it moves, beside others on one scale."""
+def drawn_panel(
+    sweep: Sweep, title: str, more: Sequence[PanelMark] = (), *, names: bool = False, followed: bool = False
+) -> Panel:
+    """The first valid pose, and the paths of its points, if it moves, beside others on one scale."""
     paths = path_marks(sweep, 0.8) if sweep.poses.followed else ()
-    posed = Posed(sweep.first, names=False, drives=False)
+    posed = Posed(sweep.first, names=names, drives=False)
     return drawn_plane([*paths, *more, posed], sweep.extent, sweep.study, title, followed=followed)

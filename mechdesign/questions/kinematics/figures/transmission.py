@@ -140,11 +140,11 @@ def _advantage(over: Along, values: Floats, unit: str, toggles: Floats, title: s
     marks: list[PanelMark] = [Trace(*_towards(x, sizes, places), look=blue)]
     marks.append(Lines(places, "x", look={"color": style.VERMILION, "linestyle": (0, (6, 3)), "linewidth": 1.2}))
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    for place in places.tolist():
+    for k, place in enumerate(places.tolist()):
         right = place > float(np.mean([x.min(), x.max()]))
         look = {"ha": "right" if right else "left", "va": "top", "fontsize": 9, "color": style.VERMILION}
-        marks.append(Words(place, 0.96, f"beyond bounds at {over.value(place)}", (-5 if right else 5, 0), "y",
-                           look=look | {"path_effects": halo}))  # fmt: skip
+        marks.append(Words(place, 0.96 - 0.1 * (k % 2), f"beyond bounds at {over.value(place)}",
+                           (-5 if right else 5, 0), "y", look=look | {"path_effects": halo}))  # fmt: skip
     axis = Axis("size of the mechanical advantage", unit, "log", (float(finite.min()) / 1.5, float(finite.max()) * 1.5))
     return Panel(marks, over.axis, axis, title, size=1.4)
 

@@ -10,6 +10,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis
 from mechdesign.ground.errors import counted
+from mechdesign.ground.numerals import in_powers, numeral, printed
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.judge import DesignSet
@@ -24,7 +25,7 @@ MAX_TICKS = 8  # of an axis with a number at each choice
 
 def listed(designs: DesignSet, design: Design) -> list[str]:
     """``l_a = 1 mm`` for each variable of a design."""
-    return [f"{name} = {value_text(value)} {style.printed(designs.unit_of(name))}".rstrip()
+    return [f"{name} = {value_text(value)} {printed(designs.unit_of(name))}".rstrip()
             for name, value in design.items()]  # fmt: skip
 
 
@@ -32,7 +33,9 @@ def value_text(value: float | str) -> str:
     """A value of a variable or a goal in words, where it is very small or large with a power of ten."""
     if isinstance(value, str):
         return value
-    return f"{value:.4g}" if value == 0 or 1e-4 <= abs(value) < 1e6 else style.in_powers(value)
+    if value and not 1e-4 <= abs(value) < 1e6:
+        return in_powers(value)
+    return numeral(value, 4 if abs(value) < 1e4 else 6)
 
 
 def quantity_axis(designs: DesignSet, name: str, **options: Any) -> Axis:

@@ -10,6 +10,7 @@ import numpy as np
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.figures.designs import FEW, GREY_DOTS, listed
 from mechdesign.questions.optimize.figures.view import DesignsView
@@ -98,6 +99,6 @@ def chosen(designs: DesignSet, front: Table, row: int) -> dict[str, float | str]
 def described(designs: DesignSet, front: Table, name: str, row: int) -> str:
     """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
     lines = listed(designs, chosen(designs, front, row))
-    lines += [f"{goal.column} = {front[goal.name][row]:.3g} {style.printed(designs.unit_of(goal.name))}"
+    lines += [f"{goal.column} = {numeral(front[goal.name][row], 3)} {printed(designs.unit_of(goal.name))}"
               for goal in designs.goals]  # fmt: skip
     return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])

@@ -11,7 +11,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.drawing import Posed
 from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.mechanism import sketch_and_first_pose
-from mechdesign.drawing.panels import MAX_PANELS, Along, abscissa, drawn_plane
+from mechdesign.drawing.panels import MAX_PANELS, Along, abscissa, drawn_plane, quantity
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
@@ -160,8 +160,9 @@ def _over_poses(over: Along, shown: Sequence[Reached]) -> Iterator[Panel]:
             dashed = {"color": style.VERMILION, "linestyle": (0, (5, 2)), "linewidth": 2.4}
             marks = [Trace(over.values, curve.values - curve.error, label="wanted", look=dashed),
                      Trace(over.values, curve.values, label="reached", look=blue | {"linewidth": 1.2})]  # fmt: skip
-            yield Panel(marks, over.wider, Axis("value", curve.unit), curve.output)
-        words = f"{curve.output}: reached less wanted, at most {curve.worst:.3g} {curve.unit}".rstrip()
+            yield Panel(marks, over.wider, Axis(curve.output, curve.unit))
+        worst = quantity(curve.worst, curve.unit).rstrip()
+        words = f"{curve.output}: reached less wanted, at most {worst}"
         zero = Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})
         yield Panel([zero, Trace(over.values, curve.error, look=blue)], over.wider, Axis("error", curve.unit), words)
 

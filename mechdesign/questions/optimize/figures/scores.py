@@ -27,6 +27,7 @@ from mechdesign.drawing.marks import (
     Words,
 )
 from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.figures.designs import (
@@ -198,7 +199,7 @@ def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> 
     near = usual(z, smallest=smallest)
     norm: Normalize = Normalize(z[near].min(), z[near].max())
     levels, extend = round_levels(z[near].min(), z[near].max(), MAP_LEVELS), "neither"
-    digits = FuncFormatter(lambda value, _: f"{value:.3g}")
+    digits = FuncFormatter(lambda value, _: numeral(value, 3))
     if _steep(z) and len(designs.goals) == 1:
         levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
     elif not near.all():

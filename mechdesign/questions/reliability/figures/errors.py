@@ -20,6 +20,7 @@ from mechdesign.drawing.looks import (
 from mechdesign.drawing.marks import Area, Axis, Dots, Lines, Panel, PanelMark, Picture, Trace, Words, Zone
 from mechdesign.drawing.panels import MAX_PANELS, Along, maps, number
 from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.questions.poses import pose_in_words
@@ -81,7 +82,7 @@ def _band(
             marks.append(Trace(x, near, label="limit of the error", look=_LIMIT))
         elif len(beyond := limit[np.isfinite(limit)]):
             far.append(" to ".join(dict.fromkeys(f"{end:+g}" for end in (beyond.min(), beyond.max()))))
-    words = f"limit {', '.join(far)} {style.printed(unit)}, outside" if far else ""
+    words = f"limit {', '.join(far)} {printed(unit)}, outside" if far else ""
     return Panel(marks, swept.axis, Axis("error", unit), heading(output, order), words)
 
 

@@ -18,6 +18,7 @@ from mechdesign.drawing.panels import drawn_plane, quantity, round_down
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Scene, Still, hull, pose
 from mechdesign.drawing.shapes import Shape
+from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.questions.poses import pose_in_words
@@ -87,7 +88,7 @@ def deflections_picture(view: StiffnessView) -> Picture | None:
         size = quantity(float(abs(shapes[0][1][0, k])), length)
         shows = np.concatenate([scene.places, *(line for lines in bent for line in lines)])
         panels.append(drawn_plane(marks, shows, study, f"{words[k]}\n{name} moves {size}"))
-    title = f"Deflections, drawn {scale:g} times as large, at {pose_in_words(study, view.poses, drawn.row)}"
+    title = f"Deflections, drawn {numeral(scale)} times as large, at {pose_in_words(study, view.poses, drawn.row)}"
     return Picture(title, panels, across=2, share="xy")
 
 
@@ -201,16 +202,17 @@ def directions_picture(view: StiffnessView) -> Picture | None:
         ]
         title = pose_in_words(study, shown.poses, row, 4)
         angle = float(table["k_angle"][row]) * study.units.angle_factor
+        stiffest = float(table["k_max"][row])
         for name, adjective, turn, color, dashes in _MAIN_AXES:
             stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
             line = at + scale / stiff * way * np.array([-1, 1])
             look = {"color": color, "linestyle": dashes, "linewidth": 1.8, "zorder": 5.2}
             marks.append(Trace(line.real, line.imag, label=f"{adjective} direction, {name}", look=look))
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
-            title += f"\n{adjective} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}"
-        title += f"\ndrawn {scale / force:g} times as large"
+            title += f"\n{adjective} {quantity(stiff, units[0], stiffest)} at {toward:.3g} {units[1]}"
+        title += f"\ndrawn {numeral(scale / force)} times as large"
         panels.append(drawn_plane(marks, np.append(scene.places, edge), study, title))
-    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    words = f"{numeral(force)} {printed(study.units.label('force'))}"
     heading = f"Ellipse: where a force of {words} in any direction moves {section.at}"
     return Picture(heading, panels, across=2, share="xy")
 

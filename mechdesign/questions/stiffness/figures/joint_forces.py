@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechdesign.drawing import style
 from mechdesign.drawing.joints import (
     MAX_JOINTS,
     NOTHING,
@@ -17,6 +16,7 @@ from mechdesign.drawing.joints import (
 from mechdesign.drawing.marks import Picture
 from mechdesign.drawing.pictures import picture
 from mechdesign.ground.expressions import Expression
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.results import Table
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -99,4 +99,4 @@ def _numbered(load: Load) -> Iterator[tuple[int, Quantity, str]]:
 def _in_words(study: Study, quantity: Quantity, kind: str) -> str:
     if isinstance(quantity, Expression):
         return quantity.text
-    return f"{quantity:g} {style.printed(study.units.label(kind))}"
+    return f"{quantity:g} {printed(study.units.label(kind))}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,23 +13,20 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
 from mechdesign.drawing.drawing import Posed, write
-from mechdesign.drawing.labels import HALO, Label
-from mechdesign.drawing.marks import Axis, Late, Lines, Own, Panel, PanelMark, Picture, Trace, Words
+from mechdesign.drawing.labels import Label
+from mechdesign.drawing.marks import Late, Own, PanelMark, Picture
 from mechdesign.drawing.overlay import both_named, line_mark, posed_before
-from mechdesign.drawing.panels import MAX_PANELS, Along
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Scene, pose, sketched
-from mechdesign.ground.numerics.arrays import Complexes, evenly
+from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.ground.results import Table
 from mechdesign.mechanism import Configuration
-from mechdesign.motion.motion import in_study_units
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
     Region,
     fill,
     left_out,
     lines,
-    panel_titles,
     pieces,
     places,
     region_marks,
@@ -40,17 +36,9 @@ from mechdesign.questions.workspace.figures.regions import (
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
 from mechdesign.questions.workspace.schema import WorkspaceSection
-from mechdesign.questions.workspace.tables import curves
 from mechdesign.region.regions import regions
 from mechdesign.study import Study
 
-SIDES = ("inner", "outer")
-# Of the drives.
-LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
-DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
-_LIMIT = {"color": style.INK, "linewidth": 0.9, "zorder": 1.5}
-_LETTERS = 55  # of the title of a panel of drives
-_TOGETHER = 0.09  # of its height, between limits whose names do not touch
 _NEAR_SHAPE = 3.0  # points from an inscribed shape to its size in words
 
 
@@ -162,63 +150,6 @@ def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Lab
             text = words.strip() + ", a singularity inside" * (name in cut)
             made.append((shape, Label(text, anchors, color, _NEAR_SHAPE, math.pi / 2, 9.0)))
     return made
-
-
-@picture(WorkspaceView, "drives", order=60)
-def drives_picture(view: WorkspaceView) -> Picture | None:
-    """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
-    study, names = view.study, view.study.mechanism.drives
-    every = [(region.boundary, side, region.title) for region in view.regions for side in SIDES
-             if (region.boundary["side"] == side).any()]  # fmt: skip
-    if not every:
-        return None
-    parts = [every[k] for k in evenly(len(every), MAX_PANELS)]
-    words = [", ".join(filter(None, (where, f"{side} boundary"))) for _, side, where in parts]
-    titles, held = panel_titles(words, _LETTERS)
-    notes = [f"panels: values of {held}"] * bool(held)
-    notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
-    units = {study.units.label(study.mechanism.quantity(name)) for name in names}
-    drive = Axis("drive", "".join(units) if len(units) == 1 else "")
-    angles = np.concatenate([boundary["theta"] for boundary, *_ in parts])
-    angle = Along(angles, style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle")))
-    limits, panels = _drive_limits(study), []
-    for (boundary, side, _), title in zip(parts, titles, strict=True):
-        rows = [rows for rows in curves(boundary) if boundary["side"][rows[0]] == side]
-        own = {name: np.concatenate([np.append(boundary[name][part], np.nan) for part in rows])
-               for name in ("theta", *names)}  # fmt: skip
-        marks: list[PanelMark] = [
-            Trace(own["theta"], own[name], label=name, look={"color": LINE_COLORS[k % len(LINE_COLORS)],
-                  "linestyle": DASHES[k % len(DASHES)], "linewidth": 1.9})
-            for k, name in enumerate(names)
-        ]  # fmt: skip
-        marks.append(Lines([*limits], label="limit of a drive", look=_LIMIT))
-        reach = np.ptp([*limits, *(end(own[name]) for name in names for end in (np.nanmin, np.nanmax))])
-        marks += [Words(1, height, ", ".join(limited), (-2, 1.5), "x", look={"ha": "right", "path_effects": HALO})
-                  for height, limited in _together(limits, _TOGETHER * float(reach))]  # fmt: skip
-        panels.append(Panel(marks, angle.axis, drive, title))
-    return Picture("Drives along the boundary of the workspace", panels, ("; ".join(notes),), share="x")
-
-
-def _drive_limits(study: Study) -> dict[float, list[str]]:
-    """Limits of the drives and whose they are."""
-    limits: dict[float, list[str]] = {}
-    for bound in study.mechanism.bounds:
-        for end in bound.ends(study.mechanism.nominal) if bound.drive else ():
-            if end is not None:
-                value = round(float(np.asarray(in_study_units(study.units, bound.coordinate, end))), 9)
-                limits.setdefault(value, []).append(bound.coordinate.name)
-    return limits
-
-
-def _together(limits: Mapping[float, Sequence[str]], near: float) -> list[tuple[float, list[str]]]:
-    """Limits and whose they are; of those nearer to each other than a distance the highest, and the names of all."""
-    groups: list[tuple[float, list[str]]] = []
-    for limit in sorted(limits, reverse=True):
-        if groups and groups[-1][0] - limit < near:
-            groups[-1][1].extend(name for name in limits[limit] if name not in groups[-1][1])
-        else:
-            groups.append((limit, list(limits[limit])))
-    return groups
 
 
 def marks_before(before: Before | None, held: Mapping[str, float] | None = None) -> list[PanelMark]:

@@ -14,6 +14,7 @@ from mechdesign.drawing.framing import extent
 from mechdesign.drawing.marks import Own, PanelMark, Picture, Trace
 from mechdesign.drawing.panels import quantity, round_down
 from mechdesign.drawing.pictures import picture
+from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.regions import fill, region_marks, region_picture, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
@@ -84,7 +85,7 @@ def _lines(edges: list[Floats], widths: list[float], look: dict[str, Any], axes:
 
 def _one(unit: str) -> str:
     """One of a unit: 1 mm/s, 1/s."""
-    return style.printed(unit if unit.startswith("1/") else f"1 {unit}")
+    return printed(unit if unit.startswith("1/") else f"1 {unit}")
 
 
 def _scale(half: Floats, spacing: float) -> tuple[float, float, float]:

@@ -22,6 +22,7 @@ from mechdesign.drawing.marks import Coloured, Late, Own, PanelMark, Picture
 from mechdesign.drawing.panels import node_areas, quantile, quantity
 from mechdesign.drawing.pictures import picture
 from mechdesign.ground.indices import INDEX_NAMES, index
+from mechdesign.ground.numerals import power
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.regions import (
     Region,
@@ -172,7 +173,7 @@ def label_levels(
         z = x + 1j * y
         edge = np.concatenate([edge, z[0], z[-1], z[:, 0], z[:, -1]])
     blocked = _on_paper(axes, edge)
-    ten = 10.0 ** style.power(float(np.abs(norm.boundaries).max()))
+    ten = 10.0 ** power(float(np.abs(norm.boundaries).max()))
     lines = [[_on_paper(axes, part) for part in parts] for parts in drawn]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
@@ -194,9 +195,10 @@ def label_levels(
         back = colormaps[style.COLORMAP](norm(level))
         # A place of the drawing, not of the page, whose layout may still change.
         axes.text(
-            anchors[best].real, anchors[best].imag, f"{level / ten:.6g}", fontsize=7.5, ha="center", va="center",
-            rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
-            zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
+            anchors[best].real, anchors[best].imag, f"{level / ten:.6g}", fontsize=style.small(), ha="center",
+            va="center", rotation=(turn + 90) % 180 - 90, rotation_mode="anchor",
+            color="white" if norm(level) < 140 else style.INK, zorder=3.5,
+            path_effects=[withStroke(linewidth=2.5, foreground=back)],
         )  # fmt: skip
 
 

@@ -17,7 +17,8 @@ from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import sketched
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Table
-from mechdesign.questions.workspace.figures.boundary import DASHES, marks_before, places_before
+from mechdesign.questions.workspace.figures.boundary import marks_before, places_before
+from mechdesign.questions.workspace.figures.drives import DASHES
 from mechdesign.questions.workspace.figures.regions import coloured, pieces, places, region_picture
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.schema import WorkspaceSection

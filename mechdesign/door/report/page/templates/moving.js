@@ -4,6 +4,7 @@
   const PLACES = 20, TURNS = 100, TIMES = 10000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
+  const ROW_POSES = 60; // of a workspace, through which it goes in that time
   const NEAR = 0.005; // a motion passes a pose this near, as a part of the range of what it gives
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -72,6 +73,33 @@
 
   // Whether a mechanism moves when its page opens: the one beside the answers, unless the reader prefers less motion.
   const opening = figure => !calm.matches && figure.closest(".stage") !== null;
+
+  // A button that plays and stops: while it plays, `advance` gets the share of the whole motion that has passed, at a
+  // rate; where less motion is preferred a larger one now and then.
+  function playback(time, advance, {begin = () => {}, end = () => {}, rate = () => 1} = {}) {
+    const button = html("button", {type: "button", textContent: "Play"});
+    let playing = 0, clock = 0;
+    function frame(now) {
+      if (!calm.matches) { advance(Math.max(0, Math.min(now - clock, 100)) / time * rate()); clock = now; }
+      else if (now - clock >= SLOW_PAUSE / rate()) { advance(1 / SLOW_STEPS); clock = now; }
+      playing = requestAnimationFrame(frame);
+    }
+    function stop() {
+      cancelAnimationFrame(playing);
+      playing = 0;
+      button.textContent = "Play";
+      end();
+    }
+    function play() {
+      begin();
+      clock = performance.now();
+      button.textContent = "Pause";
+      playing = requestAnimationFrame(frame);
+    }
+    const toggle = () => playing ? stop() : play();
+    button.addEventListener("click", toggle);
+    return {button, stop, play, toggle};
+  }
 
   // The drawing of a mechanism: shows it at a pose, or between two. A part of a drawing, such as the mechanism before a
   // change, is moved by its own data alone.
@@ -353,17 +381,24 @@
   function motion(figure, data) {
     const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), readout = numbers(figure, data);
     const vectors = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
-    const choose = pose => { stop(); show(pose); };
+    const choose = pose => { player.stop(); show(pose); };
     const {marks, inStudy} = pictures(figure, data, readout, moved, choose), other = drawing.querySelector(".moving-before");
     const before = other && linkage(other, {...data.before, poses: data.poses});
     marks.push(chart(figure, data, readout, choose));
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
     slider.setAttribute("aria-label", "pose of the motion");
-    const button = html("button", {type: "button", textContent: "Play"});
     const speed = html("select", {}, ...[[0.25, "\u00bc\u00d7"], [0.5, "\u00bd\u00d7"], [1, "1\u00d7"], [2, "2\u00d7"], [4, "4\u00d7"]]
       .map(([value, text]) => html("option", {value, textContent: text, selected: value === 1})));
     const controls = figure.querySelector(".moving-controls");
-    controls.append(slider, button, html("label", {}, "Speed", speed),
+    const player = playback(1000 * data.seconds, share => {
+      const next = ahead(share * whole);
+      show(calm.matches ? Math.round(next) % data.poses : next);
+    }, {
+      begin: () => { if (gap(Math.round(at))) show(data.first); },
+      end: () => { if (at % 1) show(Math.round(at) % data.poses); },
+      rate: () => Number(speed.value),
+    });
+    controls.append(slider, player.button, html("label", {}, "Speed", speed),
       check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
       check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
       ...vectors.boxes,
@@ -375,7 +410,7 @@
     const whole = Math.max(times[data.poses], times[last]);
     const gap = pose => data.gaps.find(([first, end]) => first <= pose && pose <= end);
     const movable = Object.keys(moved.x).filter(point => [moved.x[point], moved.y[point]].some(values => values.some(value => isFinite(value) && value !== values[data.first])));
-    let at = data.first, forward = data.backwards ? -1 : 1, playing = 0, clock = 0;
+    let at = data.first, forward = data.backwards ? -1 : 1;
 
     function show(pose) {
       at = pose;
@@ -414,27 +449,6 @@
       return next;
     }
 
-    function frame(now) {
-      const spent = Math.max(0, Math.min(now - clock, 100)) / 1000 / data.seconds * speed.value * whole;
-      if (!calm.matches) { clock = now; show(ahead(spent)); }
-      else if (now - clock >= SLOW_PAUSE / speed.value) { clock = now; show(Math.round(ahead(whole / SLOW_STEPS)) % data.poses); }
-      playing = requestAnimationFrame(frame);
-    }
-
-    function stop() {
-      cancelAnimationFrame(playing);
-      playing = 0;
-      button.textContent = "Play";
-      if (at % 1) show(Math.round(at) % data.poses);
-    }
-
-    function play() {
-      if (gap(Math.round(at))) show(data.first);
-      clock = performance.now();
-      button.textContent = "Pause";
-      playing = requestAnimationFrame(frame);
-    }
-
     // The place of the motion where it passes a pose, between two where it is between two; null where it does not.
     function passing(pose) {
       const key = data.keys.find(names => names.every(([name]) => name in pose));
@@ -462,12 +476,11 @@
         figure.scrollIntoView({block: "nearest", behavior: calm.matches ? "auto" : "smooth"});
       });
     }
-    button.addEventListener("click", () => playing ? stop() : play());
     slider.addEventListener("input", () => choose(Number(slider.value)));
     figure.addEventListener("keydown", event => {
       if (event.key === " " && !event.target.matches("button, select, input[type=checkbox]")) {
         event.preventDefault();
-        if (playing) stop(); else play();
+        player.toggle();
       }
     });
     // A drag on the linkage moves the point that is nearest to the pointer.
@@ -478,7 +491,7 @@
       if (held) choose(least(moved.x[held].map((_, k) => far(held, k))));
     });
     show(data.first);
-    if (opening(figure)) play();
+    if (opening(figure)) player.play();
     return {marks, inStudy, points: moved.x, at: () => at};
   }
 
@@ -488,7 +501,16 @@
     const map = drawing.querySelector(".moving-region"), legends = [...drawing.querySelectorAll(".moving-legend")];
     const choices = data.choices.map(choice => ({...choice, moved: linkage(drawing, choice), readout: numbers(figure, choice)}));
     const controls = figure.querySelector(".moving-controls");
-    let chosen = choices[0], at = chosen.first;
+    let chosen = choices[0], at = chosen.first, forward = 1;
+    // Played, it goes along the row of poses that it is in, and back from the ends of the row.
+    const player = playback(FRONT_TIME, share => {
+      const next = at + forward * share * ROW_POSES, low = Math.floor(next), high = Math.ceil(next);
+      const [px, py] = [chosen.moved.x, chosen.moved.y].map(places => places[data.point]);
+      const beside = low >= 0 && high < chosen.poses && Math.abs(py[high] - py[low]) < chosen.step && Math.abs(px[high] - px[low]) < 2.5 * chosen.step;
+      if (!beside) forward = -forward;
+      show(beside ? next : Math.round(at));
+    }, {end: () => show(Math.round(at))});
+    const move = pose => { player.stop(); show(pose); };
 
     function show(pose) {
       at = pose;
@@ -510,7 +532,7 @@
       return best < 0 ? at : best;
     }
 
-    follow(drawing, true, (x, y) => { words.removeAttribute("aria-live"); show(nearest(x, y)); });
+    follow(drawing, true, (x, y) => { player.stop(); words.removeAttribute("aria-live"); show(nearest(x, y)); });
     drawing.classList.add("moving-map");
     drawing.setAttribute("tabindex", "0");
     drawing.setAttribute("role", "application");
@@ -519,9 +541,10 @@
     const keys = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
     drawing.addEventListener("keydown", event => {
       const toward = keys[event.key], step = chosen.step * (event.shiftKey ? 5 : 1);
-      if (event.key === "Home") show(chosen.first);
+      if (event.key === "Home") move(chosen.first);
       else if (toward) {
         const {x, y} = chosen.moved;
+        player.stop();
         show(nearest(x[data.point][at] + step * toward[0], y[data.point][at] + step * toward[1], toward));
       } else return;
       words.setAttribute("aria-live", "polite");
@@ -531,18 +554,20 @@
       box.addEventListener("change", () => {
         map.setAttribute("href", box.dataset.href);
         legends.forEach(legend => legend.classList.toggle("moving-off", legend.dataset.index !== box.dataset.index));
-        const {x, y} = chosen.moved, place = [x[data.point][at], y[data.point][at]];
         if (choices[box.value] === chosen) return;
+        player.stop();
+        const {x, y} = chosen.moved, place = [x[data.point][at], y[data.point][at]];
         chosen = choices[box.value];
         show(nearest(...place));
       });
       // A browser that goes back to the page keeps what was chosen.
       if (box.checked) box.dispatchEvent(new Event("change"));
     }
-    controls.append(check("Link names", [...drawing.querySelectorAll(".moving-name")], false));
+    controls.append(player.button, check("Link names", [...drawing.querySelectorAll(".moving-name")], false));
     controls.append(html("span", {className: "moving-pace", textContent: "Move over the region, or use the arrow keys."}));
     controls.hidden = false;
     show(at);
+    if (opening(figure)) player.play();
     return {drawing, data, alike: choices[0]};
   }
 
@@ -568,7 +593,13 @@
     const controls = figure.querySelector(".moving-controls");
     const slider = html("input", {type: "range", min: 0, step: "any"});
     slider.setAttribute("aria-label", "pose of the motion");
-    const button = html("button", {type: "button", textContent: "Play"});
+    // Back from both ends, unless the motion ends where it began.
+    const player = playback(FRONT_TIME, step => {
+      share += forward * step;
+      if (chosen.returns) share %= 1;
+      else if (share > 1 || share < 0) { forward = -forward; share = Math.max(0, Math.min(1, share)); }
+      show(place());
+    });
     const paths = html("input", {type: "checkbox", checked: true});
     const select = html("select", {}, ...data.choices.map(({number, mark}, k) =>
       html("option", {value: k, textContent: [number, mark].filter(Boolean).join(", ")})));
@@ -576,7 +607,7 @@
       make("circle", {cx: place, cy: y[k], r: 2.6, fill: "#0072B2", stroke: "white", "stroke-width": 0.6}, picture));
     const rings = data.front.map(() => make("circle", {r: 8, fill: "none", stroke: "#222222", "stroke-width": 2,
       class: "moving-chosen"}, picture));
-    let k = -1, chosen, moved, times, tracks, share = 0, forward = 1, playing = 0, clock = 0;
+    let k = -1, chosen, moved, times, tracks, share = 0, forward = 1;
 
     // Shows a design where its motion is as far on as that of the one before.
     function choose(next) {
@@ -615,33 +646,8 @@
       slider.setAttribute("aria-valuetext", at.join(", "));
     }
 
-    // Back from both ends, unless the motion ends where it began.
-    function frame(now) {
-      const step = calm.matches ? (now - clock >= SLOW_PAUSE ? 1 / SLOW_STEPS : 0) : Math.min(now - clock, 100) / FRONT_TIME;
-      if (step) {
-        clock = now;
-        share += forward * step;
-        if (chosen.returns) share %= 1;
-        else if (share > 1 || share < 0) { forward = -forward; share = Math.max(0, Math.min(1, share)); }
-        show(place());
-      }
-      playing = requestAnimationFrame(frame);
-    }
-
-    function stop() {
-      cancelAnimationFrame(playing);
-      playing = 0;
-      button.textContent = "Play";
-    }
-
-    button.addEventListener("click", () => {
-      if (playing) return stop();
-      clock = performance.now();
-      button.textContent = "Pause";
-      playing = requestAnimationFrame(frame);
-    });
     slider.addEventListener("input", () => {
-      stop();
+      player.stop();
       const at = Number(slider.value), low = Math.floor(at);
       share = times[low] + (at - low) * ((times[low + 1] ?? times[low]) - times[low]);
       show(at);
@@ -678,11 +684,11 @@
       })));
       link.addEventListener("click", () => choose(far.indexOf(Math.min(...far))));
     }
-    controls.append(slider, button, html("label", {}, "Design", select), html("label", {}, paths, "Paths"),
+    controls.append(slider, player.button, html("label", {}, "Design", select), html("label", {}, paths, "Paths"),
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
     choose(data.first);
-    if (opening(figure)) button.click();
+    if (opening(figure)) player.play();
   }
 
   function start() {

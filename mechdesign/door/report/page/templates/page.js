@@ -1,7 +1,10 @@
 "use strict";
 (() => {
-  // Says where there is more to the side than a narrow screen shows.
-  const look = room => room.classList.toggle("more", room.scrollWidth - room.clientWidth - room.scrollLeft > 8);
+  // Says where there is more to the side than a narrow screen shows; a key brings it there, too.
+  function look(room) {
+    room.classList.toggle("more", room.scrollWidth - room.clientWidth - room.scrollLeft > 8);
+    if (room.scrollWidth > room.clientWidth) room.tabIndex = 0;
+  }
 
   // Of several pictures of a question the one that the reader chooses is on the screen; paper has all.
   function choice(room) {

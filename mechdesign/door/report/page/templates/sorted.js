@@ -2,7 +2,12 @@
 // A click on a column's name sorts the rows by it, a second one the other way round, a third as they were.
 (() => {
   const NUMBERS = {"\u2013": NaN, "\u221e": Infinity, "\u2212\u221e": -Infinity};
-  const number = text => text in NUMBERS ? NUMBERS[text] : Number(text);
+  const RAISED = "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b";
+  // 2.5 times a power of ten, and a power of ten alone.
+  const TEN = new RegExp(`(?:^(-?)|\u00b7)10([${RAISED}]+)$`);
+  const power = (_, sign, raised) =>
+    `${sign === undefined ? "" : `${sign}1`}e${[...raised].map(digit => "0123456789-"[RAISED.indexOf(digit)]).join("")}`;
+  const number = text => text in NUMBERS ? NUMBERS[text] : Number(text.replace(TEN, power));
   const words = new Intl.Collator("en", {numeric: true}).compare;
 
   // What has no number comes last, whichever way.

@@ -1,0 +1,83 @@
+"""Pages of the documentation and shipped studies, found by any word in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from mechdesign.door.reference.entries import Entry
+
+# Beside the package in a checkout, in it where it is installed.
+_PACKAGE = Path(__file__).parents[2]
+_ROOTS = (_PACKAGE / "pages", _PACKAGE.parent)
+_FOLDERS = ("docs/howto", "docs/tutorials", "docs/theory", "configs")
+_MOST = 4  # pages of a word
+_LONG = 220  # letters of the sentence that is shown
+_MARKUP = re.compile(r"\[([^\]]*)\]\([^)]*\)|\{[a-z]+\}|^- |[`*$]")
+_ENDING = re.compile(r"(?<=\w{4})(?:s|ing)$")
+
+
+class _Page(NamedTuple):
+    place: str  # from the root of the project
+    title: str
+    subjects: str  # headings, and the words by which the site's search finds it
+    paragraphs: tuple[str, ...]
+
+
+@cache
+def _pages() -> tuple[_Page, ...]:
+    """Every page and study; none where the package stands alone."""
+    root = next((root for root in _ROOTS if (root / _FOLDERS[0]).is_dir()), None)
+    if root is None:
+        return ()
+    paths = (path for folder in _FOLDERS for path in sorted((root / folder).rglob("*")))
+    return tuple(
+        {".md": _of_page, ".yaml": _of_study}[path.suffix](path.relative_to(root).as_posix(), path.read_text("utf-8"))
+        for path in paths if path.suffix in (".md", ".yaml")
+    )  # fmt: skip
+
+
+def _of_page(place: str, text: str) -> _Page:
+    headings = re.findall(r"(?m)^#+ (.+)$", text)
+    indexed = re.findall(r"```\{index\} (.+)", text)
+    prose = re.sub(r"(?ms)^```.*?^```$", "", text)
+    paragraphs = (" ".join(_MARKUP.sub(r"\1", part).split()) for part in re.split(r"\n\s*\n|\n(?=[-#] )", prose))
+    # Of a path of links alone nothing is shown.
+    shown = tuple(part for part in paragraphs if part and not part.startswith(("#", "!", "|")))
+    return _Page(place, headings[0] if headings else place, "\n".join((*headings[1:], *indexed)), shown)
+
+
+def _of_study(place: str, text: str) -> _Page:
+    lines = text.splitlines()
+    opening = lines[: next((k for k, line in enumerate(lines) if not line.startswith("#")), len(lines))]
+    name = re.search(r"(?m)^name: (.+)$", text)
+    paragraphs = "\n".join(line.removeprefix("#").strip() for line in opening).split("\n\n")
+    return _Page(place, name[1] if name else place, "", tuple(" ".join(part.split()) for part in paragraphs if part))
+
+
+def pages(word: str, *, subjects: bool = False) -> Iterator[Entry]:
+    """The pages that say most of a word, with a sentence that has it: those about it first, then by how often.
+
+    Only pages of which it is a subject, where `subjects` are asked alone.
+    """
+    # A word may end otherwise, as balance of balancing, but it does not begin inside another.
+    pattern = re.compile(rf"\b{re.escape(_ENDING.sub('', word.strip().casefold()))}")
+    ranked = []
+    for page in _pages():
+        text = " ".join(page.paragraphs)
+        places = [len(pattern.findall(part.casefold())) for part in (page.title, page.subjects, text)]
+        if any(places[:2]) or (places[2] and not subjects):
+            ranked.append((not places[0], not places[1], -places[2], page.place, page))
+    for *_, page in sorted(ranked)[:_MOST]:
+        kind = "page" if page.place.endswith(".md") else "shipped study"
+        yield Entry(page.place, kind, f"{page.title}: {_sentence(page, pattern)}")
+
+
+def _sentence(page: _Page, pattern: re.Pattern[str]) -> str:
+    """The first sentence with a word, or that a page begins with, as far as a line or two go."""
+    sentences = [sentence for part in page.paragraphs for sentence in re.split(r"(?<=[.:!?]) (?=[A-Z])", part)]
+    sentence = next((one for one in sentences if pattern.search(one.casefold())), sentences[0] if sentences else "")
+    return sentence if len(sentence) <= _LONG else f"{sentence[:_LONG].rpartition(' ')[0]} ..."
