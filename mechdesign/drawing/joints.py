@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechdesign.drawing import style
 from mechdesign.drawing.marks import Axis, Dots, Lines, Own, Panel, PanelMark, Picture, Trace
-from mechdesign.drawing.panels import Along, quantity
+from mechdesign.drawing.panels import Along, quantile, quantity
 from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.numerics.rounding import STILL, unchanging
@@ -121,7 +121,9 @@ def _mark_worst(
     sizes = np.nan_to_num(np.abs(values), nan=0.0, posinf=0.0)
     which, row = np.unravel_index(largest(sizes), sizes.shape)
     least, most, value = float(np.nanmin(values, initial=0.0)), float(sizes[which, row]), float(values[which, row])
-    usual = _BEYOND * float(np.quantile(sizes.max(axis=0), _USUAL))
+    # Each place counts by how much of the motion is its: there are more of them where a curve bends.
+    parts = np.abs(np.gradient(over.values)) if over.values.size > 1 else np.ones(1)
+    usual = _BEYOND * quantile(sizes.max(axis=0), parts, _USUAL)
     beyond, ends = cut and most > usual > 0, tuple[float | None, float | None]((None, None))
     if beyond:
         ends = -usual if least < -usual else 1.1 * least, usual

@@ -39,7 +39,8 @@ def fitting(labels: Sequence[str], width: float | None = None, more: int = 0) ->
 def panel_legend(axes: Axes, panel: Panel, entries: Mapping[str, Any], width: float) -> None:
     """One of a panel, beside it or inside; on a narrow page above it, in as many columns as a width holds."""
     names = legend_names([*entries])
-    outside = _ABOVE_LEGEND | {"ncols": fitting(names, width)} if style.narrow() else _BESIDE_LEGEND
+    # The name of an upright axis may take a second line, which makes the panel narrower.
+    outside = _ABOVE_LEGEND | {"ncols": fitting(names, width, more=1)} if style.narrow() else _BESIDE_LEGEND
     place = outside if panel.legend == "beside" else _INSIDE_LEGEND | {"loc": panel.legend}
     heading: dict[str, Any] = {"title": panel.heading or None, "title_fontsize": 9, "alignment": "left"}
     _enlarge_dots(axes.legend(entries.values(), names, **place, **heading))

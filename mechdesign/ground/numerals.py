@@ -78,7 +78,8 @@ def _with_power(digit: str, power: int) -> str:
 
 def power(largest: float) -> int:
     """Power of ten, a multiple of three, of which the numbers up to a largest one are written as multiples."""
-    return 0 if _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 else 3 * math.floor(math.log10(largest) / 3)
+    plain = _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 or not math.isfinite(largest)
+    return 0 if plain else 3 * math.floor(math.log10(largest) / 3)
 
 
 def reading(largest: float, unit: str) -> tuple[int, str]:
@@ -89,7 +90,8 @@ def reading(largest: float, unit: str) -> tuple[int, str]:
     """
     watts = _watts(unit)
     if watts is not None:
-        own = 3 * math.floor(math.log10(largest * 10.0**watts) / 3) if largest > 0 else 0
+        # What is infinite or missing has the unit itself.
+        own = 3 * math.floor(math.log10(largest * 10.0**watts) / 3) if 0 < largest < math.inf else 0
         own = min(max(own, -9), 9)
         return own - watts, f"{_PREFIX_OF[own]}W"
     exponent = power(largest)

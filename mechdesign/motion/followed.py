@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Flags, Floats
-from mechdesign.ground.numerics.rounding import STILL
+from mechdesign.ground.numerics.rounding import STILL, cleared
 from mechdesign.ground.statistics import Request
 from mechdesign.motion.along import AlongMotion
 
@@ -90,9 +90,11 @@ class Followed:
         return self.along.functions.interpolated(self.name, line, s).reshape(-1, len(parts))
 
     def pose(self, place: float) -> dict[str, float]:
-        """What the poses give at a place of the motion of the first design."""
-        poses = self.along.curve.poses.along(np.array([self.design or 0]), np.array([place]))
-        return {name: float(value[0]) + 0.0 for name, value in poses.named.items()}
+        """What the poses give at a place of the motion of the first design; 0 for rounding beside the other poses."""
+        every = self.along.curve.poses
+        poses = every.along(np.array([self.design or 0]), np.array([place]))
+        largest = {name: np.fmax.reduce(np.abs(values), initial=0.0) for name, values in every.named.items()}
+        return {name: float(cleared(value[:1], STILL * largest[name])[0]) + 0.0 for name, value in poses.named.items()}
 
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,10 @@ def test_a_power_of_ten_is_not_lost_where_an_encoding_has_no_raised_digits() -> 
     assert not writable("cp1252")
     assert writable("utf-8")
     assert plain_powers("1.76·10⁻⁹ to 10¹²").encode("ascii") == b"1.76*10^-9 to 10^12"
+
+
+def test_what_is_infinite_has_the_unit_itself():
+    """A rigid direction has an infinite stiffness, and no power of ten."""
+    assert reading(math.inf, "N/mm") == (0, "N/mm")
+    assert reading(math.nan, "N") == (0, "N")
+    assert reading(math.inf, "W") == (0, "W")

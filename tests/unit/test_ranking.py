@@ -134,7 +134,7 @@ def test_a_page_says_which_limits_the_best_case_keeps_and_how_many_cases_do():
     table, told = result.main, gates(result)
     assert told is not None
     row = int(np.flatnonzero(table["rank"] == 1)[0])
-    assert told["case"] == row + 1
+    assert told["case"] == f"{row + 1}"
     rows = {each["name"]: each for each in told["rows"]}
     assert rows["r"]["value"] == f"{table[R][row]:g}"
     assert rows[STROKE]["sense"] == "more is better"

@@ -14,7 +14,7 @@ from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.ground.columns import VARIED, Column
 from mechdesign.ground.errors import counted
 from mechdesign.ground.numerals import in_watts, numeral, printed
-from mechdesign.ground.numerics.rounding import STILL, cleared, unchanging
+from mechdesign.ground.numerics.rounding import unchanging
 from mechdesign.ground.results import KeyNumber, Result, Table
 from mechdesign.ground.rows import choose, unit_of
 from mechdesign.ground.table_text import Rounding
@@ -243,9 +243,8 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
         return row, value, _Pose()
     poses, pose = courses[row].along.curve.poses, courses[row].pose(at)
     units = {column.name: column.unit for other in result.tables.values() for column in other.columns}
-    # A place that should be zero is rounding beside the others of its coordinate.
     coordinates = [
-        Column(name, cleared(np.array([pose[name]]), STILL * np.nanmax(np.abs(poses.named[name]))), units.get(name, ""))
+        Column(name, np.array([pose[name]]), units.get(name, ""))
         for name in ([*pose] if poses.swept is None else [poses.swept])
     ]
     return row, value, _Pose(_in_words(coordinates, 0), pose, at)
