@@ -106,7 +106,7 @@ def test_both_linkages_between_given_pivots_pass_five_points_in_one_assembly() -
     lengths = lengths[table["max_error"] < 1e-9]
     for linkage in IN_ONE_ASSEMBLY:
         assert np.abs(lengths - linkage).max(axis=1).min() < 1e-6
-    assert any("2 exact, the last new one at start" in str(warning) for warning in result.warnings)
+    assert any("2 exact, the last new one at start" in str(warning) for warning in result.notes)
 
 
 def path_task(name: str) -> dict:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import AssemblyError, StudyError
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result, Table
@@ -17,6 +16,7 @@ from mechdesign.questions.synthesize.files import judged_share, study_data, stud
 from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked
 from mechdesign.questions.synthesize.tasks import Task, task_of
 from mechdesign.study import Study
+from mechdesign.study.loading import load_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class DrawnSolutions(Drawn):
 
     task: Task
     solutions: tuple[Solution, ...]
+    study: Study  # of the best
 
 
 @one_thread()
@@ -44,7 +45,6 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
             solutions = _judged(study, task, solutions[: section.judge.best])
         solutions, scores = ranked(solutions, section.rank, task.size)
     told = [*conditions.told, *_told(pools, solutions, conditions)]
-    warnings = tuple(Caution("incomplete", words) for words in told)
     if not solutions:
         raise _none(study, task, pools, conditions, told)
     solutions, scores = solutions[: section.solutions], scores[: section.solutions]
@@ -57,8 +57,9 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     }
     table = solutions_table(study, task, solutions, scores)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(solutions)}
-    drawn = DrawnSolutions(task, tuple(solutions))
-    return Result("synthesize", {table.name: table}, warnings, counts, files=files, drawn=drawn)
+    best = load_data(study_data(study, task, solutions[0], study.name), (), None, study.folder)
+    drawn = DrawnSolutions(task, tuple(solutions), best)
+    return Result("synthesize", {table.name: table}, counts=counts, files=files, drawn=drawn, notes=told)
 
 
 def _judged(study: Study, task: Task, solutions: Sequence[Solution]) -> list[Solution]:

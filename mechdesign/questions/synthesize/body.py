@@ -13,17 +13,16 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import dyads
-from mechdesign.questions.synthesize.dyads import GUIDE, LINK, SLIDE, Dyads
-from mechdesign.questions.synthesize.kinds import (
+from mechdesign.questions.synthesize.declared import (
     CONCHOID,
     FOUR_BAR,
     INVERTED,
     INVERTED_TRAMMEL,
     SLIDER_CRANK,
     TRAMMEL,
-    Kind,
-    kind_of,
 )
+from mechdesign.questions.synthesize.dyads import GUIDE, LINK, SLIDE, Dyads
+from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 
 _PAIRS = {

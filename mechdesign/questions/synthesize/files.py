@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from mechdesign.questions.look import ask
-from mechdesign.questions.synthesize.kinds import DRIVE, POINT
+from mechdesign.questions.synthesize.declared import DRIVE, POINT
 from mechdesign.questions.synthesize.solutions import Solution
 from mechdesign.questions.synthesize.tasks import Task
 from mechdesign.study import Study

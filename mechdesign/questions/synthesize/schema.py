@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.variation import Dimension
-from mechdesign.questions.synthesize.kinds import BODIES, FOUR_BAR, FUNCTIONS, PATHS, links, starting
+from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, FUNCTIONS, PATHS, links, starting
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.reading import failure

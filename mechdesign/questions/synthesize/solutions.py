@@ -14,8 +14,9 @@ from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.mechanism import Variant
+from mechdesign.questions.synthesize.declared import FOUR_BAR
 from mechdesign.questions.synthesize.judging import Way
-from mechdesign.questions.synthesize.kinds import FOUR_BAR, Kind
+from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 
 # Two linkages whose values differ by less than this part of the task are one.

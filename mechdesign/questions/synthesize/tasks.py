@@ -12,9 +12,10 @@ from mechdesign.ground.errors import StudyError
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
+from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
 from mechdesign.questions.synthesize.judging import margins, passed
-from mechdesign.questions.synthesize.kinds import BODY, FOUR_BAR, POINT, Kind, kind_of
+from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
 from mechdesign.study import Study
@@ -71,6 +72,11 @@ class BodyTask:
         f"{BODY}.{POINT}.x",
         f"{BODY}.{POINT}.y",
     )  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return self.positions.places
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what the outputs should be at each position, in the study's units."""
@@ -132,6 +138,11 @@ class FunctionTask:
         return 1.0 if self.slides else self.factor
 
     apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return np.empty(0, dtype=complex)
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what it should be at each position, in the study's units."""
@@ -196,6 +207,11 @@ class PathTask:
         return 1.0
 
     apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return self.path.points
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and where it should be at each position."""
