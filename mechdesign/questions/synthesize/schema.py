@@ -157,7 +157,7 @@ class JudgeSection(fields.Model):
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
     """Tolerances of single dimensions, as ``reliability.dimensions`` takes them. Example: {crank.length: 0.05}"""
     clearances: dict[str, Clearance] = Field(default_factory=dict)
-    """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: 0.02}"""
+    """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: {radial: 0.02}}"""
     within: Annotated[float, fields.number(None, 0.0, exclusive=True)]
     """Largest error of a made linkage at a point of the task. Example: 0.5 mm"""
     best: Annotated[int, fields.whole(1, 1000)] = 20
