@@ -1,4 +1,4 @@
-"""Design studies of planar mechanisms: one description, six questions.
+"""Design studies of planar mechanisms: one description, seven questions.
 
 >>> import mechdesign
 >>> from mechdesign.study import template_path
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from mechdesign.door.api.questions import optimize as optimize
     from mechdesign.door.api.questions import reliability as reliability
     from mechdesign.door.api.questions import stiffness as stiffness
+    from mechdesign.door.api.questions import synthesize as synthesize
     from mechdesign.door.api.questions import workspace as workspace
     from mechdesign.door.api.shown import Answer as Answer
     from mechdesign.door.report.requirements import Verdict as Verdict
@@ -59,7 +60,7 @@ _HOMES = {
     for home, names in (
         ("door.api.cases", "sweep sensitivities evaluate"),
         ("door.api.loading", "load"),
-        ("door.api.questions", "kinematics workspace optimize reliability stiffness dynamics"),
+        ("door.api.questions", "kinematics workspace optimize reliability stiffness dynamics synthesize"),
         ("door.api.shown", "Answer"),
         ("ground.cautions", "Caution"),
         ("ground.columns", "Column"),

@@ -75,6 +75,12 @@ COMMANDS = {
             "What drives it, what does it bear?",
             "Drive efforts, joint forces, shaking forces and energies of a motion.",
         ),
+        Command(
+            "synthesize",
+            "Which linkages do it?",
+            "From positions of a body, a function or a path to linkages, each a study.",
+            section="synthesis",
+        ),
     )
 }
 SWEEP = Command(

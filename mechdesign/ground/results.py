@@ -336,6 +336,8 @@ class _LongColumn(Column):
 class Drawn:
     """What the pictures of a result need besides its tables; each question has a record of its own."""
 
+    study: Any = None  # whose mechanism is shown for the answer; None: that which was asked
+
     @classmethod
     def of(cls, result: Result) -> Self:
         """The record of this kind that a result carries.
@@ -373,6 +375,7 @@ class Result:
     interrupted: str = ""  #: how far it came, where it is the finished part of an interrupted computation
     drawn: Drawn | None = None  #: what pictures need besides the tables
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
+    notes: Sequence[str] = ()  #: what is said of the whole answer, such as how complete a list of solutions is
     reached: bool = True  #: else `failed` says why a reliability is not reached, where all poses assemble
     allocated: Mapping[str, Table] = field(default_factory=dict)  #: those with allocated tolerances, which are judged
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from mechdesign.questions.optimize.schema import OptimizeSection
     from mechdesign.questions.reliability.schema.section import ReliabilitySection
     from mechdesign.questions.stiffness.schema import StiffnessSection
+    from mechdesign.questions.synthesize.schema import SynthesisSection
     from mechdesign.questions.workspace.schema import WorkspaceSection
 
 # Characters that are replaced in the folder's name, and the name of a study without one.
@@ -97,6 +98,7 @@ class Study:
         dynamics: ClassVar[DynamicsSection | None]
         matrix: ClassVar[MatrixSection | None]
         sensitivities: ClassVar[SensitivitiesSection | None]
+        synthesis: ClassVar[SynthesisSection | None]
 
     def __getattr__(self, name: str) -> Any:
         if name in SECTIONS:
@@ -118,7 +120,7 @@ class Study:
     @cached_property
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
-        return tuple(command for command in COMMANDS if self.sections.get(command) is not None)
+        return tuple(name for name, command in COMMANDS.items() if self.sections.get(command.key) is not None)
 
     @property
     def source(self) -> StudySource:

@@ -41,6 +41,9 @@ from mechdesign.study.text.reading import LOST, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 
+# Keys of the sections of questions.
+_ASKED = tuple(command.key for command in COMMANDS.values())
+
 
 def read_file(file: pathlib.Path) -> bytes:
     """The text of a study file, at most one byte more than is allowed.
@@ -97,6 +100,7 @@ def _load_changed(
     """Load a study with overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
     drawn = drawn or _drawing(document)
     override(document, changes)
+    _begin(document)
     if drawn == _drawing(document) or not same_sketch(drawn, document.data):
         return load_document(document, source, changes, seed)
     original = None
@@ -114,6 +118,13 @@ def _load_changed(
     # With all units, as in the data of the study.
     drawn = {**drawn, "units": study.resolved["units"]}
     return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
+
+
+def _begin(document: Document) -> None:
+    """Give a study that has a task and no mechanism the one with which a synthesis begins."""
+    data = document.data
+    if isinstance(data, dict) and data.get("synthesis") is not None and data.get("mechanism") is None:
+        data["mechanism"] = plain(SECTIONS["synthesis"].model.starting(data["synthesis"]))
 
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -191,7 +202,7 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
     if not isinstance(data, dict):
         message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
         raise document.values[()].failure(message)
-    return {key: {} if value is None and key in COMMANDS else value for key, value in data.items()}
+    return {key: {} if value is None and key in _ASKED else value for key, value in data.items()}
 
 
 def context_of(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
@@ -267,7 +278,7 @@ def _checked(checker: Checker) -> dict[str, Any]:
     for name in checker.parameters.kinds:
         for kind in checker.parameters.needed(name, checker.places):
             checker.kind(("mechanism", "parameters", name), kind)
-    sections |= {command: sections[command].checked(checker) for command in COMMANDS if command in sections}
+    sections |= {key: sections[key].checked(checker) for key in _ASKED if key in sections}
     for index, requirement in enumerate(sections["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
     if "matrix" in sections:

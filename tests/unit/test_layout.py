@@ -19,7 +19,8 @@ ORDER = (
     ("mechdesign.study.text",),
     ("mechdesign.motion",),
     ("mechdesign.study.building",),
-    ("mechdesign.questions.reliability.laws", "mechdesign.questions.reliability.fit_laws"),
+    ("mechdesign.questions.reliability.laws", "mechdesign.questions.reliability.fit_laws",
+     "mechdesign.questions.synthesize.declared"),
     (
         "mechdesign.study.schema",
         *(f"mechdesign.questions.{name}.schema" for name in COMMANDS), "mechdesign.experiments.schema",

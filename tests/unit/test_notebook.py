@@ -308,7 +308,7 @@ def test_a_table_is_a_data_frame_by_one_call(monkeypatch: pytest.MonkeyPatch) ->
 def test_every_question_is_a_function_of_the_package() -> None:
     """Its names stand there once more, as it may import nothing."""
     questions = re.findall(r"^  (\w+) +.*\?$", command_line.ask("--help", study="").stdout, re.MULTILINE)
-    assert len(questions) == 8
+    assert len(questions) == 9
     assert set(questions) < set(mechdesign.__all__)
 
 

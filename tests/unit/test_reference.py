@@ -74,9 +74,10 @@ def test_numbers_in_the_texts_are_those_of_the_code():
 
 def test_words_are_found_by_path_by_last_part_by_kind_and_in_any_case():
     assert words("mechanism.joints.guide.angle") == words("mechanism.joints.angle") == ["mechanism.joints.*.angle"]
-    assert words("pin") == ["mechanism.plates.pin", "reliability.clearances.*.pin"]
+    assert words("pin") == ["mechanism.plates.pin", "reliability.clearances.*.pin", "synthesis.judge.clearances.*.pin"]
     assert set(words("angle")) == {
-        "angle", "units.angle", *(f"mechanism.{part}.*.angle" for part in ("joints", "drives", "measures", "limits"))
+        "angle", "units.angle", "synthesis.body.*.angle",
+        *(f"mechanism.{part}.*.angle" for part in ("joints", "drives", "measures", "limits"))
     }  # fmt: skip
     assert words("gii") == ["GII"]
     assert words("sigma_min_mean") == ["*_mean"]

@@ -292,6 +292,45 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     return ask("dynamics", study, seed, jobs=jobs, progress=progress)
 
 
+def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
+    """Which linkages do it? From positions of a body, a function or a path to linkages, each a study.
+
+    Parameters
+    ----------
+    study : Study
+        With a section ``synthesis``; it needs no mechanism.
+    seed, jobs, progress : optional
+        See `mechdesign`; random are the samples of a path, and free choices of a body.
+
+    Returns
+    -------
+    Answer
+        Table ``solutions``, a row a linkage, best first, with errors, defects, transmission angles and dimensions in
+        the study's units; `files` has the study of each, and `notes` say how complete the list is.
+
+    Raises
+    ------
+    StudyError
+        If there is no task, or it contradicts itself.
+    AssemblyError
+        If no linkage keeps the conditions.
+
+    Examples
+    --------
+    Freudenstein's four-bar for log10 between 1 and 2, exact at three points.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... synthesis:
+    ...   function: {input: [94.0192379, 120, 145.9807621], output: [35.6125801, 65.09775, 87.0511671]}
+    ...   frame: 100
+    ... ''')
+    >>> mechdesign.synthesize(study).main["crank.length"].round(1)
+    array([71.3])
+    """
+    return ask("synthesize", study, seed, jobs=jobs, progress=progress)
+
+
 def question(command: str) -> Callable[..., Answer]:
     """The function of a question that has none of its own above."""
     return partial(ask, command, seed=None, jobs=1)

@@ -58,7 +58,7 @@ class _Group(TyperGroup):
 app = typer.Typer(
     name="mechdesign",
     cls=_Group,
-    help="Design studies of planar mechanisms: one study file, six questions, tables and pictures.",
+    help="Design studies of planar mechanisms: one study file, seven questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
     # Without Rich, whose import takes a tenth of a second.

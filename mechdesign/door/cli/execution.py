@@ -161,7 +161,8 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     code, seconds = exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, table=result.main, reached=result.reached, closing=closing_words(result.tables.get(FAILURES)),
+        written=True, table=result.main, reached=result.reached,
+        closing=(*result.notes, *closing_words(result.tables.get(FAILURES))),
     )  # fmt: skip
 
 

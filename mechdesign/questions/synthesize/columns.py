@@ -1,0 +1,33 @@
+"""Tables of a synthesis and their columns: names, meanings, units and formulas."""
+
+from __future__ import annotations
+
+from mechdesign.ground.columns import ColumnKind
+from mechdesign.ground.results import KeyNumber, TableKind
+
+SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
+    ("solution", "number in the name of its file, such as solution_1.yaml"), ("kind", "kind of linkage"),
+    ("error", "distance from the task, of a function error of its output: root mean square over the positions",
+     "as the task"),
+    ("max_error", "largest such distance", "as the task"),
+    ("defects", "branch: a position needs another assembly; circuit: a dead centre lies between two; order: the drive "
+     "cannot pass them in their order; empty where there is none"),
+    ("class", "class of its four-bar or slider-crank by the links that turn fully"),
+    ("full_turn", "1 where the drive turns fully"),
+    ("transmission_angle", "smallest on the way through the task; 0 at a dead centre", "angle"),
+    ("size", "greatest extent of pivots and pins along x or y at the positions", "length"),
+    ("yield", "share of made linkages whose errors keep the limit at every position"),
+    ("yield_low", "lower end of its interval"), ("yield_high", "upper end of its interval"),
+    ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),
+    ColumnKind("<dimension>", "dimension of the linkage by its name in its study", "as the dimension"))  # fmt: skip
+CURVE = TableKind.of("curve", "pivots, and pins in the body, of dyads through all positions",
+    ("pivot_x", "pivot in the frame", "length"), ("pivot_y", "pivot in the frame", "length"),
+    ("pin_x", "pin in the body", "length"), ("pin_y", "pin in the body", "length"),
+    ("length", "of the link between them", "length"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(SOLUTIONS, "error", "error of the best", "first"),
+    KeyNumber(SOLUTIONS, "transmission_angle", "its smallest transmission angle", "first"),
+    KeyNumber(SOLUTIONS, "yield", "its yield", "first"),
+)  # fmt: skip
+# Studies that it writes.
+STUDIES = "solution_*.yaml nearest.yaml"

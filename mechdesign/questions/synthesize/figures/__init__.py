@@ -1,0 +1,1 @@
+"""Pictures of a synthesis: the linkages with the task, and what they trade."""

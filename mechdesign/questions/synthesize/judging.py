@@ -1,0 +1,117 @@
+"""What linkages do on their way through a task: defects, transmission angle, error, class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.questions.synthesize.kinds import Kind
+
+# Poses on the way through the task; where a linkage comes nearest to a dead centre, so many more between two of them.
+POSES, FINER = 181, 17
+# Linkages that are followed at once: their poses stay in the processor's cache.
+_AT_ONCE = 100
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How linkages of a kind pass the positions of a task; each array has a first axis (count,)."""
+
+    kind: Kind
+    modes: tuple[int, ...]
+    values: Floats
+    angles: Floats  # drive at the positions, on its way: rising or falling
+    branch: Flags  # another assembly is needed at some position
+    circuit: Flags  # a dead centre lies between two positions
+    order: Flags  # the drive cannot pass the positions in their order
+    transmission: Floats  # smallest transmission angle on the way, radians
+    full_turn: Flags
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @cached_property
+    def defects(self) -> list[str]:
+        """Defects in words, empty where there are none."""
+        names = ("branch", "circuit", "order")
+        return [
+            ", ".join(name for name, flag in zip(names, flags, strict=True) if flag)
+            for flags in zip(self.branch.tolist(), self.circuit.tolist(), self.order.tolist(), strict=True)
+        ]
+
+
+def in_order(angles: Floats) -> tuple[Floats, Flags]:
+    """Values of a drive that turns, unwound so that they rise or fall; and whether they do neither within a turn."""
+    steps = np.diff(angles, axis=1)
+    forward, back = np.mod(steps, _TURN), -np.mod(-steps, _TURN)
+    up, down = forward.sum(axis=1), -back.sum(axis=1)
+    nearest = np.where(np.abs(forward) <= np.abs(back), forward, back)
+    limit = _TURN * (1 + 1e-9)
+    chosen = np.where((up <= limit) & (up <= down), 1, np.where(down <= limit, -1, np.where(up <= limit, 1, 0)))
+    steps = np.where(chosen[:, None] == 1, forward, np.where(chosen[:, None] == -1, back, nearest))
+    return np.concatenate([angles[:, :1], angles[:, :1] + np.cumsum(steps, axis=1)], axis=1), chosen == 0
+
+
+def margins(kind: Kind, poses: Configuration) -> tuple[Floats, Floats]:
+    """How far poses are from where they no longer close, below 0 beyond; and the sine of the transmission angle."""
+    count = poses.shape
+    closes = np.full(count, np.inf)
+    for closure in poses.closures:
+        closes = np.minimum(closes, np.broadcast_to(closure, count))
+    sine = np.full(count, 1.0)
+    for conditioning in kind.mechanism.linearize(poses).conditionings.values():
+        sine = np.minimum(sine, np.abs(np.broadcast_to(conditioning, count)))
+    return np.where(np.isnan(closes), -np.inf, closes), np.where(poses.valid, sine, 0.0)
+
+
+def along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
+    """Whether a dead centre lies on the way of the drive, and the smallest transmission angle there (radians)."""
+    dead, worst = np.zeros(len(values), dtype=bool), np.zeros(len(values))
+    for first in range(0, len(values), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        dead[some], worst[some] = _along(kind, modes, values[some], begin[some], end[some])
+    return dead, worst
+
+
+def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
+    parts = np.linspace(0, 1, POSES)
+    poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
+    _, sine = margins(kind, poses)
+    worst, dead = sine.min(axis=1), np.asarray(~poses.valid.all(axis=1))
+    # Between poses it is lowest beside the lowest of them; a few local minima are looked at.
+    inner = np.concatenate([sine[:, :1] >= np.inf, (sine[:, 1:-1] <= sine[:, :-2]) & (sine[:, 1:-1] <= sine[:, 2:]),
+                            sine[:, :1] >= np.inf], axis=1)  # fmt: skip
+    lane, place = np.nonzero(inner & ~dead[:, None])
+    low, high = parts[place - 1], parts[place + 1]
+    for _ in range(5):
+        if not len(lane):
+            break
+        fine = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, FINER)
+        own = kind.solve(values[lane], begin[lane, None] + fine * (end - begin)[lane, None], modes)
+        _, sines = margins(kind, own)
+        np.minimum.at(worst, lane, sines.min(axis=1))
+        np.logical_or.at(dead, lane, ~own.valid.all(axis=1))
+        at, rows = np.clip(sines.argmin(axis=1), 1, FINER - 2), np.arange(len(lane))
+        low, high = fine[rows, at - 1], fine[rows, at + 1]
+    worst = np.where(dead, 0.0, worst)
+    return dead, np.arcsin(np.clip(worst, 0, 1))
+
+
+def passed(
+    kind: Kind, modes: tuple[int, ...], values: Floats, angles: Floats, branch: Flags | None = None, *, full_turn: bool
+) -> Way:  # fmt: skip
+    """The way of linkages through a task in an assembly; `branch` tells which need another one at some position."""
+    unwound, disorder = in_order(angles)
+    begin, end = unwound.min(axis=1), unwound.max(axis=1)
+    whole_dead, whole_worst = along(kind, modes, values, begin, begin + _TURN)
+    rest = np.flatnonzero(whole_dead)
+    dead, worst = whole_dead.copy(), whole_worst.copy()
+    if not full_turn and len(rest):
+        dead[rest], worst[rest] = along(kind, modes, values[rest], begin[rest], end[rest])
+    branch = np.zeros(len(values), dtype=bool) if branch is None else branch
+    return Way(kind, modes, values, unwound, branch, dead, disorder, worst, ~whole_dead)

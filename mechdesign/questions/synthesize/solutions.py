@@ -1,0 +1,256 @@
+"""Solutions of a task: which keep the conditions, their order, their numbers, and each as a study file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.four_bars import four_bars
+from mechdesign.mechanism.mechanism import Variant
+from mechdesign.questions.synthesize.declared import FOUR_BAR
+from mechdesign.questions.synthesize.judging import Way
+from mechdesign.questions.synthesize.kinds import Kind
+from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+
+# Two linkages whose values differ by less than this part of the task are one.
+_SAME = 1e-5
+# Most linkages of a kind and assembly that are compared one by one.
+_MOST = 200
+# An error below this part of the task's size is none.
+EXACT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Linkages of one kind and assembly that do a task, and how well; each array has a first axis (count,)."""
+
+    way: Way
+    errors: Floats  # at each position, shape (count, positions)
+
+    @property
+    def kind(self) -> Kind:
+        """Their kind."""
+        return self.way.kind
+
+    def rms(self) -> Floats:
+        """Root mean square of the errors."""
+        return np.asarray(np.sqrt((self.errors**2).mean(axis=1)))
+
+    def solution(self, row: int) -> Solution:
+        """One of them."""
+        way = self.way
+        return Solution(
+            way.kind, way.modes, way.values[row], way.angles[row], self.errors[row], way.defects[row],
+            float(way.transmission[row]), bool(way.full_turn[row]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """One linkage that does a task."""
+
+    kind: Kind
+    modes: tuple[int, ...]
+    values: Floats  # shape (places,), angles in radians
+    angles: Floats  # drive at the positions
+    errors: Floats  # at the positions
+    defects: str
+    transmission: float  # radians
+    full_turn: bool
+    share: tuple[float, float, float] = (np.nan, np.nan, np.nan)  # of made linkages that keep the limit, and its ends
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the errors."""
+        return float(np.sqrt((self.errors**2).mean()))
+
+    @cached_property
+    def poses(self) -> Configuration:
+        """Its poses at the positions."""
+        return self.kind.solve(self.values[None], self.angles[None], self.modes)
+
+    @property
+    def size(self) -> float:
+        """The greatest extent of its points along x or y."""
+        places = np.concatenate([np.broadcast_to(node, self.poses.shape).ravel() for node in self.poses.nodes])
+        return float(max(np.ptp(places.real), np.ptp(places.imag)))
+
+    @property
+    def variant(self) -> Variant:
+        """Its mechanism."""
+        description = self.kind.mechanism.description
+        places = {
+            name: replace(place, nominal=float(value))
+            for (name, place), value in zip(description.places.items(), self.values, strict=True)
+        }
+        return Variant(self.kind.mechanism, replace(description, places=places))
+
+    @property
+    def grashof(self) -> str:
+        """Class of its first four-bar or slider-crank; empty where it has none."""
+        return next((loop.type for loop in four_bars(self.variant)), "")
+
+
+class Conditions:
+    """What linkages must keep, and how many were dropped for each."""
+
+    def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
+        self.section, self.centre, self.size, self.factor = section, centre, size, factor
+        self.dropped: Counter[str] = Counter()
+        self.told: list[str] = []  #: what is found, in words
+
+    def begun(self, kind: Kind, values: Floats, errors: Floats, most: int) -> Ints:
+        """Linkages, at most so many, that keep what their dimensions alone tell; best first by their errors.
+
+        Where none does it is the one with the smallest error, as the nearest.
+        """
+        kept = self._counted(self._of_dimensions(kind, values), len(values))
+        if not kept.any():
+            return np.argsort(errors, kind="stable")[:1]
+        rows = np.flatnonzero(kept)
+        return rows[np.argsort(errors[rows], kind="stable")][:most]
+
+    def kept(self, pool: Pool) -> Flags:
+        """Which linkages keep all conditions."""
+        kept = np.ones(len(pool.way), dtype=bool)
+        for _, good in self._of_dimensions(pool.kind, pool.way.values):
+            kept &= good
+        return kept & self._counted(self._of_way(pool.way), len(pool.way))
+
+    def missed(self, pool: Pool, row: int) -> list[str]:
+        """The conditions that one linkage of a pool does not keep."""
+        conditions = [*self._of_dimensions(pool.kind, pool.way.values), *self._of_way(pool.way)]
+        return [reason for reason, good in conditions if not good[row]]
+
+    def _counted(self, judged: Iterator[tuple[str, Flags]], count: int) -> Flags:
+        """Which linkages keep conditions; the others are counted by the first that they miss."""
+        kept = np.ones(count, dtype=bool)
+        for reason, good in judged:
+            self.dropped[reason] += int((kept & ~good).sum())
+            kept &= good
+        return kept
+
+    def solutions(self, pool: Pool) -> Iterator[Solution]:
+        """The best linkages of a pool that keep all conditions."""
+        if not len(pool.way):
+            return
+        rows = np.flatnonzero(self.kept(pool))
+        faulty = np.array([words != "" for words in pool.way.defects])[rows]
+        errors = np.where(pool.rms() < EXACT * self.size, 0.0, pool.rms())[rows]
+        best = rows[np.lexsort((-pool.way.transmission[rows], errors, faulty))][:_MOST]
+        yield from (pool.solution(int(row)) for row in best)
+
+    def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
+        section = self.section
+        pivots = np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1)
+        held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
+        if section.pivots is not None and not held.shape[1]:
+            yield "it has no pivot (pivots)", np.zeros(len(values), dtype=bool)
+        links = kind.links(values)
+        lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
+        yield (
+            "a pivot is too far away (limits.reach)",
+            (np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size),
+        )
+        with np.errstate(all="ignore"):
+            ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
+        yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
+        if isinstance(section.pivots, Region):
+            yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size).all(axis=1)
+        elif section.pivots is not None:
+            given = np.array([complex(*place) for place in section.pivots])
+            gap = np.abs(held[..., None] - given).min(axis=2)
+            yield "a pivot is none of those given (pivots)", (gap <= 1e-6 * self.size).all(axis=1)
+        for box in section.keep_out:
+            within = (np.abs(pivots.real - np.mean(box.x)) < np.ptp(box.x) / 2) & (
+                np.abs(pivots.imag - np.mean(box.y)) < np.ptp(box.y) / 2
+            )
+            yield "a pivot lies where none may (keep_out)", ~within.any(axis=1)
+        for name, (low, high) in section.lengths.items():
+            if name in links:
+                good = (links[name] >= low) & (links[name] <= high)
+                yield f"{name} is too short or too long (lengths)", good
+        if section.grashof and kind.name == FOUR_BAR:
+            ordered = np.sort(lengths, axis=0)
+            good = ordered[0] + ordered[-1] <= ordered[1:-1].sum(axis=0)
+            yield "no link can turn fully (grashof)", good
+
+    def _of_way(self, way: Way) -> Iterator[tuple[str, Flags]]:
+        section = self.section
+        if section.needs_turn:
+            yield "the drive cannot turn fully (full_turn)", way.full_turn
+        if section.transmission is not None:
+            least = float(np.sin(section.transmission.at_least * self.factor))
+            yield "the transmission angle is too small (transmission)", np.sin(way.transmission) >= least
+        if section.defects == "dropped":
+            yield "it has a defect", np.array([not words for words in way.defects], dtype=bool)
+
+    @staticmethod
+    def _on_slide(kind: Kind, column: int) -> bool:
+        """Whether a point of the frame only tells where a slide runs."""
+        point = kind.places[column].split(".")[1]
+        return any(
+            joint["slot"] == "ground" and joint["through"] == point for joint in kind.data.get("joints", {}).values()
+        )
+
+
+def inside(region: Region, places: Any, size: float) -> Any:
+    """Which places, x + i y, lie in a region; a line has a width within rounding."""
+    slack = 1e-6 * size
+    if region.through is not None:
+        away = (places - complex(*region.through)) * np.exp(-1j * region.direction)
+        return np.abs(away.imag) <= slack
+    good = np.ones(np.shape(places), dtype=bool)
+    for ends, values in ((region.x, places.real), (region.y, places.imag)):
+        if ends is not None:
+            low, high = ends if isinstance(ends, tuple) else (ends, ends)
+            good &= (values >= low - slack) & (values <= high + slack)
+    return good
+
+
+def distinct(solutions: Sequence[Solution], size: float) -> list[Solution]:
+    """Solutions by their errors, each once; those with a defect behind the others."""
+    ordered = sorted(solutions, key=lambda one: (one.defects != "", rounded(one.error, size), -one.transmission))
+    kept: list[Solution] = []
+    seen: dict[tuple[str, tuple[int, ...]], list[Floats]] = {}
+    for one in ordered:
+        others = seen.setdefault((one.kind.name, one.modes), [])
+        scale = np.maximum(np.abs(one.values), size)
+        if not others or (np.abs(np.array(others) - one.values) / scale).max(axis=1).min() > _SAME:
+            others.append(one.values)
+            kept.append(one)
+    return kept
+
+
+def rounded(error: float, size: float) -> float:
+    """An error, 0 where it is rounding; to four digits, so that rounding orders nothing."""
+    return 0.0 if error < EXACT * size else float(f"{error:.4g}")
+
+
+def ranked(
+    solutions: Sequence[Solution], weights: Mapping[str, float], size: float
+) -> tuple[list[Solution], list[float]]:
+    """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
+    measures: dict[str, Callable[[Solution], float]] = {
+        "error": lambda one: -rounded(one.error, size), "yield": lambda one: one.share[0],
+        "transmission": lambda one: one.transmission, "size": lambda one: -one.size,
+    }  # fmt: skip
+    total, whole = np.zeros(len(solutions)), sum(weights.values())
+    for name, weight in weights.items():
+        values = np.nan_to_num(np.array([measures[name](one) for one in solutions], dtype=float), nan=-np.inf)
+        known = values[np.isfinite(values)]
+        low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+        share = (np.maximum(values, low) - low) / (high - low) if high > low else np.ones(len(values))
+        total += weight / whole * np.where(np.isfinite(values), share, 0.0)
+    order = sorted(
+        range(len(solutions)),
+        key=lambda k: (solutions[k].defects != "", -round(float(total[k]), 9), -solutions[k].transmission),
+    )
+    return [solutions[k] for k in order], [float(total[k]) for k in order]

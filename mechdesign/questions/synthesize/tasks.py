@@ -1,0 +1,393 @@
+"""The three tasks: how each finds linkages, and how far a linkage is from it at each of its positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mechdesign.ground.errors import StudyError
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.questions.synthesize import body, paths
+from mechdesign.questions.synthesize.body import Candidates, Positions
+from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
+from mechdesign.questions.synthesize.dyads import LINK, Dyads
+from mechdesign.questions.synthesize.judging import margins, passed
+from mechdesign.questions.synthesize.kinds import Kind, kind_of
+from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
+from mechdesign.study import Study
+from mechdesign.study.text.csv_files import read_table
+
+# Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
+_AROUND, _AT_ONCE = 32, 1000
+# Greatest ratio of lengths of samples between given pivots.
+_SAMPLED = 30.0
+# Of more points than this fewer linkages are polished, down to so few; of more points than the last only
+# every second, third and so on counts.
+_MANY, _FEWEST, _MOST_POINTS = 40, 100, 200
+# Exact linkages that differ by less are one.
+_DISTINCT = 1e-5
+# Most linkages of a kind whose ways are followed.
+MOST = 200
+# Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
+PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 1_500
+# An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
+_OTHER = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTask:
+    """Positions of a body."""
+
+    section: SynthesisSection
+    factor: float  # radians in the study's unit of angle
+    positions: Positions
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the places."""
+        return self.positions.centre
+
+    @property
+    def size(self) -> float:
+        """The extent of the places."""
+        return self.positions.size
+
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+        """Linkages of every kind and assembly."""
+        found, words = body.choices(self.positions, self.section, random)
+        conditions.told.append(words)
+        for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
+            yield from assembled(part, self.gaps(part), conditions, self.size)
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0
+
+    apart: ClassVar[tuple[str, ...]] = (
+        f"{BODY}.{POINT}.x",
+        f"{BODY}.{POINT}.y",
+    )  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return self.positions.places
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and what the outputs should be at each position, in the study's units."""
+        turns = np.unwrap(np.angle(self.positions.rotations)) / self.factor
+        return POINT, {POINT: _pairs(self.positions.places), f"{BODY}.angle": turns.tolist()}
+
+    def gaps(self, part: Candidates) -> list[Floats]:
+        """Distance of the body's origin from each position, of each assembly; shape (count, positions)."""
+        return [
+            np.abs(part.kind.points(part.kind.solve(part.values, part.angles, modes)) - self.positions.places)
+            for modes in part.kind.modes
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionTask:
+    """Pairs of an input angle and an output angle or place."""
+
+    section: SynthesisSection
+    factor: float
+    inputs: Floats  # radians
+    outputs: Floats  # radians, or lengths
+
+    @property
+    def slides(self) -> bool:
+        """Whether the output is a slide."""
+        return self.section.output_kind != FOUR_BAR
+
+    @property
+    def size(self) -> float:
+        """The frame of a four-bar, or the stroke of a slider."""
+        return float(np.ptp(self.outputs)) if self.slides else float(self.section.frame or 1.0)
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the mechanism."""
+        return complex(self.outputs.mean(), 0.0) if self.slides else self.size / 2 + 0j
+
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+        """Linkages of every assembly."""
+        # The output link, or the slider, as it is seen from the input link.
+        back = np.exp(-1j * self.inputs)
+        place = self.outputs if self.slides else np.full(len(back), self.size)
+        seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
+        found, words = body.choices(seen, self.section, random, zeros=self.section.zeros == "fixed", slides=self.slides)
+        conditions.told.append(words)
+        links = next(part for part in found if part.kind == LINK)
+        # The frame itself is a dyad between the links.
+        links = links.take(
+            (np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size))
+        )
+        if len(links):
+            part = self._linkage(links)
+            yield from assembled(part, self.gaps(part, links), conditions, self.size if self.slides else 1.0)
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0 if self.slides else self.factor
+
+    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return np.empty(0, dtype=complex)
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and what it should be at each position, in the study's units."""
+        if self.slides:
+            zero = solution.poses.point("B")[0].real.mean() - self.outputs.mean()
+            return "B.x", {"B.x": (self.outputs + zero).tolist()}
+        reached = np.unwrap(np.angle(solution.poses.rotation("rocker")[0] * np.exp(-1j * self.outputs)))
+        return "rocker.angle", {"rocker.angle": ((self.outputs + reached.mean()) / self.factor).tolist()}
+
+    def _linkage(self, links: Dyads) -> Candidates:
+        """The linkages with these couplers; the crank stands at the input plus the angle of its pin."""
+        kind = kind_of("function", self.section.output_kind)
+        values = np.tile(kind.nominal, (len(links), 1))
+        numbers = {
+            "ground.O.x": 0.0,
+            "ground.O.y": 0.0,
+            "crank.length": np.abs(links.pivot),
+            "coupler.length": links.length,
+        }
+        if self.slides:
+            numbers |= {"ground.D.x": 0.0, "ground.D.y": links.pin.imag, "rail.direction": 0.0}
+        else:
+            numbers |= {"ground.D.x": self.size, "ground.D.y": 0.0, "rocker.length": np.abs(links.pin)}
+        for name, number in numbers.items():
+            values[:, kind[name]] = number
+        return Candidates(kind, values, self.inputs + np.angle(links.pivot)[:, None])
+
+    def gaps(self, part: Candidates, links: Dyads) -> list[Floats]:
+        """Errors of the output at each input, of each assembly."""
+        gaps = []
+        for modes in part.kind.modes:
+            poses = part.kind.solve(part.values, part.angles, modes)
+            if self.slides:
+                gaps.append(np.abs(part.kind.points(poses).real - self.outputs - links.pin.real[:, None]))
+                continue
+            turned = np.where(poses.valid, poses.rotation("rocker"), np.nan)
+            gaps.append(np.abs(np.angle(turned * np.exp(-1j * (self.outputs + np.angle(links.pin)[:, None])))))
+        return gaps
+
+
+@dataclass(frozen=True, eq=False)
+class PathTask:
+    """Points that a point passes."""
+
+    section: SynthesisSection
+    factor: float
+    path: paths.Points
+
+    @property
+    def centre(self) -> complex:
+        """The middle of the points."""
+        return self.path.centre
+
+    @property
+    def size(self) -> float:
+        """The extent of the points."""
+        return self.path.size
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0
+
+    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return self.path.points
+
+    def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
+        """The output that is judged, and where it should be at each position."""
+        return POINT, {POINT: _pairs(self.path.points)}
+
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+        """Linkages of every kind and assembly."""
+        section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
+        for name in section.kinds or (FOUR_BAR,):
+            kind = kind_of("path", name)
+            bound, exact = Bound(kind, self), []
+            for modes in kind.modes:
+                ratio = min(section.limits.ratio, _SAMPLED) if bound.in_place else section.limits.ratio
+                samples = paths.samples(kind, random, count, ratio, full_turn=section.needs_turn)
+                if bound.in_place:
+                    samples = bound.placed(samples)
+                most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
+                fits = paths.fits(kind, modes, self.path, samples, bound, most)
+                exact.append(_exact(fits, self.size))
+                if not len(fits.costs):
+                    continue
+                rows = conditions.begun(kind, fits.values, fits.costs, MOST)
+                values, angles = fits.values[rows], fits.angles[rows]
+                gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
+                yield Pool(passed(kind, modes, values, angles, full_turn=section.needs_turn), gaps)
+            if len(self.path.points) <= paths.MOST_EXACT:
+                whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
+                conditions.told.append(f"{whole} exact, the last new one at start {last} of {starts}" if whole else
+                                       f"none exact of {starts} starts")  # fmt: skip
+
+
+Task = BodyTask | FunctionTask | PathTask
+
+
+def _exact(fits: paths.Fits, size: float) -> tuple[int, int, int]:
+    """How many linkages pass all points, the start (from 1) that gave the last new one, and the number of starts."""
+    kept: list[Floats] = []
+    last, limit = 0, (EXACT * size) ** 2 * fits.angles.shape[1]
+    for row in np.flatnonzero(fits.costs <= limit)[np.argsort(fits.starts[fits.costs <= limit])].tolist():
+        values = fits.values[row]
+        if not kept or (np.abs(np.array(kept) - values) / (np.abs(values) + size)).max(axis=1).min() > _DISTINCT:
+            kept.append(values)
+            last = int(fits.starts[row]) + 1
+    return len(kept), last, int(fits.starts.max(initial=-1)) + 1
+
+
+def _pairs(places: Complexes) -> list[list[float]]:
+    return [[place.real, place.imag] for place in places.tolist()]
+
+
+class Bound:
+    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can."""
+
+    def __init__(self, kind: Kind, task: PathTask) -> None:
+        self.kind, self.task = kind, task
+        section = task.section
+        self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
+        self.ends = {
+            kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
+        }
+        self.ground = section.lengths.get("ground", (0.0, np.inf))
+        pivots = section.pivots
+        self.given = None if pivots is None or isinstance(pivots, Region) else np.array([complex(*p) for p in pivots])
+        self.box = pivots if isinstance(pivots, Region) and pivots.through is None else None
+        self.fixed = np.zeros(len(kind.places), dtype=bool)
+        self.in_place = self.given is not None and len(self.given) >= len(kind.pivots)
+        if self.in_place:
+            self.fixed[[column for pair in kind.pivots for column in pair]] = True
+
+    def placed(self, values: Floats) -> Floats:
+        """Linkages turned, scaled and shifted to the first two of the given pivots."""
+        assert self.given is not None
+        first, second = (values[:, self.kind[f"ground.{name}.x"]] + 1j * values[:, self.kind[f"ground.{name}.y"]]
+                         for name in "OD")  # fmt: skip
+        turned = (self.given[1] - self.given[0]) / (second - first)
+        return self(self.kind.moved(values, turned, self.given[0] - turned * first))
+
+    def __call__(self, values: Floats) -> Floats:
+        values, limits = values.copy(), self.task.section.limits
+        for x, y in self.kind.pivots:
+            place = values[:, x] + 1j * values[:, y]
+            if self.fixed.any():
+                assert self.given is not None
+                # In the order of the points: D before O in the columns, O first as given.
+                place = np.full(len(values), self.given[self._order(x)])
+            away = place - self.task.centre
+            far = np.maximum(np.abs(away) / (limits.reach * self.task.size), 1.0)
+            place = self.task.centre + away / far
+            if self.box is not None:
+                place = np.clip(place.real, *_ends(self.box.x)) + 1j * np.clip(place.imag, *_ends(self.box.y))
+            values[:, x], values[:, y] = place.real, place.imag
+        # The shortest gives way to the ratio; a negative length is one to the other side.
+        own = np.abs(values[:, self.links])
+        values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
+        for column, (low, high) in self.ends.items():
+            values[:, column] = np.clip(values[:, column], low, high)
+        if not self.in_place and self.links:
+            # The frame keeps the ratio by its second pivot.
+            (x, y), (u, v) = ((self.kind[f"ground.{name}.x"], self.kind[f"ground.{name}.y"]) for name in "OD")
+            own, frame = values[:, self.links], values[:, u] - values[:, x] + 1j * (values[:, v] - values[:, y])
+            length = np.maximum(np.abs(frame), np.finfo(float).tiny)
+            low, high = self.ground
+            least = np.maximum(own.max(axis=1) / limits.ratio, low)
+            moved = frame * np.clip(length, least, np.minimum(own.min(axis=1) * limits.ratio, high)) / length
+            values[:, u], values[:, v] = values[:, x] + moved.real, values[:, y] + moved.imag
+        return values
+
+    def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
+        """Which linkages have the transmission angle that is asked for over a turn of the crank."""
+        least = self.task.section.transmission
+        if least is None or not self.task.section.needs_turn:
+            return np.ones(len(values), dtype=bool)
+        good = np.zeros(len(values), dtype=bool)
+        turn = 2 * np.pi * np.arange(_AROUND)[None] / _AROUND
+        for first in range(0, len(values), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            poses = self.kind.solve(values[some], turn, modes)
+            good[some] = margins(self.kind, poses)[1].min(axis=1) >= np.sin(float(least.at_least) * self.task.factor)
+        return good
+
+    def _order(self, column: int) -> int:
+        names = sorted(self.kind.places[x].split(".")[1] for x, _ in self.kind.pivots)
+        names.sort(key="ODF".index)
+        return names.index(self.kind.places[column].split(".")[1])
+
+
+def _ends(ends: Any) -> tuple[float, float]:
+    return ends if isinstance(ends, tuple) else (-np.inf, np.inf) if ends is None else (ends, ends)
+
+
+def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
+    """Linkages by the assembly in which they are at the first position, with how they pass the others."""
+    stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
+    rows = conditions.begun(part.kind, part.values, stack.min(axis=0).max(axis=1), MOST)
+    part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
+    nearest = stack.min(axis=0)
+    first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
+    for number, modes in enumerate(part.kind.modes):
+        some = np.flatnonzero((first == number) & np.isfinite(nearest).all(axis=1))
+        if len(some):
+            other = stack[number, some] > nearest[some] + _OTHER * size
+            way = passed(part.kind, modes, part.values[some], part.angles[some], other.any(axis=1),
+                         full_turn=conditions.section.needs_turn)  # fmt: skip
+            yield Pool(way, nearest[some])
+
+
+def task_of(study: Study, section: SynthesisSection) -> Task:
+    """The task of a study."""
+    factor = study.units.angle_factor
+    if section.body is not None:
+        places = np.array([complex(part.x, part.y) for part in section.body])
+        positions = Positions(places, np.exp(1j * factor * np.array([part.angle for part in section.body])))
+        return BodyTask(section, factor, positions)
+    if section.function is not None:
+        outputs = np.array(section.function.output, dtype=float)
+        slides = section.output_kind != FOUR_BAR
+        inputs = factor * np.array(section.function.input, dtype=float)
+        return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
+    assert section.path is not None
+    if section.of is not None:
+        message = "linkages of a study's own mechanism are not looked for; give 'kinds', or ask optimize"
+        raise StudyError([study.problem(message, "synthesis", "of")])
+    points = section.path.points
+    table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
+    if table.shape[1] != 2 or len(table) < 2:
+        raise StudyError(
+            [study.problem("a path has two points or more, a row [x, y] each", "synthesis", "path", "points")]
+        )
+    timing = None if section.path.timing is None else factor * np.array(section.path.timing)
+    if timing is not None and len(timing) != len(table):
+        message = f"{len(timing)} crank angles for {len(table)} points"
+        raise StudyError([study.problem(message, "synthesis", "path", "timing")])
+    # The form of a path needs no more points; the time of a search grows with them.
+    every = -(-len(table) // _MOST_POINTS)
+    table, timing = table[::every], None if timing is None else timing[::every]
+    path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
+    if not path.size > 0:
+        raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
+    return PathTask(section, factor, path)

@@ -1,0 +1,71 @@
+"""Tasks that no linkage does, or that are no tasks: what is said of them."""
+
+from typing import Any
+
+import pytest
+import yaml
+
+import mechdesign
+
+THREE = [{"x": 0, "y": 0, "angle": 0}, {"x": 2, "y": 1, "angle": 30}, {"x": 3, "y": 3, "angle": 75}]
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+def solved(task: Any) -> Any:
+    return mechdesign.synthesize(mechdesign.load(text=yaml.safe_dump({"synthesis": task})), seed=1)
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        ({}, "a task is one of body, function and path"),
+        ({"body": []}, "2 to 1000 positions, not 0"),
+        ({"body": [THREE[0], THREE[0]]}, "position 2 of the body is one of those before it"),
+        ({"body": [THREE[0], {"x": 1e300, "y": 0, "angle": 0}]}, "too large"),
+        ({"body": [THREE[0], {"x": float("inf"), "y": 0, "angle": 0}]}, "finite"),
+        ({"body": THREE, "pivots": {"x": [4, -4]}}, "-4 is not beyond 4"),
+        ({"body": THREE, "pivots": []}, "not an empty list"),
+        ({"body": THREE, "lengths": {"cramk": [1, 2]}}, "no link 'cramk'; links are ground, crank"),
+        ({"body": THREE, "lengths": {"crank": [2, 1]}}, "crank: 1 is not beyond 2"),
+        ({"function": {"input": [], "output": []}}, "3 to 1000 pairs, not 0"),
+        ({"function": {"input": [1, 2, 3], "output": [1, 2]}}, "3 values of 'input' for 2 of 'output'"),
+        ({"path": {"points": []}}, "two points or more, not 0"),
+        ({"path": {"points": [[1, 1], [1, 1]]}}, "all points of the path are one"),
+        ({"path": {"points": [[float("nan"), 0], [1, 0]]}}, "finite number, not nan"),
+        ({"path": {"points": [[0, 0]] * 10_001}}, "at most 10000 points, not 10001"),
+        ({"path": {"points": "missing.csv"}}, "missing.csv cannot be read"),
+        ({"path": {"points": SQUARE, "timing": [0, 1]}}, "2 crank angles for 4 points"),
+        ({"path": {"points": SQUARE}, "kinds": "trammel"}, "no trammel is looked for from a path"),
+        ({"path": {"points": SQUARE}, "rank": "yield"}, "a yield needs 'judge'"),
+    ],
+)  # fmt: skip
+def test_what_is_no_task_is_said(task: Any, words: str) -> None:
+    with pytest.raises(mechdesign.StudyError, match=words):
+        solved(task)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "words"),
+    [
+        ({"pivots": {"x": [100, 101], "y": [100, 101]}}, "a pivot is too far away"),
+        ({"keep_out": {"x": [-99, 99], "y": [-99, 99]}}, "a pivot lies where none may"),
+    ],
+)
+def test_conditions_that_contradict_each_other_are_named(conditions: Any, words: str) -> None:
+    with pytest.raises(mechdesign.AssemblyError, match=words) as raised:
+        solved({"body": THREE, **conditions, "kinds": "four_bar"})
+    assert "the nearest is in nearest.yaml: a pivot" in str(raised.value)
+
+
+def test_where_pivots_are_wished_each_linkage_has_one_in_the_box() -> None:
+    table = solved({"body": THREE, "pivots": {"x": [-4, 4], "y": [-3, 0]}}).tables["solutions"]
+    assert "trammel" not in table["kind"]
+    assert table["max_error"].max() < 1e-9
+    pivot = table["ground.O.x"] + 1j * table["ground.O.y"]
+    assert ((abs(pivot.real) <= 4) & (pivot.imag <= 1e-6) & (pivot.imag >= -3 - 1e-6)).all()
+
+
+@pytest.mark.nightly
+def test_points_that_come_twice_and_points_in_a_line_are_paths() -> None:
+    for points in ([[0, 0], [0, 0], [1, 0], [1, 1], [1, 1]], [[0, 0], [1, 0], [2, 0], [3, 0]]):
+        assert solved({"path": {"points": points}}).tables["solutions"]["error"][0] < 1e-6
