@@ -17,6 +17,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.motion.finer import asked_at, extremes_of, finer, together
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import PoseValues
+from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.along import KinematicAlong
 from mechdesign.questions.kinematics.limits import LimitPlace
 from mechdesign.questions.kinematics.loops import Toggle
@@ -74,6 +75,9 @@ class DrawnPoses(Drawn):
             return self
         question, poses = along.question, shown.poses
         sizes = {**question.parts, **{name: size for name, (size, _) in question.columns.items()}}
+        # Errors of targets that are given pose by pose have no values between them.
+        at_poses = {targets.error(output) for output in targets.judged(question.study)} - question.errors.keys()
+        sizes = {name: size for name, size in sizes.items() if name not in at_poses}
 
         def columns(motion: PoseValues) -> dict[str, Floats]:
             valid, arrays = motion.valid, motion.arrays

@@ -64,7 +64,8 @@ def motion_columns(motion: PoseValues) -> list[Column]:
                 columns.append(MOTION[f"<output>_{order}"].column(arrays[rate], rates[rate], output=name))
         point, _, axis = name.rpartition(".")
         for owner, quantity in errors.items():
-            if owner == name or (axis == "y" and owner == point):
+            # Between poses there are no errors of targets that are given pose by pose.
+            if error(owner) in arrays and (owner == name or (axis == "y" and owner == point)):
                 kind = "<point>_error" if owner in question.study.mechanism.points else "<output>_error"
                 values, unit = arrays[error(owner)], label(quantity)
                 columns.append(MOTION[kind].column(values, unit, point=owner, output=owner))

@@ -20,10 +20,6 @@ SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("yield_low", "lower end of its interval"), ("yield_high", "upper end of its interval"),
     ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),
     ColumnKind("<dimension>", "dimension of the linkage by its name in its study", "as the dimension"))  # fmt: skip
-CURVE = TableKind.of("curve", "pivots, and pins in the body, of dyads through all positions",
-    ("pivot_x", "pivot in the frame", "length"), ("pivot_y", "pivot in the frame", "length"),
-    ("pin_x", "pin in the body", "length"), ("pin_y", "pin in the body", "length"),
-    ("length", "of the link between them", "length"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(SOLUTIONS, "error", "error of the best", "first"),
     KeyNumber(SOLUTIONS, "transmission_angle", "its smallest transmission angle", "first"),

@@ -56,7 +56,10 @@ def _curve(solution: Solution) -> Complexes:
 def trade_picture(view: View) -> Picture | None:
     """Error against the smallest transmission angle; the front is those that none surpasses in both."""
     table = view.result.tables["solutions"]
-    errors, angles = np.asarray(table["error"]), np.asarray(table["transmission_angle"])
+    drawn = DrawnSolutions.of(view.result)
+    # What is rounding is no error.
+    errors = np.array([rounded(one.error, drawn.task.size) for one in drawn.solutions]) / drawn.task.error_factor
+    angles = np.asarray(table["transmission_angle"])
     if len(table) < 2:
         return None
     best = np.array([not ((errors < e) & (angles >= a) | (errors <= e) & (angles > a)).any()
