@@ -69,3 +69,11 @@ def test_where_pivots_are_wished_each_linkage_has_one_in_the_box() -> None:
 def test_points_that_come_twice_and_points_in_a_line_are_paths() -> None:
     for points in ([[0, 0], [0, 0], [1, 0], [1, 1], [1, 1]], [[0, 0], [1, 0], [2, 0], [3, 0]]):
         assert solved({"path": {"points": points}}).tables["solutions"]["error"][0] < 1e-6
+
+
+def test_pivots_lie_on_the_line_that_is_given_by_its_angle() -> None:
+    """Through (0, -1) at 30 deg from the x axis."""
+    line = {"through": [0, -1], "direction": 30}
+    table = solved({"body": THREE, "pivots": line, "kinds": "four_bar"}).tables["solutions"]
+    for point in ("ground.O", "ground.D"):
+        assert table[f"{point}.y"] == pytest.approx(-1 + table[f"{point}.x"] / 3**0.5, abs=1e-5)

@@ -67,11 +67,12 @@ class Candidates:
 
 
 def choices(
-    task: Positions, section: SynthesisSection, random: np.random.Generator, *, zeros: bool = False,
+    task: Positions, section: SynthesisSection, random: np.random.Generator, factor: float, *, zeros: bool = False,
     slides: bool = False,
 ) -> tuple[list[Dyads], str]:  # fmt: skip
     """Dyads through all positions of a body, one of each kind, and what is said of them.
 
+    `factor` is radians in the unit of the section's angles.
     With `zeros` the pivot lies on the x axis of the frame, and the pin on that of the body unless the body slides.
     """
     centre, size = (0j if zeros or slides else task.centre), task.size
@@ -81,7 +82,7 @@ def choices(
         found = _least_squares(scaled, random, np.array(fixed).reshape(-1, 8))
         words = f"{count} positions are met by least squares"
     else:
-        wishes = _wishes(count + len(fixed), section, task, random)
+        wishes = _wishes(count + len(fixed), section, task, random, factor)
         rows = ((np.concatenate([np.broadcast_to(fixed, (*wish.shape[:-2], len(fixed), 8)), wish], axis=-2)
                  if fixed else wish) for wish in wishes)  # fmt: skip
         parts = [dyads.dyads(scaled.places, scaled.rotations, wish) for wish in rows]
@@ -99,15 +100,16 @@ def choices(
     ], words  # fmt: skip
 
 
-def _wishes(count: int, section: SynthesisSection, task: Positions, random: np.random.Generator) -> Iterator[Floats]:
+def _wishes(
+    count: int, section: SynthesisSection, task: Positions, random: np.random.Generator, factor: float
+) -> Iterator[Floats]:
     """Rows of wishes that leave no choice, each of shape (samples, rows, 8)."""
     if count == 5:
         yield np.empty((0, 8))
         return
-    pivots = _sampled(section.pivots, random, section.limits.reach)
-    pivots = (pivots - task.centre) / task.size if section.pivots is not None else pivots
-    pins = _sampled(section.pins, random, section.limits.reach)
-    pins = pins / task.size if section.pins is not None else pins
+    reach = section.limits.reach * task.size
+    pivots = (_sampled(section.pivots, random, task.centre, reach, factor) - task.centre) / task.size
+    pins = _sampled(section.pins, random, 0j, reach, factor) / task.size
     turns = np.exp(1j * random.uniform(0, np.pi, WISHES))
     free = random.normal(size=(WISHES, 5 - count, 8))
     # Of a slide w = 0, and X = 0 or A = 0 by one of the conics' points.
@@ -128,21 +130,25 @@ def _wishes(count: int, section: SynthesisSection, task: Positions, random: np.r
 
 
 def _sampled(
-    places: Sequence[tuple[float, float]] | Region | None, random: np.random.Generator, reach: float
-) -> Complexes:
-    """Places in a region, each given one equally often; without a region within `reach` of the origin."""
+    places: Sequence[tuple[float, float]] | Region | None, random: np.random.Generator, centre: complex, reach: float,
+    factor: float,
+) -> Complexes:  # fmt: skip
+    """Places in a region, each given one equally often; where it has no end, within `reach` of a centre."""
     if places is None:
         around = np.exp(1j * random.uniform(-np.pi, np.pi, WISHES))
-        return np.asarray(reach * np.sqrt(random.uniform(size=WISHES)) * around)
+        return np.asarray(centre + reach * np.sqrt(random.uniform(size=WISHES)) * around)
     if not isinstance(places, Region):
         given = np.array([complex(x, y) for x, y in places])
         return np.asarray(np.resize(given, WISHES))
     if places.through is not None:
-        along = np.exp(1j * places.direction) * reach * random.uniform(-1, 1, WISHES)
-        return np.asarray(complex(*places.through) + along)
+        along = places.along(factor)
+        nearest = complex(*places.through) + ((centre - complex(*places.through)) * np.conj(along)).real * along
+        return np.asarray(nearest + along * reach * random.uniform(-1, 1, WISHES))
     parts = []
-    for ends in (places.x, places.y):
-        low, high = ends if isinstance(ends, tuple) else (ends, ends) if ends is not None else (-reach, reach)
+    for ends, middle in ((places.x, centre.real), (places.y, centre.imag)):
+        low, high = (
+            ends if isinstance(ends, tuple) else (ends, ends) if ends is not None else (middle - reach, middle + reach)
+        )
         parts.append(random.uniform(low, high, WISHES) if high > low else np.full(WISHES, low))
     return parts[0] + 1j * parts[1]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
@@ -100,6 +101,10 @@ class Region(fields.Model):
     """A point of a line. Example: [0, -2]"""
     direction: fields.Angle = 0.0
     """Angle of this line from the x axis. Example: 30"""
+
+    def along(self, factor: float) -> complex:
+        """Unit vector along the line; `factor` is radians in the study's unit of angle."""
+        return cmath.exp(1j * factor * self.direction)
 
     def faults(self) -> Iterator[str]:
         for key in ("x", "y"):

@@ -163,7 +163,7 @@ class Conditions:
             ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
         yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
         if isinstance(section.pivots, Region):
-            yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size).all(axis=1)
+            yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size, self.factor).all(axis=1)
         elif section.pivots is not None:
             given = np.array([complex(*place) for place in section.pivots])
             gap = np.abs(held[..., None] - given).min(axis=2)
@@ -201,11 +201,11 @@ class Conditions:
         )
 
 
-def inside(region: Region, places: Any, size: float) -> Any:
+def inside(region: Region, places: Any, size: float, factor: float) -> Any:
     """Which places, x + i y, lie in a region; a line has a width within rounding."""
     slack = 1e-6 * size
     if region.through is not None:
-        away = (places - complex(*region.through)) * np.exp(-1j * region.direction)
+        away = (places - complex(*region.through)) / region.along(factor)
         return np.abs(away.imag) <= slack
     good = np.ones(np.shape(places), dtype=bool)
     for ends, values in ((region.x, places.real), (region.y, places.imag)):

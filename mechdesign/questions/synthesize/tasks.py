@@ -58,7 +58,7 @@ class BodyTask:
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
-        found, words = body.choices(self.positions, self.section, random)
+        found, words = body.choices(self.positions, self.section, random, self.factor)
         conditions.told.append(words)
         for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
             yield from assembled(part, self.gaps(part), conditions, self.size)
@@ -121,7 +121,8 @@ class FunctionTask:
         back = np.exp(-1j * self.inputs)
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
-        found, words = body.choices(seen, self.section, random, zeros=self.section.zeros == "fixed", slides=self.slides)
+        fixed = self.section.zeros == "fixed"
+        found, words = body.choices(seen, self.section, random, self.factor, zeros=fixed, slides=self.slides)
         conditions.told.append(words)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
