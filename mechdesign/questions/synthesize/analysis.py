@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from mechdesign.ground.errors import AssemblyError, StudyError
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result, Table
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.synthesize.columns import SOLUTIONS
 from mechdesign.questions.synthesize.files import judged_share, study_data, study_text
-from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked
+from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
 from mechdesign.questions.synthesize.tasks import Task, task_of
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
@@ -23,9 +25,22 @@ from mechdesign.study.loading import load_data
 class DrawnSolutions(Drawn):
     """The task and its solutions."""
 
+    asked: Study  # with the task
     task: Task
     solutions: tuple[Solution, ...]
-    study: Study  # of the best
+
+    @cached_property
+    def study(self) -> Study:
+        """That of the best."""
+        return load_data(
+            study_data(self.asked, self.task, self.solutions[0], self.asked.name), (), None, self.asked.folder
+        )
+
+    @property
+    def errors(self) -> Floats:
+        """Errors of the solutions in the study's unit, 0 where they are rounding."""
+        errors = [rounded(solution.error, self.task.size) for solution in self.solutions]
+        return np.array(errors) / self.task.error_factor
 
 
 @one_thread()
@@ -57,8 +72,7 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     }
     table = solutions_table(study, task, solutions, scores)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(solutions)}
-    best = load_data(study_data(study, task, solutions[0], study.name), (), None, study.folder)
-    drawn = DrawnSolutions(task, tuple(solutions), best)
+    drawn = DrawnSolutions(study, task, tuple(solutions))
     return Result("synthesize", {table.name: table}, counts=counts, files=files, drawn=drawn, notes=told)
 
 
@@ -85,10 +99,8 @@ def _none(
     best = min((pool for pool in pools if len(pool.way)), key=lambda pool: pool.rms().min(), default=None)
     if best is None:
         return AssemblyError(words)
-    solution, missed = (
-        best.solution(int(best.rms().argmin())),
-        "; ".join(conditions.missed(best, int(best.rms().argmin()))),
-    )
+    row = int(best.rms().argmin())
+    solution, missed = best.solution(row), "; ".join(conditions.missed(best, row))
     message = f"{words}; the nearest is in nearest.yaml: {missed}"
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])

@@ -120,14 +120,11 @@ def _complex(w: Floats, k: int) -> Complexes:
 
 def _quadric(free: Floats) -> Floats:
     """The two conics of w q - conj(A) X for unknowns that are sums of three, shape (count, 2, 3, 3)."""
-    w, a, x, q = free[:, 0].astype(complex), np.conj(_columns(free, 4)), _columns(free, 2), _columns(free, 6)
+    three = np.swapaxes(free, 1, 2)
+    w, a, x, q = three[..., 0], np.conj(_complex(three, 4)), _complex(three, 2), _complex(three, 6)
     form = w[:, :, None] * q[:, None] - a[:, :, None] * x[:, None]
     form = (form + np.swapaxes(form, 1, 2)) / 2
     return np.stack([form.real, form.imag], axis=1)
-
-
-def _columns(free: Floats, k: int) -> Complexes:
-    return free[:, k] + 1j * free[:, k + 1]
 
 
 def _points(free: Floats) -> Floats:

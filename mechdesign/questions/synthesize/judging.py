@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.derivatives import regularity
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses on the way through the task; where a linkage comes nearest to a dead centre, so many more between two of them.
@@ -57,16 +58,10 @@ def in_order(angles: Floats) -> tuple[Floats, Flags]:
     return np.concatenate([angles[:, :1], angles[:, :1] + np.cumsum(steps, axis=1)], axis=1), chosen == 0
 
 
-def margins(kind: Kind, poses: Configuration) -> tuple[Floats, Floats]:
-    """How far poses are from where they no longer close, below 0 beyond; and the sine of the transmission angle."""
-    count = poses.shape
-    closes = np.full(count, np.inf)
-    for closure in poses.closures:
-        closes = np.minimum(closes, np.broadcast_to(closure, count))
-    sine = np.full(count, 1.0)
-    for conditioning in kind.mechanism.linearize(poses).conditionings.values():
-        sine = np.minimum(sine, np.abs(np.broadcast_to(conditioning, count)))
-    return np.where(np.isnan(closes), -np.inf, closes), np.where(poses.valid, sine, 0.0)
+def sines(kind: Kind, poses: Configuration) -> Floats:
+    """Sine of the smallest transmission angle in each pose; 0 where a linkage cannot be assembled."""
+    least = np.broadcast_to(regularity(kind.mechanism.linearize(poses)), poses.shape)
+    return np.where(poses.valid, least, 0.0)
 
 
 def along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
@@ -81,22 +76,21 @@ def along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end
 def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, end: Floats) -> tuple[Flags, Floats]:
     parts = np.linspace(0, 1, POSES)
     poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
-    _, sine = margins(kind, poses)
+    sine = sines(kind, poses)
     worst, dead = sine.min(axis=1), np.asarray(~poses.valid.all(axis=1))
     # Between poses it is lowest beside the lowest of them; a few local minima are looked at.
-    inner = np.concatenate([sine[:, :1] >= np.inf, (sine[:, 1:-1] <= sine[:, :-2]) & (sine[:, 1:-1] <= sine[:, 2:]),
-                            sine[:, :1] >= np.inf], axis=1)  # fmt: skip
-    lane, place = np.nonzero(inner & ~dead[:, None])
-    low, high = parts[place - 1], parts[place + 1]
+    lowest = (sine[:, 1:-1] <= sine[:, :-2]) & (sine[:, 1:-1] <= sine[:, 2:])
+    lane, before = np.nonzero(lowest & ~dead[:, None])
+    low, high = parts[before], parts[before + 2]
     for _ in range(5):
         if not len(lane):
             break
         fine = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, FINER)
         own = kind.solve(values[lane], begin[lane, None] + fine * (end - begin)[lane, None], modes)
-        _, sines = margins(kind, own)
-        np.minimum.at(worst, lane, sines.min(axis=1))
+        sine = sines(kind, own)
+        np.minimum.at(worst, lane, sine.min(axis=1))
         np.logical_or.at(dead, lane, ~own.valid.all(axis=1))
-        at, rows = np.clip(sines.argmin(axis=1), 1, FINER - 2), np.arange(len(lane))
+        at, rows = np.clip(sine.argmin(axis=1), 1, FINER - 2), np.arange(len(lane))
         low, high = fine[rows, at - 1], fine[rows, at + 1]
     worst = np.where(dead, 0.0, worst)
     return dead, np.arcsin(np.clip(worst, 0, 1))

@@ -13,7 +13,6 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.plan import Plan
 from mechdesign.questions.synthesize.declared import BODY, MECHANISMS, POINT
-from mechdesign.study import Study
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 
@@ -23,8 +22,7 @@ class Kind:
 
     def __init__(self, name: str, mechanism: Mapping[str, Any]) -> None:
         self.name, self.data = name, mechanism
-        self.study: Study = load_data({"mechanism": mechanism}, (), None, Folder())
-        self.mechanism: Mechanism = self.study.mechanism
+        self.mechanism: Mechanism = load_data({"mechanism": mechanism}, (), None, Folder()).mechanism
         description = self.mechanism.description
         self.places = tuple(description.places)
         self.nominal = np.array([place.nominal for place in description.places.values()])

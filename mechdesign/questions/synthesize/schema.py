@@ -250,8 +250,8 @@ class SynthesisSection(fields.Model):
     solutions: Annotated[int, fields.whole(1, 1000)] = 20
     """How many are kept. Example: 10"""
     evaluations: Annotated[int, fields.whole(100, 100_000_000)] | None = None
-    """How many linkages are sampled. Left out: 30,000 of each kind and assembly for a path, 4,000 pairs of dyads for a
-    body. Example: 100000
+    """How many linkages are sampled. Left out: 30,000 of each kind and assembly for a closed path, 4,000 for
+    an open one, 1,500 pairs of dyads of each kind for a body. Example: 100000
     """
     seed: Annotated[int, fields.whole(0)] | None = None
     """Seed of the samples; left out: that of the study. Example: 1"""

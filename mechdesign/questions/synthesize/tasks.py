@@ -14,7 +14,7 @@ from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
-from mechdesign.questions.synthesize.judging import margins, passed
+from mechdesign.questions.synthesize.judging import passed, sines
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
@@ -39,12 +39,25 @@ _OTHER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class BodyTask:
-    """Positions of a body."""
+class _Task:
+    """What the tasks share."""
 
     section: SynthesisSection
     factor: float  # radians in the study's unit of angle
+    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
+
+    @property
+    def error_factor(self) -> float:
+        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
+        return 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTask(_Task):
+    """Positions of a body."""
+
     positions: Positions
+    apart: ClassVar[tuple[str, ...]] = (f"{BODY}.{POINT}.x", f"{BODY}.{POINT}.y")
 
     @property
     def centre(self) -> complex:
@@ -62,16 +75,6 @@ class BodyTask:
         conditions.told.append(words)
         for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
             yield from assembled(part, self.gaps(part), conditions, self.size)
-
-    @property
-    def error_factor(self) -> float:
-        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
-        return 1.0
-
-    apart: ClassVar[tuple[str, ...]] = (
-        f"{BODY}.{POINT}.x",
-        f"{BODY}.{POINT}.y",
-    )  #: places that are no dimensions of the linkage
 
     @property
     def points(self) -> Complexes:
@@ -92,11 +95,9 @@ class BodyTask:
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionTask:
+class FunctionTask(_Task):
     """Pairs of an input angle and an output angle or place."""
 
-    section: SynthesisSection
-    factor: float
     inputs: Floats  # radians
     outputs: Floats  # radians, or lengths
 
@@ -137,8 +138,6 @@ class FunctionTask:
     def error_factor(self) -> float:
         """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
         return 1.0 if self.slides else self.factor
-
-    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
 
     @property
     def points(self) -> Complexes:
@@ -185,11 +184,9 @@ class FunctionTask:
 
 
 @dataclass(frozen=True, eq=False)
-class PathTask:
+class PathTask(_Task):
     """Points that a point passes."""
 
-    section: SynthesisSection
-    factor: float
     path: paths.Points
 
     @property
@@ -201,13 +198,6 @@ class PathTask:
     def size(self) -> float:
         """The extent of the points."""
         return self.path.size
-
-    @property
-    def error_factor(self) -> float:
-        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
-        return 1.0
-
-    apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
 
     @property
     def points(self) -> Complexes:
@@ -330,7 +320,7 @@ class Bound:
         for first in range(0, len(values), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
             poses = self.kind.solve(values[some], turn, modes)
-            good[some] = margins(self.kind, poses)[1].min(axis=1) >= np.sin(float(least.at_least) * self.task.factor)
+            good[some] = sines(self.kind, poses).min(axis=1) >= np.sin(float(least.at_least) * self.task.factor)
         return good
 
     def _order(self, column: int) -> int:

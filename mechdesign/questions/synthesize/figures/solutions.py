@@ -12,7 +12,7 @@ from mechdesign.drawing.pictures import View, picture
 from mechdesign.drawing.scene import Scene
 from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
-from mechdesign.questions.synthesize.solutions import Solution, rounded
+from mechdesign.questions.synthesize.solutions import Solution
 
 # Linkages on the page, and poses of their curves.
 _SHOWN, _POSES = 9, 181
@@ -22,7 +22,7 @@ _FEW = 20
 @picture(View, "solutions", order=10)
 def solutions_picture(view: View) -> Picture:
     """The best linkages, each at the first position of the task, with its curve and the points."""
-    drawn = DrawnSolutions.of(view.result)
+    drawn, unit = DrawnSolutions.of(view.result), view.result.tables["solutions"].column("error").unit
     panels = []
     for number, solution in enumerate(drawn.solutions[:_SHOWN], 1):
         first = (np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp))
@@ -37,8 +37,7 @@ def solutions_picture(view: View) -> Picture:
                 Dots(points.real, points.imag, label="the task", look={"color": style.VERMILION, "markersize": 4}),
             ]
         shows = np.concatenate([curve[np.isfinite(curve)] if len(points) else points, points, [*still.points.values()]])
-        unit = view.study.units.label("length" if drawn.task.error_factor == 1.0 else "angle")
-        error = quantity(rounded(solution.error, drawn.task.size) / drawn.task.error_factor, unit)
+        error = quantity(float(drawn.errors[number - 1]), unit)
         words = f"{number}: {solution.kind.name.replace('_', ' ')}, error {error}"
         faults = f"defect: {solution.defects}" if solution.defects else ""
         panels.append(drawn_plane(marks, shows, drawn.study, "\n".join(filter(None, (words, faults)))))
@@ -55,10 +54,7 @@ def _curve(solution: Solution) -> Complexes:
 @picture(View, "trade", order=20)
 def trade_picture(view: View) -> Picture | None:
     """Error against the smallest transmission angle; the front is those that none surpasses in both."""
-    table = view.result.tables["solutions"]
-    drawn = DrawnSolutions.of(view.result)
-    # What is rounding is no error.
-    errors = np.array([rounded(one.error, drawn.task.size) for one in drawn.solutions]) / drawn.task.error_factor
+    table, errors = view.result.tables["solutions"], DrawnSolutions.of(view.result).errors
     angles = np.asarray(table["transmission_angle"])
     if len(table) < 2:
         return None
