@@ -63,6 +63,17 @@ mechanism:
   drives: {theta: {angle: crank}}
   sketch: {A: [20, 22], B: [105, 0]}
 """
+# A crank-rocker with a coupler point.
+FOUR_BAR = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+"""
 
 
 def study_of(text: str, *overrides: str) -> mechdesign.Study:

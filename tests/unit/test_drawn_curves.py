@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.pictures import figure_of
-from helpers.studies import study_of
+from helpers.studies import FOUR_BAR, study_of
 from matplotlib.axes import Axes
 
 import mechdesign
@@ -150,19 +150,9 @@ def test_places_that_fall_together_leave_the_crank_angle_on_the_axis() -> None:
 
 def test_errors_that_are_given_pose_by_pose_cost_no_picture_of_a_path():
     """A path of the drive with as many rows of a target as poses: its errors have no values between them."""
-    study = mechdesign.load(
-        text="""
-mechanism:
-  links:
-    ground: {O: [0, 0], D: [100, 0]}
-    crank: [O, A, 30]
-    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
-    rocker: [D, B, 60]
-  drives: {theta: {angle: crank}}
-  sketch: {A: [0, 30], B: [75, 55]}
-  targets: {P: [[40, 40], [30, 50], [10, 40], [0, 30]]}
-kinematics: {path: {theta: [0, 60, 120, 180]}, outputs: [P]}
-"""
+    study = study_of(
+        FOUR_BAR + "kinematics: {path: {theta: [0, 60, 120, 180]}, outputs: [P]}",
+        "mechanism.targets={P: [[40, 40], [30, 50], [10, 40], [0, 30]]}",
     )
     figure = mechdesign.kinematics(study).figure("motion")
     assert figure.axes

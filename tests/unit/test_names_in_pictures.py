@@ -8,28 +8,18 @@ import numpy as np
 import pytest
 from helpers.command_line import ask
 from helpers.pictures import figure_of
-from helpers.studies import study_of
+from helpers.studies import FOUR_BAR, study_of
 
 import mechdesign
 from mechdesign.drawing import fonts, style
 
 # A point in a letter that one of Matplotlib's other fonts has, STIXGeneral.
-FOUR_BAR = """
-mechanism:
-  links:
-    ground: {O: [0, 0], D: [100, 0]}
-    crank: [O, A, 30]
-    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
-    rocker: [D, B, 60]
-  drives: {theta: {angle: crank}}
-  sketch: {A: [0, 30], B: [75, 55]}
-kinematics: {outputs: [P, rocker.angle], sweep: {theta: {from: 0, to: 360, step: 30}}}
-"""
+TURNING = FOUR_BAR + "kinematics: {outputs: [P, rocker.angle], sweep: {theta: {from: 0, to: 360, step: 30}}}\n"
 
 
 @pytest.mark.slow
 def test_letters_without_a_font_are_told_in_one_sentence(tmp_path):
-    done = ask("kinematics", "-", "--out", tmp_path, study=FOUR_BAR.replace("rocker", "曲柄").replace("rod", "연결봉"))
+    done = ask("kinematics", "-", "--out", tmp_path, study=TURNING.replace("rocker", "曲柄").replace("rod", "연결봉"))
     assert done.exit_code == 0
     told = [line for line in done.stderr.splitlines() if "warning" in line.lower()]
     assert len(told) == 1, done.stderr
@@ -40,7 +30,7 @@ def test_letters_without_a_font_are_told_in_one_sentence(tmp_path):
 
 @pytest.mark.slow
 def test_letters_of_an_installed_font_are_drawn_and_nothing_is_told(monkeypatch):
-    study = study_of(FOUR_BAR.replace("P", "の"))
+    study = study_of(TURNING.replace("P", "の"))
     assert "の" in fonts.lost_letters(str(study.resolved))
     result = mechdesign.kinematics(study)
     boxes = drawn(study, result)
@@ -60,7 +50,7 @@ def drawn(study, result):
 
 def test_curves_of_names_that_differ_at_their_end_are_told_apart():
     name = "messpunkt_auf_der_übergroßen_pleuelstange_der_schmiedepresse"
-    study = study_of(FOUR_BAR.replace("P", name))
+    study = study_of(TURNING.replace("P", name))
     with style.context():
         figure = figure_of(study, mechdesign.kinematics(study), "motion")
         entries = [text.get_text() for axes in figure.axes if axes.get_legend() for text in axes.get_legend().texts]

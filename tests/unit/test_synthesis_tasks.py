@@ -77,3 +77,10 @@ def test_pivots_lie_on_the_line_that_is_given_by_its_angle() -> None:
     table = solved({"body": THREE, "pivots": line, "kinds": "four_bar"}).tables["solutions"]
     for point in ("ground.O", "ground.D"):
         assert table[f"{point}.y"] == pytest.approx(-1 + table[f"{point}.x"] / 3**0.5, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_of_many_points_it_is_told_how_many_count() -> None:
+    points = [[float(x), float(abs(x % 4 - 2))] for x in range(401)]
+    task = {"path": {"points": points}, "limits": {"reach": 100, "ratio": 1000}, "evaluations": 100}
+    assert "134 of 401 points count, evenly chosen" in solved(task).notes

@@ -13,7 +13,7 @@ from mechdesign.drawing.dimensions import table_rows, tolerance_of
 from mechdesign.drawing.scene import Still
 from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.ground.numerics.rounding import STILL
+from mechdesign.ground.numerics.rounding import STILL, cleared
 from mechdesign.ground.results import Result
 from mechdesign.ground.table_text import Rounding
 from mechdesign.mechanism.cams import CamFollower
@@ -59,7 +59,7 @@ def general_tolerance(study: Study) -> str:
 
 def _number(value: float, size: float) -> str:
     """A length; 0 of what is rounding beside a size."""
-    return numeral(0.0 if abs(value) < STILL * size else value, 5)
+    return numeral(float(cleared(np.asarray(value), STILL * size)), 5)
 
 
 def _pivots(study: Study, scene: Still) -> list[tuple[str, ...]]:

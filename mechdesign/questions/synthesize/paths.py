@@ -227,7 +227,9 @@ def _alike_open(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats
         forms, middles, sizes = _centred(np.nan_to_num(at_poses(curves[some], poses)))
         fits[number, some] = np.conj(forms) @ wanted[0]
         found.append((some, poses, middles, sizes))
-    best = np.argsort(-np.abs(fits).max(axis=0), kind="stable")[:most]
+    likeness = np.abs(fits).max(axis=0)
+    # Some linkages have no window in which they can be assembled throughout.
+    best = np.argsort(-likeness, kind="stable")[: min(most, np.count_nonzero(likeness))]
     window, scale, start, centre = np.abs(fits[:, best]).argmax(axis=0), [], [], []
     arcs = np.append(0.0, np.cumsum(np.abs(np.diff(task.points))))
     parts = (_COARSE - 1) * arcs / max(arcs[-1], np.finfo(float).tiny)
@@ -237,7 +239,7 @@ def _alike_open(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats
         scale.append(fits[number, lane] * size / sizes[row])
         centre.append(middles[row])
         start.append(at_poses(poses[row : row + 1], parts[None])[0])
-    turn, angles = np.array(scale), np.array(start) * 2 * np.pi / POSES
+    turn, angles = np.array(scale), np.reshape(start, (len(best), len(parts))) * 2 * np.pi / POSES
     return kind.moved(values[best], turn, middle - turn * np.array(centre)), angles + np.angle(turn)[:, None]
 
 

@@ -188,6 +188,7 @@ class PathTask(_Task):
     """Points that a point passes."""
 
     path: paths.Points
+    given: int  # points that the task has, of which the path may have every second, third and so on
 
     @property
     def centre(self) -> complex:
@@ -211,6 +212,8 @@ class PathTask(_Task):
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
         section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
+        if len(self.path.points) < self.given:
+            conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
         for name in section.kinds or (FOUR_BAR,):
             kind = kind_of("path", name)
             bound, exact = Bound(kind, self), []
@@ -376,9 +379,9 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
         message = f"{len(timing)} crank angles for {len(table)} points"
         raise StudyError([study.problem(message, "synthesis", "path", "timing")])
     # The form of a path needs no more points; the time of a search grows with them.
-    every = -(-len(table) // _MOST_POINTS)
+    given, every = len(table), -(-len(table) // _MOST_POINTS)
     table, timing = table[::every], None if timing is None else timing[::every]
     path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
     if not path.size > 0:
         raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
-    return PathTask(section, factor, path)
+    return PathTask(section, factor, path, given)
