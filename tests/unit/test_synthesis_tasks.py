@@ -84,3 +84,9 @@ def test_of_many_points_it_is_told_how_many_count() -> None:
     points = [[float(x), float(abs(x % 4 - 2))] for x in range(401)]
     task = {"path": {"points": points}, "limits": {"reach": 100, "ratio": 1000}, "evaluations": 100}
     assert "134 of 401 points count, evenly chosen" in solved(task).notes
+
+
+def test_where_no_sample_keeps_a_condition_it_is_said() -> None:
+    task = {"path": {"points": SQUARE, "closed": True}, "transmission": {"at_least": 89}, "evaluations": 100}
+    with pytest.raises(mechdesign.AssemblyError, match="no linkage does it"):
+        solved(task)

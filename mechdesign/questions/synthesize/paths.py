@@ -149,6 +149,8 @@ def resampled(curves: Complexes, count: int, *, closed: bool) -> tuple[Complexes
 
 def _interpolated(wanted: Floats, rising: Floats) -> Floats:
     """Where, with its fraction, each row of rising numbers takes values; shape of `wanted`."""
+    if not len(rising):
+        return wanted
     scale = np.maximum(rising[:, -1:], np.finfo(float).tiny)
     rows = 2.0 * np.arange(len(rising))[:, None]
     flat = (rising / scale + rows).ravel()
