@@ -78,7 +78,7 @@ def test_no_link_that_newton_finds_from_many_starts_is_missed(tasks: int, starts
         places = random.normal(size=5) + 1j * random.normal(size=5)
         places = (places - places.mean()) / np.ptp(places.real)
         rotations = np.exp(1j * random.uniform(-2, 2, 5))
-        found = dyads.dyads(places, rotations, np.empty((0, 8)))["link"]
+        found = dyads.dyads(dyads.rows(places, rotations))["link"]
         pairs = np.stack([found.pivot, found.pin], axis=1)
         for link in by_newton(places, rotations, starts, random):
             assert len(pairs)

@@ -88,7 +88,9 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
     """How many linkages there were, and what became of them."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
     words = [f"{count} linkages, {len(solutions)} of them keep the conditions, {whole} without a defect"]
-    return words + [f"{lost} dropped: {reason}" for reason, lost in conditions.dropped.most_common() if lost]
+    return words + [
+        f"{lost} {what} dropped: {reason}" for (what, reason), lost in conditions.dropped.most_common() if lost
+    ]
 
 
 def _none(
@@ -96,11 +98,14 @@ def _none(
 ) -> AssemblyError:
     """Why there is no solution, with the linkage that comes nearest where there is one."""
     words = "no linkage does it: " + "; ".join(told)
-    best = min((pool for pool in pools if len(pool.way)), key=lambda pool: pool.rms().min(), default=None)
-    if best is None:
+    every = [(reasons, pool.solution(row)) for pool in pools for row, reasons in enumerate(conditions.missed(pool))]
+    if not every:
         return AssemblyError(words)
-    row = int(best.rms().argmin())
-    solution, missed = best.solution(row), "; ".join(conditions.missed(best, row))
+    # It misses the fewest conditions; of several it has the smallest error, then the best transmission.
+    reasons, solution = min(
+        every, key=lambda one: (len(one[0]), rounded(one[1].error, task.size), -one[1].transmission)
+    )
+    missed = "; ".join(reasons)
     message = f"{words}; the nearest is in nearest.yaml: {missed}"
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])

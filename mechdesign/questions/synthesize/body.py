@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize import dyads
 from mechdesign.questions.synthesize.declared import (
     CONCHOID,
@@ -23,17 +23,23 @@ from mechdesign.questions.synthesize.declared import (
 )
 from mechdesign.questions.synthesize.dyads import GUIDE, LINK, SLIDE, Dyads
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
-from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.schema import SynthesisSection
+from mechdesign.questions.synthesize.sites import Site
 
 _PAIRS = {
     (LINK, LINK): FOUR_BAR, (LINK, SLIDE): SLIDER_CRANK, (LINK, GUIDE): INVERTED,
     (SLIDE, SLIDE): TRAMMEL, (GUIDE, GUIDE): INVERTED_TRAMMEL, (SLIDE, GUIDE): CONCHOID,
 }  # fmt: skip
-# Wishes that are sampled where positions leave a choice, for each choice.
-WISHES = 240
+# By how many wishes each kind may be joined to frame and body: to a line by one, to a place by two; a slide, which
+# crosses every line, runs through a place by one and has a direction by another.
+_GRADES = {LINK: ((0, 1, 2), (0, 1, 2)), SLIDE: ((0, 1, 2), (0, 2)), GUIDE: ((0, 2), (0, 1, 2))}
+# Samples of each way to share out the wishes, and of each subset of more positions.
+WISHES, _FEW = 240, 4
 # Subsets of five of more positions, whose dyads are starts.
 _SUBSETS = 60
 _ROUNDS = 40
+# Rotations that differ by less are the same.
+_STILL = 1e-9
 # Dyads that differ by less than this part of the task are one.
 _SAME = 1e-6
 
@@ -51,6 +57,11 @@ class Positions:
         return complex(self.places.mean())
 
     @property
+    def shifts(self) -> bool:
+        """Whether the body only shifts."""
+        return bool(np.abs(self.rotations - self.rotations[0]).max() < _STILL)
+
+    @property
     def size(self) -> float:
         """The greatest extent of the places along x or y; 1 where the body only turns."""
         extent = max(np.ptp(self.places.real), np.ptp(self.places.imag))
@@ -66,91 +77,73 @@ class Candidates:
     angles: Floats  # shape (count, positions)
 
 
-def choices(
-    task: Positions, section: SynthesisSection, random: np.random.Generator, factor: float, *, zeros: bool = False,
-    slides: bool = False,
-) -> tuple[list[Dyads], str]:  # fmt: skip
+def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], str]:
     """Dyads through all positions of a body, one of each kind, and what is said of them.
 
-    `factor` is radians in the unit of the section's angles.
-    With `zeros` the pivot lies on the x axis of the frame, and the pin on that of the body unless the body slides.
+    What positions leave free is sampled in the sites of frame and body, which dyads may miss.
     """
-    centre, size = (0j if zeros or slides else task.centre), task.size
-    scaled, count = Positions((task.places - centre) / size, task.rotations), len(task.places)
-    fixed = [dyads.pivot_on(1j, 0.0)] * zeros + [dyads.pin_on(1j, 0.0)] * (zeros and not slides)
-    if count + len(fixed) > 5:
-        found = _least_squares(scaled, random, np.array(fixed).reshape(-1, 8))
-        words = f"{count} positions are met by least squares"
-    else:
-        wishes = _wishes(count + len(fixed), section, task, random, factor)
-        rows = ((np.concatenate([np.broadcast_to(fixed, (*wish.shape[:-2], len(fixed), 8)), wish], axis=-2)
-                 if fixed else wish) for wish in wishes)  # fmt: skip
-        parts = [dyads.dyads(scaled.places, scaled.rotations, wish) for wish in rows]
-        found = [_joined([part[kind] for part in parts]) for kind in (LINK, SLIDE, GUIDE)]
-        real, whole = sum(map(len, found)), count + len(fixed) == 5
-        words = f"{real} real dyads of at most 4" if whole else f"{real} dyads from {WISHES} samples of each choice"
-    placed = [
+    centre, size = task.centre, task.size
+    scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
+    for one, other in product(frame.around, body.around):
+        sites = one.scaled(centre, size), other.scaled(0j, size)
+        spare.append(_known(LINK, scaled)[1] - sum(_needs(LINK, sites)))
+        parts += _least_squares(scaled, sites, random) if spare[-1] < 0 else _exact(scaled, sites, random, WISHES)
+    found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
+    real = sum(map(len, found))
+    words = (
+        f"{len(task.places)} positions are met by least squares" if min(spare) < 0 else
+        f"{real} dyads from {WISHES} samples of each choice" if max(spare) > 0 else
+        f"{real} real dyads, all through the given places" if len(frame.given) + len(body.given) else
+        f"{real} real dyads of at most 4"
+    )  # fmt: skip
+    return [
         replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size)
         for part in found
-    ]
-    # The line of a slide of the frame is told by its point next to the task.
-    return [
-        replace(part, pivot=centre + ((part.pivot - centre) * np.conj(part.normal)).real * part.normal)
-        if part.kind == SLIDE else part for part in placed
-    ], words  # fmt: skip
+    ], words
 
 
-def _wishes(
-    count: int, section: SynthesisSection, task: Positions, random: np.random.Generator, factor: float
-) -> Iterator[Floats]:
-    """Rows of wishes that leave no choice, each of shape (samples, rows, 8)."""
-    if count == 5:
-        yield np.empty((0, 8))
-        return
-    reach = section.limits.reach * task.size
-    pivots = (_sampled(section.pivots, random, task.centre, reach, factor) - task.centre) / task.size
-    pins = _sampled(section.pins, random, 0j, reach, factor) / task.size
-    turns = np.exp(1j * random.uniform(0, np.pi, WISHES))
-    free = random.normal(size=(WISHES, 5 - count, 8))
-    # Of a slide w = 0, and X = 0 or A = 0 by one of the conics' points.
-    yield np.concatenate([np.broadcast_to(dyads.SLIDING, (WISHES, 1, 8)), free[:, 1:]], axis=1)
-    if count == 4:
-        # The curve of centre points, where lines through the places that pivots may have cut it.
-        for samples, on in ((pivots, dyads.pivot_on), (pins, dyads.pin_on)):
-            lines = zip(turns, samples, strict=True)
-            yield np.stack([on(n, float((np.conj(n) * place).real))[None] for n, place in lines])
-    elif count == 3:
-        yield np.stack([dyads.pivot_at(place) for place in pivots])
-        yield np.stack([dyads.pin_at(place) for place in pins])
-    else:
-        yield np.stack([
-            np.concatenate([dyads.pin_at(pin), dyads.pivot_on(n, float((np.conj(n) * place).real))[None]])
-            for n, place, pin in zip(turns, pivots, pins, strict=True)
-        ])  # fmt: skip
+def _known(kind: str, task: Positions) -> tuple[Floats, int]:
+    """What positions tell of a kind of dyad as independent rows, and how many wishes they leave."""
+    known = dyads.independent(np.concatenate([dyads.absent(kind), dyads.rows(task.places, task.rotations)]))
+    if kind != LINK:
+        return known, 7 - len(known)
+    # A body that only shifts has links where its places lie on a circle.
+    return known, -1 if task.shifts and len(known) > 3 else 5 - len(known)
 
 
-def _sampled(
-    places: Sequence[tuple[float, float]] | Region | None, random: np.random.Generator, centre: complex, reach: float,
-    factor: float,
-) -> Complexes:  # fmt: skip
-    """Places in a region, each given one equally often; where it has no end, within `reach` of a centre."""
-    if places is None:
-        around = np.exp(1j * random.uniform(-np.pi, np.pi, WISHES))
-        return np.asarray(centre + reach * np.sqrt(random.uniform(size=WISHES)) * around)
-    if not isinstance(places, Region):
-        given = np.array([complex(x, y) for x, y in places])
-        return np.asarray(np.resize(given, WISHES))
-    if places.through is not None:
-        along = places.along(factor)
-        nearest = complex(*places.through) + ((centre - complex(*places.through)) * np.conj(along)).real * along
-        return np.asarray(nearest + along * reach * random.uniform(-1, 1, WISHES))
-    parts = []
-    for ends, middle in ((places.x, centre.real), (places.y, centre.imag)):
-        low, high = (
-            ends if isinstance(ends, tuple) else (ends, ends) if ends is not None else (middle - reach, middle + reach)
-        )
-        parts.append(random.uniform(low, high, WISHES) if high > low else np.full(WISHES, low))
-    return parts[0] + 1j * parts[1]
+def _needs(kind: str, sites: tuple[Site, Site]) -> tuple[int, int]:
+    """How many wishes of a dyad the sites of frame and body are."""
+    frame, body = (sum(site.fixed) for site in sites)
+    return (frame // 2 if kind == SLIDE else frame), (body // 2 if kind == GUIDE else body)
+
+
+def _exact(task: Positions, sites: tuple[Site, Site], random: np.random.Generator, count: int) -> list[Dyads]:
+    """Dyads through all positions, with so many samples of each way to share out the wishes that these leave."""
+    parts = list[Dyads]()
+    for kind, grades in _GRADES.items():
+        (known, freedom), needs = _known(kind, task), _needs(kind, sites)
+        for shares in product(*grades):
+            if sum(shares) != freedom or shares[0] < needs[0] or shares[1] < needs[1]:
+                continue
+            some = count if shares != needs else max(1, *(len(site.given) for site in sites))
+            wishes = [_wishes(kind, side, share, site, random, some)
+                      for side, share, site in zip((dyads.FRAME, dyads.BODY), shares, sites, strict=True)]  # fmt: skip
+            rows = np.concatenate([np.broadcast_to(known, (some, *known.shape)), *wishes], axis=1)
+            parts += dyads.dyads(rows).values()
+    return parts
+
+
+def _wishes(kind: str, side: int, share: int, site: Site, random: np.random.Generator, count: int) -> Floats:
+    """Rows of so many wishes of a dyad for its place in frame or body, shape (count, rows, 8)."""
+    if not share:
+        return np.empty((count, 0, 8))
+    places = site.samples(random, count)
+    if kind == (SLIDE if side == dyads.FRAME else GUIDE):
+        turned = dyads.on_lines(side, site.normals(random, count), 0 * places)
+        return np.concatenate([dyads.through(side, places), turned[:, : share - 1]], axis=1)
+    if share == 1:
+        return dyads.on_lines(side, site.normals(random, count), places)
+    return dyads.at_places(kind, side, places)
 
 
 def _joined(parts: Sequence[Dyads]) -> Dyads:
@@ -162,26 +155,26 @@ def _joined(parts: Sequence[Dyads]) -> Dyads:
     return whole.take(np.sort(first))
 
 
-def _least_squares(task: Positions, random: np.random.Generator, fixed: Floats) -> list[Dyads]:
-    """Dyads with the least squares of their errors, from those of subsets of five positions."""
-    every = list(combinations(range(len(task.places)), 5 - len(fixed))) if len(task.places) < 12 else [
-        tuple(random.choice(len(task.places), 5 - len(fixed), replace=False)) for _ in range(_SUBSETS)
+def _least_squares(task: Positions, sites: tuple[Site, Site], random: np.random.Generator) -> list[Dyads]:
+    """Dyads with the least squares of their errors, from those of subsets of the positions."""
+    count = len(task.places)
+    size = min(count, 3 if task.shifts else 5 - sum(_needs(LINK, sites)))
+    every = list(combinations(range(count), size)) if count < 12 else [
+        tuple(random.choice(count, size, replace=False)) for _ in range(_SUBSETS)
     ]  # fmt: skip
-    chosen = [every[k] for k in random.permutation(len(every))[:_SUBSETS]]
-    parts = [dyads.dyads(task.places[list(some)], task.rotations[list(some)], fixed) for some in chosen]
-    held = ([], [3], [1, 3])[len(fixed)]
-    starts = {kind: _joined([part[kind] for part in parts]) for kind in (LINK, SLIDE, GUIDE)}
-    if not len(fixed):
-        # A pin whose way is nearly straight may as well slide.
-        link = starts[LINK]
-        for kind, seen, pin in ((SLIDE, task, link.pin), (GUIDE, _from_body(task), link.pivot)):
-            ways = seen.places + seen.rotations * pin[:, None]
-            about = ways - ways.mean(axis=1, keepdims=True)
-            normal = 1j * np.exp(0.5j * np.angle((about**2).sum(axis=1)))
-            line = (ways.mean(axis=1) * np.conj(normal)).real * normal
-            sliding = Dyads(SLIDE, line, pin, normal, 0.0 * link.length)
-            starts[kind] = sliding if kind == SLIDE else Dyads(GUIDE, pin, line, normal, sliding.length)
-    return [_joined([_refined(start, task, held)]) for start in starts.values()]
+    chosen = [list(every[k]) for k in random.permutation(len(every))[:_SUBSETS]]
+    parts = [part for some in chosen
+             for part in _exact(Positions(task.places[some], task.rotations[some]), sites, random, _FEW)]  # fmt: skip
+    # A pin whose way is nearly straight may as well slide.
+    link = _joined([part for part in parts if part.kind == LINK])
+    for kind, seen, pin in ((SLIDE, task, link.pin), (GUIDE, _from_body(task), link.pivot)):
+        ways = seen.places + seen.rotations * pin[:, None]
+        about = ways - ways.mean(axis=1, keepdims=True)
+        normal = 1j * np.exp(0.5j * np.angle((about**2).sum(axis=1)))
+        line = (ways.mean(axis=1) * np.conj(normal)).real * normal
+        sliding = Dyads(SLIDE, line, pin, normal, 0.0 * link.length)
+        parts.append(sliding if kind == SLIDE else Dyads(GUIDE, pin, line, normal, sliding.length))
+    return [_refined(_joined([part for part in parts if part.kind == kind]), task, sites) for kind in _GRADES]
 
 
 def _from_body(task: Positions) -> Positions:
@@ -189,68 +182,95 @@ def _from_body(task: Positions) -> Positions:
     return Positions(-task.places / task.rotations, 1 / task.rotations)
 
 
-def _refined(start: Dyads, task: Positions, held: Sequence[int] = ()) -> Dyads:
+def _refined(start: Dyads, task: Positions, sites: tuple[Site, Site]) -> Dyads:
     """Dyads with the least squares of the errors of length, or of the distance from the line, by Gauss and Newton.
 
-    Of a link the unknowns `held` (x and y of pin and pivot) stay.
+    Pivots and pins stay in the sites of frame and body.
     """
+    frame, body = sites
     if not len(start):
         return start
     if start.kind == GUIDE:
         # Seen from the body the pivot of the frame moves along a slide.
-        other = _refined(Dyads(SLIDE, start.pin, start.pivot, start.normal, start.length), _from_body(task))
+        other = _refined(Dyads(SLIDE, start.pin, start.pivot, start.normal, start.length), _from_body(task),
+                         (body, frame))  # fmt: skip
         return Dyads(GUIDE, other.pin, other.pivot, other.normal, other.length)
-    p, r = task.places, task.rotations
-    pin, pivot, normal, length = start.pin, start.pivot, start.normal, start.length
+    p, r, links = task.places, task.rotations, start.kind == LINK
+    normal, length, through = start.normal, start.length, all(frame.fixed)
+    pin, pivot = body.nearest(start.pin), start.pivot if links else frame.crossed(start.pivot, normal)
+    if links or through:
+        pivot = frame.nearest(pivot)
     for _ in range(_ROUNDS):
         reach = p + r * pin[:, None] - pivot[:, None]
-        if start.kind == LINK:
-            size = np.maximum(np.abs(reach), np.finfo(float).tiny)
-            along = np.conj(reach) / size
-            wrong: Floats = size - length[:, None]
-            parts = [(along * r).real, (along * 1j * r).real, -along.real, -along.imag, -np.ones_like(size)]
-        else:
-            along = np.broadcast_to(np.conj(normal)[:, None], reach.shape)
-            wrong = (along * reach).real
-            turn = (np.conj(1j * normal)[:, None] * (p + r * pin[:, None])).real
-            parts = [(along * r).real, (along * 1j * r).real, turn, -np.ones_like(turn)]
+        size = np.maximum(np.abs(reach), np.finfo(float).tiny)
+        along = np.conj(reach) / size if links else np.broadcast_to(np.conj(normal)[:, None], reach.shape)
+        wrong: Floats = size - length[:, None] if links else (along * reach).real
+        by_pin, by_pivot = along * r * body.axis, -along * frame.axis
+        parts = [by_pin.real, -by_pin.imag, *((by_pivot.real, -by_pivot.imag) if links else [(along * reach).imag]),
+                 -np.ones_like(size)]  # fmt: skip
         matrix = np.stack(parts, 2)
-        matrix[..., held] = 0.0
-        square = np.einsum("npi,npj->nij", matrix, matrix)
         slope = np.einsum("npi,np->ni", matrix, wrong)
+        free = np.ones_like(slope)
+        free[:, :2] = body.free(pin, slope[:, :2])
+        if links:
+            free[:, 2:4] = frame.free(pivot, slope[:, 2:4])
+        else:
+            free[:, 3] = not through
+        matrix, slope = matrix * free[:, None], slope * free
+        square = np.einsum("npi,npj->nij", matrix, matrix)
         square[:, range(square.shape[1]), range(square.shape[1])] += 1e-12 * (1 + np.einsum("nii->n", square)[:, None])
         step = -np.linalg.solve(square, slope[..., None])[..., 0]
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
-        pin = pin + step[:, 0] + 1j * step[:, 1]
-        if start.kind == LINK:
-            pivot, length = pivot + step[:, 2] + 1j * step[:, 3], length + step[:, 4]
+        pin = body.nearest(pin + body.axis * (step[:, 0] + 1j * step[:, 1]))
+        if links:
+            pivot = frame.nearest(pivot + frame.axis * (step[:, 2] + 1j * step[:, 3]))
+            length = length + step[:, 4]
         else:
-            offset = (pivot * np.conj(normal)).real + step[:, 3]
             normal = normal * np.exp(1j * step[:, 2])
-            pivot = offset * normal
+            pivot = pivot + step[:, 3] * normal
     return Dyads(start.kind, pivot, pin, normal, length)
 
 
 def pairs(
-    task: Positions, found: Sequence[Dyads], section: SynthesisSection, random: np.random.Generator, most: int
-) -> Iterator[Candidates]:
-    """Linkages of two dyads each, at most so many of a kind."""
+    task: Positions, found: Sequence[Dyads], sites: tuple[Site, Site], section: SynthesisSection,
+    random: np.random.Generator, most: int,
+) -> Iterator[tuple[Candidates, int]]:  # fmt: skip
+    """Linkages of two dyads each, at most so many of a kind, and how many there are."""
     wanted = section.kinds or tuple(_PAIRS.values())
+    by_kind = {part.kind: part for part in found}
     for (first, second), name in _PAIRS.items():
-        one, other = (next(part for part in found if part.kind == kind) for kind in (first, second))
-        if name not in wanted or not len(one) or not len(other) or (section.slide and SLIDE not in (first, second)
-                                                                   and GUIDE not in (first, second)):  # fmt: skip
+        if name not in wanted or (section.slide and first == second == LINK):
             continue
-        a, b = np.divmod(np.arange(len(one) * len(other)), len(other))
+        one, other = by_kind[first], by_kind[second]
+        good = _together(one, other, sites)
         # A pair of links may be driven by either; two slides are the same pair in both orders.
-        a, b = (
-            (a[a != b], b[a != b]) if first == second == LINK else (a[a < b], b[a < b]) if first == second else (a, b)
-        )
-        if len(a) > most:
-            some = np.sort(random.choice(len(a), most, replace=False))
-            a, b = a[some], b[some]
-        if len(a):
-            yield _linkage(kind_of("body", name), task, one.take(a), other.take(b))
+        if first == second:
+            good &= ~np.eye(len(one), dtype=bool) if first == LINK else np.triu(np.ones(good.shape, dtype=bool), 1)
+        every = np.flatnonzero(good)
+        if len(every):
+            some = random.choice(every, most, replace=False) if len(every) > most else every
+            a, b = np.divmod(some, len(other))
+            count = len(every) // (2 if first == second == LINK else 1)
+            yield _linkage(kind_of("body", name), task, one.take(a), other.take(b)), count
+
+
+def _together(one: Dyads, other: Dyads, sites: tuple[Site, Site]) -> Flags:
+    """Which dyads have, with which others, as many of the given points of frame and body as they have room for.
+
+    A single one is that of a pivot, or pin, where the linkage has one.
+    """
+    good = np.ones((len(one), len(other)), dtype=bool)
+    for site, slides, side in zip(sites, (SLIDE, GUIDE), ("pivot", "pin"), strict=True):
+        if not len(site.given):
+            continue
+        first, second = (np.where(site.holds(places), np.abs(places[:, None] - site.given).argmin(axis=1), -1)
+                         for places in (getattr(one, side), getattr(other, side)))  # fmt: skip
+        if len(site.given) > 1:
+            good &= (first[:, None] >= 0) & (second >= 0) & (first[:, None] != second)
+        else:
+            has = [(one.kind != slides or other.kind == slides), (other.kind != slides or one.kind == slides)]
+            good &= (has[0] & (first[:, None] == 0)) ^ (has[1] & (second == 0))
+    return good
 
 
 def _linkage(kind: Kind, task: Positions, one: Dyads, other: Dyads) -> Candidates:

@@ -67,33 +67,49 @@ def rows(places: ArrayLike, rotations: ArrayLike) -> Floats:
     )
 
 
-def pivot_on(normal: complex, offset: float) -> Floats:
-    """The wish that a pivot lies on a line of the frame, Re(conj(normal) A) = offset; shape (8,)."""
-    return np.array([-offset, 0, 0, 0, normal.real, normal.imag, 0, 0])
+# The columns of the unknowns of the body and of the frame: a wish for a pin is one for a pivot, seen from the body.
+BODY, FRAME = 2, 4
+# What the unknowns of a kind of dyad do not have: w and one of X and A of slides.
+_ABSENT = {LINK: (), SLIDE: (0, BODY, BODY + 1), GUIDE: (0, FRAME, FRAME + 1)}
 
 
-def pin_on(normal: complex, offset: float) -> Floats:
-    """The wish that a pin lies on a line of the body; shape (8,)."""
-    return np.array([-offset, 0, normal.real, normal.imag, 0, 0, 0, 0])
+def absent(kind: str) -> Floats:
+    """The rows that make a dyad one of a kind, shape (rows, 8)."""
+    return np.eye(8)[list(_ABSENT[kind])]
 
 
-def pivot_at(a: complex) -> Floats:
-    """The wish for a given pivot; shape (4, 8)."""
-    return np.array([
-        [-a.real, 0, 0, 0, 1, 0, 0, 0], [-a.imag, 0, 0, 0, 0, 1, 0, 0],
-        [0, 0, a.real, a.imag, 0, 0, -1, 0], [0, 0, -a.imag, a.real, 0, 0, 0, -1],
-    ])  # fmt: skip
+def on_lines(side: int, normals: Complexes, places: Complexes) -> Floats:
+    """The wishes that a pivot or pin lies on the lines through places, shape (count, 1, 8)."""
+    wish = np.zeros((len(places), 1, 8))
+    wish[:, 0, 0] = -(np.conj(normals) * places).real
+    wish[:, 0, side], wish[:, 0, side + 1] = normals.real, normals.imag
+    return wish
 
 
-def pin_at(x: complex) -> Floats:
-    """The wish for a given pin; shape (4, 8)."""
-    return np.array([
-        [-x.real, 0, 1, 0, 0, 0, 0, 0], [-x.imag, 0, 0, 1, 0, 0, 0, 0],
-        [0, 0, 0, 0, x.real, x.imag, -1, 0], [0, 0, 0, 0, x.imag, -x.real, 0, -1],
-    ])  # fmt: skip
+def at_places(kind: str, side: int, places: Complexes) -> Floats:
+    """The wishes for given pivots or pins, shape (count, 4, 8); (count, 2, 8) of slides, which have no other side."""
+    wish, other = np.zeros((len(places), 4, 8)), BODY + FRAME - side
+    x, y = places.real, places.imag
+    wish[:, 0, 0], wish[:, 0, side] = -x, 1
+    wish[:, 1, 0], wish[:, 1, side + 1] = -y, 1
+    wish[:, 2, other], wish[:, 2, other + 1], wish[:, 2, 6] = x, y, -1
+    sign = 1 if side == BODY else -1
+    wish[:, 3, other], wish[:, 3, other + 1], wish[:, 3, 7] = sign * y, -sign * x, -1
+    return wish if kind == LINK else wish[:, 2:]
 
 
-SLIDING = np.array([1.0, 0, 0, 0, 0, 0, 0, 0])  # the wish for a slide
+def through(side: int, places: Complexes) -> Floats:
+    """The wishes that slides of the frame or body run through places, shape (count, 1, 8)."""
+    wish = np.zeros((len(places), 1, 8))
+    wish[:, 0, 1], wish[:, 0, side], wish[:, 0, side + 1] = 0.5, -places.real, -places.imag
+    return wish
+
+
+def independent(equations: Floats) -> Floats:
+    """Rows of length 1 that tell what equations tell, each something of its own; shape (rank, 8)."""
+    size = np.linalg.norm(equations, axis=1, keepdims=True)
+    _, sizes, right = np.linalg.svd(equations / np.where(size > 0, size, 1.0))
+    return np.asarray(right[: np.count_nonzero(sizes > _DEPENDENT * sizes[0])])
 
 
 def unknowns(equations: Floats) -> Floats:
@@ -182,14 +198,9 @@ def _product(one: Floats, other: Floats) -> Floats:
     return whole
 
 
-def dyads(places: Complexes, rotations: Complexes, wishes: Floats) -> dict[str, Dyads]:
-    """All dyads through given positions, with rows of wishes of shape (..., wishes, 8); by their kinds.
-
-    Positions are centred and of size 1, of shape (positions,).
-    """
-    positions = rows(places, rotations)
-    whole = np.concatenate([np.broadcast_to(positions, (*wishes.shape[:-2], *positions.shape)), wishes], axis=-2)
-    w = unknowns(whole)
+def dyads(equations: Floats) -> dict[str, Dyads]:
+    """All dyads that fulfil rows of equations, shape (..., rows, 8); by their kinds."""
+    w = unknowns(equations)
     weight, x, a, q = w[:, 0], _complex(w, 2), _complex(w, 4), _complex(w, 6)
     link = np.abs(weight) > NOTHING
     slide = ~link & (np.abs(x) <= np.sqrt(NOTHING)) & (np.abs(a) > np.sqrt(NOTHING))

@@ -214,12 +214,12 @@ class SynthesisSection(fields.Model):
     zeros: Annotated[str, fields.choice(_ZEROS, "zeros of a function")] = "fixed"
     """From where the angles, or the places, of a function count."""
     pivots: Places | None = None
-    """Where pivots of the frame lie: a box, a line or given points. Example: {x: [-4, 4], y: [-3, 0]} Example: [[0, 0],
-    [10, 0]]
+    """Where pivots of the frame lie, and slides of the frame run through: a box, a line, or given points, of which each
+    linkage has as many as it can. Example: {x: [-4, 4], y: [-3, 0]} Example: [[0, 0], [10, 0]]
     """
     pins: Places | None = None
-    """Where pins of the body lie, in its own coordinates: a box, a line or given points. Example: {x: [-1, 1], y: [0,
-    1]}
+    """Where pins of the body lie, and slides of the body run through, in its own coordinates: a box, a line or given
+    points. Example: {x: [-1, 1], y: [0, 1]}
     """
     slide: bool = False
     """Whether one side of the body must be a slide."""

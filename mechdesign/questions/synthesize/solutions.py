@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import chain
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.mechanism import Variant
-from mechdesign.questions.synthesize.declared import FOUR_BAR
+from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR
+from mechdesign.questions.synthesize.dyads import GUIDE, SLIDE, Dyads
 from mechdesign.questions.synthesize.judging import Way
 from mechdesign.questions.synthesize.kinds import Kind
-from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.schema import SynthesisSection
+from mechdesign.questions.synthesize.sites import Site
 
 # Two linkages whose values differ by less than this part of the task are one.
 _SAME = 1e-5
@@ -103,19 +105,23 @@ class Conditions:
 
     def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
         self.section, self.centre, self.size, self.factor = section, centre, size, factor
-        self.dropped: Counter[str] = Counter()
+        reach = section.limits.reach * size
+        #: where the frame has room for pivots, and the body for pins
+        self.sites = Site.of(section.pivots, centre, reach, factor), Site.of(section.pins, 0j, reach, factor)
+        self.dropped: Counter[tuple[str, str]] = Counter()  #: by what was dropped, and why
         self.told: list[str] = []  #: what is found, in words
 
-    def begun(self, kind: Kind, values: Floats, errors: Floats, most: int) -> Ints:
-        """Linkages, at most so many, that keep what their dimensions alone tell; best first by their errors.
+    def begun(self, kind: Kind, values: Floats, order: Ints, most: int) -> Ints:
+        """Linkages, at most so many and in an order, that keep what their dimensions alone tell.
 
-        Where none does it is the one with the smallest error, as the nearest.
+        Where none does it is the first of those that miss the fewest conditions, as the nearest.
         """
-        kept = self._counted(self._of_dimensions(kind, values), len(values))
+        judged = [*self._of_dimensions(kind, values)]
+        kept = self._counted(judged, len(values))
         if not kept.any():
-            return np.argsort(errors, kind="stable")[:1]
-        rows = np.flatnonzero(kept)
-        return rows[np.argsort(errors[rows], kind="stable")][:most]
+            misses = np.sum([~good for _, good in judged], axis=0)
+            return order[[int(misses[order].argmin())]]
+        return np.asarray(order[kept[order]][:most])
 
     def kept(self, pool: Pool) -> Flags:
         """Which linkages keep all conditions."""
@@ -124,16 +130,29 @@ class Conditions:
             kept &= good
         return kept & self._counted(self._of_way(pool.way), len(pool.way))
 
-    def missed(self, pool: Pool, row: int) -> list[str]:
-        """The conditions that one linkage of a pool does not keep."""
+    def missed(self, pool: Pool) -> list[list[str]]:
+        """The conditions that each linkage of a pool does not keep."""
         conditions = [*self._of_dimensions(pool.kind, pool.way.values), *self._of_way(pool.way)]
-        return [reason for reason, good in conditions if not good[row]]
+        return [[reason for reason, good in conditions if not good[row]] for row in range(len(pool.way))]
 
-    def _counted(self, judged: Iterator[tuple[str, Flags]], count: int) -> Flags:
-        """Which linkages keep conditions; the others are counted by the first that they miss."""
+    def placed(self, dyads: Dyads) -> Dyads:
+        """The dyads that are in place in frame and body; slides told by a point that is there, if they have one."""
+        frame, body = self.sites
+        if dyads.kind == SLIDE:
+            dyads = replace(dyads, pivot=frame.crossed(dyads.pivot, dyads.normal))
+        if dyads.kind == GUIDE:
+            dyads = replace(dyads, pin=body.crossed(dyads.pin, dyads.normal))
+        judged = chain(
+            self._of_pivots(dyads.pivot[:, None], few=len(frame.given) == 1),
+            self._of_pins(dyads.pin[:, None], few=len(body.given) == 1),
+        )
+        return dyads.take(self._counted(judged, len(dyads), "dyads"))
+
+    def _counted(self, judged: Iterable[tuple[str, Flags]], count: int, what: str = "linkages") -> Flags:
+        """Which linkages, or dyads, keep conditions; the others are counted by the first that they miss."""
         kept = np.ones(count, dtype=bool)
         for reason, good in judged:
-            self.dropped[reason] += int((kept & ~good).sum())
+            self.dropped[what, reason] += int((kept & ~good).sum())
             kept &= good
         return kept
 
@@ -147,32 +166,36 @@ class Conditions:
         best = rows[np.lexsort((-pool.way.transmission[rows], errors, faulty))][:_MOST]
         yield from (pool.solution(int(row)) for row in best)
 
-    def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
-        section = self.section
-        pivots = np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1)
-        held = pivots[:, [k for k, (x, _) in enumerate(kind.pivots) if not self._on_slide(kind, x)]]
-        if section.pivots is not None and not held.shape[1]:
-            yield "it has no pivot (pivots)", np.zeros(len(values), dtype=bool)
-        links = kind.links(values)
-        lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
+    def _of_pivots(self, pivots: Complexes, *, few: bool = False) -> Iterator[tuple[str, Flags]]:
+        """What pivots of the frame keep, shape (count, pivots); `few` are not all of a linkage."""
+        frame, section = self.sites[0], self.section
         yield (
             "a pivot is too far away (limits.reach)",
             (np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size),
         )
-        with np.errstate(all="ignore"):
-            ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
-        yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
-        if isinstance(section.pivots, Region):
-            yield "a pivot is out of place (pivots)", inside(section.pivots, held, self.size, self.factor).all(axis=1)
-        elif section.pivots is not None:
-            given = np.array([complex(*place) for place in section.pivots])
-            gap = np.abs(held[..., None] - given).min(axis=2)
-            yield "a pivot is none of those given (pivots)", (gap <= 1e-6 * self.size).all(axis=1)
+        if section.pivots is not None and not few:
+            yield "a pivot is out of place (pivots)", _in_place(frame, pivots)
         for box in section.keep_out:
             within = (np.abs(pivots.real - np.mean(box.x)) < np.ptp(box.x) / 2) & (
                 np.abs(pivots.imag - np.mean(box.y)) < np.ptp(box.y) / 2
             )
             yield "a pivot lies where none may (keep_out)", ~within.any(axis=1)
+
+    def _of_pins(self, pins: Complexes, *, few: bool = False) -> Iterator[tuple[str, Flags]]:
+        """What pins of the body keep, shape (count, pins); `few` are not all of a linkage."""
+        if self.section.pins is not None and not few:
+            yield "a pin is out of place (pins)", _in_place(self.sites[1], pins)
+
+    def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
+        section, links = self.section, kind.links(values)
+        yield from self._of_pivots(np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1))
+        if section.pins is not None:
+            x, y = (np.stack([values[:, kind[f"{BODY}.{pin}.{way}"]] for pin in "AB"], axis=1) for way in "xy")
+            yield from self._of_pins(x + 1j * y)
+        lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
+        with np.errstate(all="ignore"):
+            ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
+        yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
         for name, (low, high) in section.lengths.items():
             if name in links:
                 good = (links[name] >= low) & (links[name] <= high)
@@ -192,27 +215,13 @@ class Conditions:
         if section.defects == "dropped":
             yield "it has a defect", np.array([not words for words in way.defects], dtype=bool)
 
-    @staticmethod
-    def _on_slide(kind: Kind, column: int) -> bool:
-        """Whether a point of the frame only tells where a slide runs."""
-        point = kind.places[column].split(".")[1]
-        return any(
-            joint["slot"] == "ground" and joint["through"] == point for joint in kind.data.get("joints", {}).values()
-        )
 
-
-def inside(region: Region, places: Any, size: float, factor: float) -> Any:
-    """Which places, x + i y, lie in a region; a line has a width within rounding."""
-    slack = 1e-6 * size
-    if region.through is not None:
-        away = (places - complex(*region.through)) / region.along(factor)
-        return np.abs(away.imag) <= slack
-    good = np.ones(np.shape(places), dtype=bool)
-    for ends, values in ((region.x, places.real), (region.y, places.imag)):
-        if ends is not None:
-            low, high = ends if isinstance(ends, tuple) else (ends, ends)
-            good &= (values >= low - slack) & (values <= high + slack)
-    return good
+def _in_place(site: Site, places: Complexes) -> Flags:
+    """Which linkages have all places, shape (count, places), in a site, and as many of the given ones as they can."""
+    if not len(site.given):
+        return np.asarray(site.holds(places).all(axis=1))
+    near = (np.abs(places[:, :, None] - site.given) <= site.slack).any(axis=1)
+    return np.asarray(near.sum(axis=1) >= min(places.shape[1], len(site.given)))
 
 
 def distinct(solutions: Sequence[Solution], size: float) -> list[Solution]:
@@ -249,8 +258,12 @@ def ranked(
         low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
         share = (np.maximum(values, low) - low) / (high - low) if high > low else np.ones(len(values))
         total += weight / whole * np.where(np.isfinite(values), share, 0.0)
-    order = sorted(
-        range(len(solutions)),
-        key=lambda k: (solutions[k].defects != "", -round(float(total[k]), 9), -solutions[k].transmission),
-    )
+    places = [(one.defects != "", -round(float(score), 9)) for one, score in zip(solutions, total, strict=True)]
+    # Of those that are as good, such as exact ones, the best of every kind comes first.
+    turn: Counter[tuple[bool, float, str]] = Counter()
+    turns = [0] * len(solutions)
+    for k in sorted(range(len(solutions)), key=lambda k: -solutions[k].transmission):
+        turn[*places[k], solutions[k].kind.name] += 1
+        turns[k] = turn[*places[k], solutions[k].kind.name]
+    order = sorted(range(len(solutions)), key=lambda k: (places[k], turns[k], -solutions[k].transmission))
     return [solutions[k] for k in order], [float(total[k]) for k in order]

@@ -14,9 +14,10 @@ from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
-from mechdesign.questions.synthesize.judging import passed, sines
+from mechdesign.questions.synthesize.judging import in_order, passed, sines
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.sites import Site
 from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
 from mechdesign.study import Study
 from mechdesign.study.text.csv_files import read_table
@@ -71,9 +72,17 @@ class BodyTask(_Task):
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
-        found, words = body.choices(self.positions, self.section, random, self.factor)
-        conditions.told.append(words)
-        for part in body.pairs(self.positions, found, self.section, random, self.section.evaluations or PAIRS):
+        section, sites = self.section, conditions.sites
+        found, words = body.choices(self.positions, *sites, random)
+        placed = [conditions.placed(part) for part in found]
+        most = section.evaluations or PAIRS
+        parts = [*body.pairs(self.positions, placed, sites, section, random, most)]
+        conditions.told.append(f"{words}, {sum(pairs for _, pairs in parts)} pairs")
+        if not parts:
+            # None is in place: the nearest is one of the others.
+            free = (Site(site.centre, site.reach) for site in sites)
+            parts = [*body.pairs(self.positions, found, (next(free), next(free)), section, random, most)]
+        for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
     @property
@@ -122,8 +131,10 @@ class FunctionTask(_Task):
         back = np.exp(-1j * self.inputs)
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
+        reach = self.section.limits.reach * self.size
+        free, axis = Site(0j, reach), Site(0j, reach, ends=((-np.inf, np.inf), (0.0, 0.0)))
         fixed = self.section.zeros == "fixed"
-        found, words = body.choices(seen, self.section, random, self.factor, zeros=fixed, slides=self.slides)
+        found, words = body.choices(seen, axis if fixed else free, axis if fixed and not self.slides else free, random)
         conditions.told.append(words)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
@@ -227,7 +238,7 @@ class PathTask(_Task):
                 exact.append(_exact(fits, self.size))
                 if not len(fits.costs):
                     continue
-                rows = conditions.begun(kind, fits.values, fits.costs, MOST)
+                rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
                 values, angles = fits.values[rows], fits.angles[rows]
                 gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
                 yield Pool(passed(kind, modes, values, angles, full_turn=section.needs_turn), gaps)
@@ -339,7 +350,11 @@ def _ends(ends: Any) -> tuple[float, float]:
 def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
     """Linkages by the assembly in which they are at the first position, with how they pass the others."""
     stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
-    rows = conditions.begun(part.kind, part.values, stack.min(axis=0).max(axis=1), MOST)
+    errors = stack.min(axis=0).max(axis=1)
+    # Those without a defect come first, as far as the positions alone tell.
+    branch = ~(stack <= stack.min(axis=0) + _OTHER * size).all(axis=2).any(axis=0)
+    order = np.lexsort((np.where(errors < EXACT * size, 0.0, errors), in_order(part.angles)[1], branch))
+    rows = conditions.begun(part.kind, part.values, order, MOST)
     part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
     nearest = stack.min(axis=0)
     first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
