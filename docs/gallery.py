@@ -24,6 +24,7 @@ GROUPS = {
                           "scissor_lift", "excavator"),
     "Straight lines": ("chebyshev", "hoeken", "hart", "peaucellier", "watt_parallel_motion", "pantograph",
                        "acrylic_leg"),
+    "From a task": ("five_positions", "log10", "robust_curve"),
     "Gears, belts and cams": ("geared_five_bar", "planetary", "differential", "one_tooth_difference", "cycloidal_crank",
                               "rack_slider", "parallel_gripper", "cam_dwell", "cam_arm", "belt_scara"),
     "Robots": ("five_bar", "two_rpr", "two_rrr", "two_rpr_printed", "two_rrr_printed", "robot_arm", "scara",
@@ -38,8 +39,8 @@ GROUPS = {
 HOME = ("four_bar", "jansen", "shaper", "five_bar", "scissor_lift", "v_twin", "peaucellier", "excavator", "watt",
         "pantograph", "klann", "trammel")  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
-PICTURES = ("optimum", "allocation", "free_bodies", "deflections", "failure_map", "density_contours", "springs",
-            "workspace", "paths", "bands", "reliability", "mechanism")  # fmt: skip
+PICTURES = ("optimum", "solutions", "allocation", "free_bodies", "deflections", "failure_map", "density_contours",
+            "springs", "workspace", "paths", "bands", "reliability", "mechanism")  # fmt: skip
 
 
 def studies() -> dict[str, Path]:

@@ -12,12 +12,14 @@ from typing import Any
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
+import yaml
 
 import mechdesign
 from mechdesign.door.report.page.moving import moving
 from mechdesign.door.report.page.tracks import PLACES, TIMES, TURNS, steps
 from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.study import Study
 
 # A moving part lies this far beside its pose at most: units of a drawing that is shown half as large, degrees, lengths.
 _NEAR = {"translate": 1.0, "rotate": 0.5, "scale": 0.01}
@@ -33,6 +35,8 @@ _MOVED_BY = ("data-at", "data-turn", "data-from", "data-to", "data-way")
 def thumbnail(path: Path) -> str | None:
     """The mechanism of a study along its motion, as SVG; None where the study has no motion."""
     study = mechdesign.load(path)
+    if study.synthesis is not None:
+        study = best(study)
     try:
         shown = moving(study, mechdesign.kinematics(study), plain=True)
     except MechdesignError:
@@ -58,6 +62,19 @@ def thumbnail(path: Path) -> str | None:
     style.text = _STYLE.format(seconds=tracks.seconds, back=back, rules="".join(rules.values()))
     root.insert(0, style)
     return tostring(root, encoding="unicode")
+
+
+def best(task: Study) -> Study:
+    """The best linkage for a task along its way through the task, or a full turn."""
+    answer = mechdesign.synthesize(task)
+    data = yaml.safe_load(answer.files["solution_1.yaml"])
+    (drive,) = data["mechanism"]["drives"]
+    angles = [pose[drive] for pose in data["kinematics"]["poses"]]
+    end = min(angles) + 360 if answer.main["full_turn"][0] else max(angles)
+    sweep = {drive: {"from": min(angles), "to": end, "number": 121}}
+    data["kinematics"] = {"sweep": sweep, "outputs": data["kinematics"]["outputs"]}
+    del data["mechanism"]["targets"], data["requirements"]
+    return mechdesign.load(text=yaml.safe_dump(data))
 
 
 class Tracks:

@@ -55,8 +55,11 @@ DRAWN = [*studies_of_every_picture()]
 
 
 def fewer_designs(config: Path) -> Iterator[str]:
-    """Overrides by which an optimisation looks at few designs: tests/reference compares those of the whole study."""
-    section = load(config).optimize
+    """Overrides by which a search looks at few designs: tests/reference compares those of the whole study."""
+    study = load(config)
+    section, task = study.optimize, study.synthesis
+    if task is not None and task.path is not None:
+        yield from ("synthesis.evaluations=1000", "synthesis.judge.best=3", "synthesis.judge.samples=100")
     if section is None:
         return
     if section.method != "grid":
@@ -95,7 +98,7 @@ def test_study_runs_with_its_pictures(config: Path, tmp_path: Path, invoke) -> N
 
 
 def check_run(config: Path, folder: Path, invoke, *options: str) -> None:
-    """Run every question of a study, of an optimisation with few designs; check its files against the manifests."""
+    """Run every question of a study, of a search with few designs; check its files against the manifests."""
     fewer = [word for override in fewer_designs(config) for word in ("--set", override)]
     done = invoke("run", config, "--out", folder, "--jobs", 1, *options, *fewer)
     assert done.exit_code == 0, done.output

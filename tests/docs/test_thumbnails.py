@@ -63,3 +63,10 @@ def test_it_is_small_has_no_script_and_stands_still_where_less_motion_is_wanted(
 
 def test_a_study_without_a_motion_has_none() -> None:
     assert thumbnails.thumbnail(gallery.studies()["scara"]) is None
+
+
+def test_the_linkage_of_a_task_moves_through_its_positions() -> None:
+    moving = thumbnails.best(mechdesign.load(gallery.studies()["five_positions"]))
+    path = mechdesign.kinematics(moving).main
+    for place in (0, 19 + 13j, 46 + 21j, 67 + 18j, 89 - 2j):
+        assert np.abs(path["P.x"] + 1j * path["P.y"] - place).min() < 1

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from helpers.gallery import study_named
 
 import mechdesign
 from mechdesign.questions.synthesize import dyads
@@ -151,3 +152,40 @@ def test_a_solution_passes_its_points_as_a_study_of_its_own(name: str) -> None:
             error = np.asarray(answer.tables["motion"]["P_error"])
             np.testing.assert_allclose(error.max(), table["max_error"][row], rtol=1e-6, atol=1e-9)
             assert [text for text in map(str, answer.warnings) if "dead centre" in text] == []
+
+
+def test_each_link_of_the_tray_keeps_its_length_at_all_five_positions() -> None:
+    study = study_named("five_positions")
+    table = mechdesign.synthesize(study).tables["solutions"]
+    body = study.synthesis.body
+    places = np.array([position.x + 1j * position.y for position in body])
+    rotations = np.exp(1j * np.radians([position.angle for position in body]))
+    links = set()
+    for pivot, pin, link in (("ground.O", "coupler.A", "crank"), ("ground.D", "coupler.B", "rocker")):
+        foot, point = (table[f"{name}.x"] + 1j * table[f"{name}.y"] for name in (pivot, pin))
+        lengths = np.abs(places + rotations * point[:, None] - foot[:, None])
+        np.testing.assert_allclose(lengths, np.tile(table[f"{link}.length"][:, None], 5), rtol=1e-11)
+        links |= {complex(round(place.real, 6), round(place.imag, 6)) for place in foot}
+    # Newton's method finds all four links; one has its pivot beyond three sizes of the task.
+    found = by_newton((places - 50) / 100, rotations, 120, np.random.default_rng(1))
+    near = {complex(round(100 * pivot.real + 50, 6), round(100 * pivot.imag, 6)) for pivot, _ in found}
+    assert links <= near
+    assert (len(links), len(near), len(table["solution"])) == (3, 4, 6)
+    assert [words == "" for words in table["defects"]] == [True, True, False, False, False, False]
+
+
+def test_the_pairs_of_log10_are_those_of_freudensteins_linkage() -> None:
+    table = mechdesign.synthesize(study_named("log10")).tables["solutions"]
+    own = study_named("function_generator")
+    for name, place in (("crank", "crank"), ("coupler", "coupler"), ("rocker", "follower")):
+        length = own.mechanism.description.places[f"{place}.length"].nominal
+        assert table[f"{name}.length"] == pytest.approx([length], rel=1e-11)
+
+
+@pytest.mark.nightly
+def test_of_the_curve_of_eighteen_points_the_robust_linkage_stands_before_the_best_fit() -> None:
+    table = mechdesign.synthesize(study_named("robust_curve")).tables["solutions"]
+    best = int(table["error"].argmin())
+    assert (table["transmission_angle"][best] < 5, table["yield"][best] < 0.5) == (True, True)
+    assert (table["transmission_angle"][0] > 60, table["yield"][0] > 0.99) == (True, True)
+    assert table["error"][0] < 1.01 * table["error"][best]
