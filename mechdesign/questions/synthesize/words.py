@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from mechdesign.ground.errors import counted
 from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
 from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, in_words
 from mechdesign.questions.synthesize.schema import RATIO, REACH
 from mechdesign.study import Study
+from mechdesign.study.schema.variable import plainly
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.variants import in_one_line
 
 _DIGITS = 4
+# Most positions that a dyad passes exactly.
+_EXACT = 5
 
 
 def linkage(table: Table, row: int, error: float) -> list[str]:
@@ -45,26 +49,30 @@ def task(study: Study) -> Iterator[str]:
         return f"{name} {numeral(ordered[0], _DIGITS)} to {numeral(ordered[-1], _DIGITS)} {printed(unit)}".rstrip()
 
     if section.body is not None:
-        what, count = "a body", len(section.body)
+        what = f"a body through {_exactly(len(section.body), 'position')}"
         ways = [extent(name, (getattr(part, name) for part in section.body), unit)
                 for name, unit in (("x", length), ("y", length), ("angle", angle))]  # fmt: skip
     elif section.function is not None:
-        what, count = "a function", len(section.function.input)
+        what = f"a function through {_exactly(len(section.function.input), 'pair')}"
         ways = [extent("input", section.function.input, angle),
                 extent("output", section.function.output, angle if section.output_kind == FOUR_BAR else length),
                 f"zeros {section.zeros}"]  # fmt: skip
     else:
         assert section.path is not None
-        what, points = f"a {'closed ' * section.path.closed}path", section.path.points
+        points = section.path.points
         rows = read_table(study.folder, points).tolist() if isinstance(points, str) else points
-        count = len(rows)
+        what = f"a {'closed ' * section.path.closed}path through {counted(len(rows), 'point')}"
         ways = [extent(name, (row[k] for row in rows), length) for k, name in enumerate("xy")]
         ways.append("at any crank angles" if section.path.timing is None else "at given crank angles")
-    yield f"task: {what} through {count} positions: {', '.join(ways)}"
+    yield f"task: {what}: {', '.join(ways)}"
     kinds = section.kinds or (BODIES if section.body is not None else (section.output_kind,))
     yield f"linkages: {section.of or ', '.join(map(in_words, kinds))}"
     written = study.resolved["synthesis"]
-    default = {"limits": {"reach": REACH, "ratio": RATIO}} if "limits" not in written else {}
+    default = {"limits": {"reach": plainly(REACH), "ratio": plainly(RATIO)}} if "limits" not in written else {}
     for key, value in (default | written).items():
         if key not in ("body", "function", "path", "kinds", "kind", "of"):
             yield in_one_line(key, value)
+
+
+def _exactly(count: int, noun: str) -> str:
+    return f"{counted(count, noun)} {'exactly' if count <= _EXACT else 'by least squares'}"
