@@ -384,6 +384,10 @@ class Result:
         count = len(self.warnings)
         return f"<Result of {self.command}: {tables}; {count or 'no'} warning{'s' * (count != 1)}>"
 
+    def whose(self, study: Any) -> Any:
+        """The study whose mechanism is shown for the answer: that which was asked, or its own, such as the best."""
+        return study if self.drawn is None or self.drawn.study is None else self.drawn.study
+
     @property
     def seen(self) -> Result:
         """The result with those rows of its tables that pictures show."""

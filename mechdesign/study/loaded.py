@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from mechdesign.commands import COMMANDS, SECTIONS
 from mechdesign.ground.cautions import ALL, Caution
-from mechdesign.ground.errors import Problem, printable
+from mechdesign.ground.errors import Problem, StudyError, printable
 from mechdesign.mechanism import Mechanism
 from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses
@@ -121,6 +121,25 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(name for name, command in COMMANDS.items() if self.sections.get(command.key) is not None)
+
+    @property
+    def is_task(self) -> bool:
+        """Whether it has a task and no mechanism: what it computes with is the kind with which a synthesis begins."""
+        return "mechanism" not in self.resolved
+
+    def need_mechanism(self, who: str) -> None:
+        """Refuse what asks about a mechanism where the study has none.
+
+        Raises
+        ------
+        StudyError
+            If it has only a task.
+        """
+        if self.is_task:
+            words = f"{who} asks about a mechanism, and this study has only a task"
+            raise StudyError(
+                [self.problem(f"{words}: synthesize finds linkages, each a study of its own", "synthesis")]
+            )
 
     @property
     def source(self) -> StudySource:

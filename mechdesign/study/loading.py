@@ -100,7 +100,6 @@ def _load_changed(
     """Load a study with overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
     drawn = drawn or _drawing(document)
     override(document, changes)
-    _begin(document)
     if drawn == _drawing(document) or not same_sketch(drawn, document.data):
         return load_document(document, source, changes, seed)
     original = None
@@ -118,13 +117,6 @@ def _load_changed(
     # With all units, as in the data of the study.
     drawn = {**drawn, "units": study.resolved["units"]}
     return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
-
-
-def _begin(document: Document) -> None:
-    """Give a study that has a task and no mechanism the one with which a synthesis begins."""
-    data = document.data
-    if isinstance(data, dict) and data.get("synthesis") is not None and data.get("mechanism") is None:
-        data["mechanism"] = plain(SECTIONS["synthesis"].model.starting(data["synthesis"]))
 
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -148,7 +140,7 @@ def load_document(
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
     reporter = Reporter(document)
-    data = _sections(document, reporter)
+    data = _begun(_sections(document, reporter), reporter)
     context, formulas = context_of(data, reporter)
     parts = _validated(data, context, reporter)
     section: MechanismSection | None = parts.get("mechanism")
@@ -203,6 +195,20 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
         message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
         raise document.values[()].failure(message)
     return {key: {} if value is None and key in _ASKED else value for key, value in data.items()}
+
+
+def _begun(data: dict[str, Any], reporter: Reporter) -> dict[str, Any]:
+    """Give a study that has a task and no mechanism the one with which a synthesis begins."""
+    task = SECTIONS["synthesis"]
+    if data.get(task.key) is None or data.get("mechanism") is not None:
+        return data
+    for key in _ASKED:
+        if key != task.key and key in data:
+            words = (
+                f"asks about a mechanism, and this study has only a task; the studies that {task.name} writes have one"
+            )
+            reporter.report((key,), words, at_key=True)
+    return data | {"mechanism": plain(task.model.starting(data[task.key]))}
 
 
 def context_of(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:

@@ -245,7 +245,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         if "\n" in text[value.start : value.end].rstrip():
             return None
         between = ", " if inside_flow else "\n" + " " * (name.column - 1)
-        edits.append((name.start, value.end, between.join(_in_one_line(*entry) for entry in entries.items())))
+        edits.append((name.start, value.end, between.join(in_one_line(*entry) for entry in entries.items())))
     now = dict(leaves(written))
     for keys, new in leaves(target):
         if keys in now and new != now[keys]:
@@ -290,6 +290,7 @@ def _removal(text: str, document: Document, keys: KeyPath) -> tuple[int, int, st
     return start, end + len(text[end:]) - len(text[end:].lstrip(", ")), ""
 
 
-def _in_one_line(key: str, value: Any) -> str:
+def in_one_line(key: str, value: Any) -> str:
+    """An entry of a mapping as YAML in one line."""
     written = yaml.safe_dump({key: value}, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**6)
     return written.strip()[1:-1]

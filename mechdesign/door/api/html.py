@@ -20,6 +20,7 @@ from mechdesign.ground.results import Result, Table
 from mechdesign.ground.table_text import readable
 from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_words
 from mechdesign.mechanism.diagnosis import joints_in_words
+from mechdesign.questions.synthesize.words import task
 from mechdesign.study import Study
 
 # Of the main table, shown in a cell.
@@ -44,14 +45,17 @@ class _Beginning(NamedTuple):
 def study_html(study: Study, picture: bytes | None) -> str:
     """A study: its drawing, a PNG if it has one, and what it says in words."""
     description = study.mechanism.description
-    facts = {
-        "links": [_link(link, study.units.label("length")) for link in links_in_words(description)],
-        "joints": joints_in_words(description, study.mechanism.graph),
-        "drives": drives_in_words(description),
-        "mobility": [str(study.mechanism.mobility)],
-        "questions": list(study.questions),
-        "changed": list(study.overrides),
-    }
+    facts = (
+        {"task": [*task(study)]}
+        if study.is_task
+        else {
+            "links": [_link(link, study.units.label("length")) for link in links_in_words(description)],
+            "joints": joints_in_words(description, study.mechanism.graph),
+            "drives": drives_in_words(description),
+            "mobility": [str(study.mechanism.mobility)],
+        }
+    )
+    facts |= {"questions": list(study.questions), "changed": list(study.overrides)}
     return _render("study.html.j2", name=study.name, facts=facts, warnings=[*study.cautions], picture=_inline(picture))
 
 
@@ -80,6 +84,7 @@ def answer_html(
         question=QUESTIONS[answer.command].question,
         counts=[f"{noun}: {count:,}" for noun, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
+        said=answer.notes,
         verdicts=shown,
         met=sum(verdict.met for verdict in judged),
         required=len(judged),

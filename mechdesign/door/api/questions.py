@@ -7,7 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from mechdesign.commands import QUESTIONS
+from mechdesign.commands import COMMANDS, QUESTIONS
 from mechdesign.door.api.shown import Answer
 from mechdesign.ground.errors import Interrupted
 from mechdesign.ground.progress import NULL, Progress
@@ -338,6 +338,8 @@ def question(command: str) -> Callable[..., Answer]:
 
 def ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
     """A command's answer, which knows its study."""
+    if command in COMMANDS and command not in study.questions:
+        study.need_mechanism(command)
     answer = getattr(import_module(QUESTIONS[command].module), command)
     if all_modes:
         options["all_modes"] = True

@@ -37,7 +37,7 @@ class ShownStudy(Study):
 
     def __repr__(self) -> str:
         mechanism = self.mechanism
-        words = ", ".join((
+        words = "a task, no mechanism" if self.is_task else ", ".join((
             counted(len(mechanism.description.links), "link"), f"mobility {mechanism.mobility}",
             f"driven by {', '.join(mechanism.drives) or 'nothing'}",
         ))  # fmt: skip
@@ -54,7 +54,9 @@ class ShownStudy(Study):
 
     @cached_property
     def _picture(self) -> bytes | None:
-        """The sketch as it is assembled; None where it cannot be drawn."""
+        """The sketch as it is assembled; None where it cannot be drawn, or there is none."""
+        if self.is_task:
+            return None
         try:
             return writer.sketch(self)
         except Exception as error:
@@ -172,7 +174,7 @@ class Answer(Result):
         elif judged:
             met = sum(verdict.met for verdict in judged)
             lines.append(f"{met} of {counted(len(judged), 'requirement')} met")
-        lines += [text for text in (self.interrupted, self.failed) if text]
+        lines += [text for text in (self.interrupted, self.failed, *self.notes) if text]
         lines.append(counted(len(self.warnings), "warning") if self.warnings else "no warnings")
         return "\n  ".join(lines) + ">"
 
@@ -220,7 +222,7 @@ class Answer(Result):
         with style.context():
             drawn = figures(self.study, self, name=name)
             if name in (None, MECHANISM):
-                drawn.add(MECHANISM, mechanism_picture, self.study, self.seen)
+                drawn.add(MECHANISM, mechanism_picture, self.whose(self.study), self.seen)
         if why := lost_letters(str(self.study.resolved)):
             warnings.warn(why, stacklevel=2)
         return drawn

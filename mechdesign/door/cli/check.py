@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.dynamics.question import weighed_beams
 from mechdesign.questions.reliability.schema.section import in_words
+from mechdesign.questions.synthesize.words import task
 from mechdesign.study import Study
 
 
@@ -37,16 +38,15 @@ def check(options: Options) -> int:
         try:
             study = load_source(source_of(path, options), options)
             label = study.label
-            if not options.no_plots:
+            drawn = not (options.no_plots or study.is_task)
+            if drawn:
                 claim(owners, study)
                 directory, output = folder(study, "check", options, several=len(files) > 1), extras("check", options)
                 check_sketch(directory, study, output)
             if not options.quiet:
-                clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
-                head = printable(f"{label}: {study.name}")
-                terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, *_massless(study), ""]))
+                terminal.emit_words("\n".join([printable(f"{label}: {study.name}"), *_described(study), ""]))
             cautions = assumed(study) if study.dynamics is not None else []
-            doubts = [*sketch_doubts(study.mechanism), *cautions]
+            doubts = cautions if study.is_task else [*sketch_doubts(study.mechanism), *cautions]
             for caution in cautions:
                 terminal.say(f"{label}: warning: {caution} [{caution.kind}]", quiet=options.quiet)
             for warning in study.warnings:
@@ -57,7 +57,7 @@ def check(options: Options) -> int:
                     terminal.say(f"{label}: requirement: {verdict}")
                     worst = max(worst, 1)
             _foresee(study)
-            if not options.no_plots:
+            if drawn:
                 terminal.say(f"{label}: {write_sketch(directory, study, output)}", quiet=options.quiet)
                 if len(files) == 1:
                     terminal.suggest(directory / f"{MECHANISM}.{options.kinds.split(',')[0]}", quiet=options.quiet)
@@ -67,6 +67,15 @@ def check(options: Options) -> int:
             annotate("error", of_error(error, message))
             worst = max(worst, code)
     return worst
+
+
+def _described(study: Study) -> Iterator[str]:
+    """The mechanism of a study, if it has one, and its task."""
+    if not study.is_task:
+        yield describe(study.mechanism)
+        yield from in_words(study.reliability, study.mechanism.graph, study.sizes)
+        yield from _massless(study)
+    yield from task(study)
 
 
 def _massless(study: Study) -> list[str]:

@@ -215,7 +215,7 @@ def _finished(study: Study, command: str, directory: Path, output: Extras) -> Ou
     code = exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
-        written=True, table=table, closing=closing_words(failures),
+        written=True, table=table, closing=(*content.get("notes", ()), *closing_words(failures)),
     )  # fmt: skip
 
 

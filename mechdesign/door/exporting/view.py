@@ -72,7 +72,8 @@ class PosedStudy:
 
     @property
     def mechanism(self) -> Mechanism:
-        """The study's mechanism."""
+        """The study's mechanism; a study that has only a task is refused."""
+        self.study.need_mechanism("an export")
         return self.study.mechanism
 
     @cached_property

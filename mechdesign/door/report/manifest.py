@@ -137,6 +137,7 @@ def compose(
         | {
             "counts": plain(dict(result.counts)),
             "warnings": [warning.as_data() for warning in (*study.cautions, *result.warnings)],
+            **({"notes": list(result.notes)} if result.notes else {}),
             "failed": result.failed,
             **({"interrupted": result.interrupted} if result.interrupted else {}),
             **({"strict": True} if study.strict else {}),

@@ -217,7 +217,6 @@ def pictures(
 
     formats = output.formats.split(",")
     result = result.seen
-    whose = study if result.drawn is None or result.drawn.study is None else result.drawn.study
     with style.context(output.style):
         gallery = figures(study, result, before)
 
@@ -234,7 +233,7 @@ def pictures(
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
         mechanism = f"{MECHANISM}.{formats[0]}"
-        drawings[mechanism] = partial(files, MECHANISM, lambda: draw(mechanism_picture(whose, result)))
+        drawings[mechanism] = partial(files, MECHANISM, lambda: draw(mechanism_picture(result.whose(study), result)))
         if output.animate:
             from mechdesign.questions.kinematics.drawn import DrawnMotion
             from mechdesign.questions.kinematics.figures.animation import animation

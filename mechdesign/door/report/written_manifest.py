@@ -76,6 +76,7 @@ class WrittenManifest(BaseModel):
     before: dict[str, Any] | None
     counts: dict[str, Any]
     warnings: list[_Warning]
+    notes: list[str] = []
     failed: str
     interrupted: str = ""
     strict: bool = False

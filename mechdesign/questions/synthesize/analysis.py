@@ -2,45 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from mechdesign.ground.errors import AssemblyError, StudyError
-from mechdesign.ground.numerics.arrays import Floats
+from mechdesign.ground.errors import AssemblyError, StudyError, counted
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result, Table
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.synthesize.columns import SOLUTIONS
-from mechdesign.questions.synthesize.files import judged_share, study_data, study_text
+from mechdesign.questions.synthesize.files import judged, study_data, study_text
 from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
 from mechdesign.questions.synthesize.tasks import Task, task_of
+from mechdesign.questions.synthesize.words import linkage
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
+from mechdesign.study.text.inputs import Folder
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnSolutions(Drawn):
-    """The task and its solutions."""
+    """The solutions as studies, best first, whose sketches are at the first position, and the task."""
 
-    asked: Study  # with the task
-    task: Task
-    solutions: tuple[Solution, ...]
+    data: tuple[Mapping[str, Any], ...]  # of the studies
+    folder: Folder
+    output: str  # the point, or the coordinate, that does the task
+    places: Complexes  # of the point at the positions; empty of a coordinate
+    directions: Complexes  # of the body there; empty of a point
+    errors: Floats  # in the study's unit, 0 where they are rounding
 
     @cached_property
-    def study(self) -> Study:
-        """That of the best."""
-        return load_data(
-            study_data(self.asked, self.task, self.solutions[0], self.asked.name), (), None, self.asked.folder
-        )
+    def studies(self) -> list[Study]:
+        """Those of the solutions."""
+        return [load_data(data, (), None, self.folder) for data in self.data]
 
     @property
-    def errors(self) -> Floats:
-        """Errors of the solutions in the study's unit, 0 where they are rounding."""
-        errors = [rounded(solution.error, self.task.size) for solution in self.solutions]
-        return np.array(errors) / self.task.error_factor
+    def study(self) -> Study:
+        """That of the best."""
+        return self.studies[0]
 
 
 @one_thread()
@@ -49,48 +52,46 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     section = study.synthesis
     if section is None:
         raise StudyError((study.problem("there is no task", "synthesis"),))
-    own = study.seed if seed is None else seed
-    random = np.random.default_rng(own if section.seed is None or seed is not None else section.seed)
+    if seed is None:
+        seed = study.seed if section.seed is None else section.seed
+    random = np.random.default_rng(seed)
     task = task_of(study, section)
     conditions = Conditions(section, task.centre, task.size, task.factor)
     with np.errstate(all="ignore"):
         pools = [*task.pools(random, conditions)]
         solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
+        told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
         if section.judge is not None:
-            solutions = _judged(study, task, solutions[: section.judge.best])
+            solutions = [replace(solution, made=judged(study, study_data(study, task, solution, study.name)))
+                         for solution in solutions[: section.judge.best]]  # fmt: skip
+            told.append(f"the best {len(solutions)} are judged")
         solutions, scores = ranked(solutions, section.rank, task.size)
-    told = [*conditions.told, *_told(pools, solutions, conditions)]
     if not solutions:
         raise _none(study, task, pools, conditions, told)
     solutions, scores = solutions[: section.solutions], scores[: section.solutions]
-    files = {
-        f"solution_{number}.yaml": study_text(
-            study_data(study, task, solution, f"{study.name}, solution {number}"),
-            f"Solution {number} of {study.name}: {solution.kind.name.replace('_', ' ')}",
-        )
-        for number, solution in enumerate(solutions, 1)
-    }
+    data = [study_data(study, task, solution, f"{study.name}, solution {number}")
+            for number, solution in enumerate(solutions, 1)]  # fmt: skip
     table = solutions_table(study, task, solutions, scores)
+    errors = np.array([rounded(solution.error, task.size) for solution in solutions]) / task.error_factor
+    files = {}
+    for row, made in enumerate(data):
+        name = f"solution_{row + 1}.yaml"
+        heading = [f"Solution {row + 1} of {study.name}: {', '.join(linkage(table, row, float(errors[row])))}",
+                   f"Its report: mechdesign run {name} --report"]  # fmt: skip
+        files[name] = study_text(made, heading)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(solutions)}
-    drawn = DrawnSolutions(study, task, tuple(solutions))
+    output, _ = task.targets(solutions[0])
+    drawn = DrawnSolutions(tuple(data), study.folder, output, task.points, task.directions, errors)
+    told = [f"best: {', '.join(linkage(table, 0, float(errors[0])))}", *told]
     return Result("synthesize", {table.name: table}, counts=counts, files=files, drawn=drawn, notes=told)
 
 
-def _judged(study: Study, task: Task, solutions: Sequence[Solution]) -> list[Solution]:
-    """Solutions with their yields."""
-    return [
-        replace(solution, share=judged_share(study, study_data(study, task, solution, study.name)))
-        for solution in solutions
-    ]
-
-
-def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions) -> list[str]:
-    """How many linkages there were, and what became of them."""
+def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
+    """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
-    words = [f"{count} linkages, {len(solutions)} of them keep the conditions, {whole} without a defect"]
-    return words + [
-        f"{lost} {what} dropped: {reason}" for (what, reason), lost in conditions.dropped.most_common() if lost
-    ]
+    told = [f"{counted(count, 'linkage')}, of which {len(solutions)} keep the conditions, {whole} without a defect"]
+    lost = [f"{number} {what} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number]
+    return [*told, *([f"dropped: {'; '.join(lost)}"] if lost else []), f"seed {seed}"]
 
 
 def _none(
@@ -109,7 +110,7 @@ def _none(
     message = f"{words}; the nearest is in nearest.yaml: {missed}"
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])
-    files = {"nearest.yaml": study_text(data, f"Nearest to {study.name}: {missed}")}
+    files = {"nearest.yaml": study_text(data, [f"Nearest to {study.name}: {missed}"])}
     return AssemblyError(message, Result("synthesize", {table.name: table}, failed=message, files=files))
 
 
@@ -128,9 +129,11 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
         transmission_angle=np.array([one.transmission for one in solutions]) / task.factor,
         size=np.array([one.size for one in solutions]),
     )  # fmt: skip
-    if task.section.judge is not None:
-        shares = np.array([one.share for one in solutions]).T
-        columns += SOLUTIONS.columns({}, **dict(zip(("yield", "yield_low", "yield_high"), shares, strict=True)))
+    judge, made = task.section.judge, np.array([one.made for one in solutions]).T
+    if judge is not None and judge.within is not None:
+        columns += SOLUTIONS.columns({}, **dict(zip(("yield", "yield_low", "yield_high"), made[:3], strict=True)))
+    if judge is not None and judge.loads:
+        columns += SOLUTIONS.columns(labels, peak_effort=made[3])
     columns += SOLUTIONS.columns({}, score=np.array(scores))
     places = {
         place: declared.quantity for one in solutions

@@ -19,12 +19,14 @@ SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("size", "greatest extent of pivots and pins along x or y at the positions", "length"),
     ("yield", "share of made linkages whose errors keep the limit at every position"),
     ("yield_low", "lower end of its interval"), ("yield_high", "upper end of its interval"),
+    ("peak_effort", "greatest effort of the drive on its way through the task under the loads of `judge`", "torque"),
     ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),
     ColumnKind("<dimension>", "dimension of the linkage by its name in its study", "as the dimension"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(SOLUTIONS, "error", "error of the best", "first"),
     KeyNumber(SOLUTIONS, "transmission_angle", "its smallest transmission angle", "first"),
-    KeyNumber(SOLUTIONS, "yield", "its yield", "first"),
+    KeyNumber(SOLUTIONS, "yield", "its yield", "first", bounds=("yield_low", "yield_high")),
+    KeyNumber(SOLUTIONS, "peak_effort", "its peak effort", "first"),
 )  # fmt: skip
 # Studies that it writes.
 STUDIES = "solution_*.yaml nearest.yaml"

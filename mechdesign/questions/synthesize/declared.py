@@ -81,6 +81,11 @@ MECHANISMS = {"path": _PATHS, "body": _BODIES, "function": _FUNCTIONS}
 PATHS, BODIES, FUNCTIONS = map(tuple, MECHANISMS.values())
 
 
+def in_words(kind: str) -> str:
+    """A kind of linkage in texts, such as four-bar."""
+    return kind.replace("four_bar", "four-bar").replace("slider_crank", "slider-crank").replace("_", " ")
+
+
 def starting(section: Mapping[str, Any]) -> Mapping[str, Any]:
     """The mechanism of the first kind that the task of a synthesis section looks for, as data."""
     task = next((task for task in MECHANISMS if task in section), "path")

@@ -12,6 +12,7 @@ from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, FUNCTIONS, PATHS, links, starting
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.text import fields
 from mechdesign.study.text.reading import failure
 
@@ -163,16 +164,23 @@ class JudgeSection(fields.Model):
     """Tolerances of single dimensions, as ``reliability.dimensions`` takes them. Example: {crank.length: 0.05}"""
     clearances: dict[str, Clearance] = Field(default_factory=dict)
     """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: {radial: 0.02}}"""
-    within: Annotated[float, fields.number(None, 0.0, exclusive=True)]
+    within: Annotated[float, fields.number(None, 0.0, exclusive=True)] | None = None
     """Largest error of a made linkage at a point of the task. Example: 0.5 mm"""
+    loads: tuple[Load, ...] = ()
+    """Forces and moments under which the peak effort of the drive is told, as ``dynamics.loads`` takes them. Example:
+    [{at: P, force: [0, -20 N]}]
+    """
     best: Annotated[int, fields.whole(1, 1000)] = 20
     """How many linkages are judged, those with the smallest errors. Example: 40"""
     samples: Annotated[int, fields.whole(2, 10**9)] = 4000
     """Samples of the Monte Carlo simulation of each. Example: 10000"""
 
     def faults(self) -> Iterator[str]:
-        if self.tolerance is None and not self.dimensions and not self.clearances:
+        deviates = self.tolerance is not None or self.dimensions or self.clearances
+        if self.within is not None and not deviates:
             yield "what deviates? give 'tolerance', 'dimensions' or 'clearances'"
+        if self.within is None and (deviates or not self.loads):
+            yield "a yield needs 'within', the largest error of a made linkage, such as 0.5 mm"
 
 
 Rank = Annotated[str, fields.choice(_RANKS, "order of solutions")]
@@ -299,7 +307,7 @@ class SynthesisSection(fields.Model):
             yield "'of' takes the 'ranges' of parameters, and no 'kinds'"
         if self.ranges and self.of is None:
             yield "'ranges' are of the parameters of the study that 'of' names"
-        if "yield" in self.rank and self.judge is None:
+        if "yield" in self.rank and (self.judge is None or self.judge.within is None):
             yield "a yield needs 'judge', such as {tolerance: 0.1 mm, within: 0.5 mm}"
         if not any(self.rank.values()):
             yield "all weights of 'rank' are zero"
@@ -310,5 +318,7 @@ class SynthesisSection(fields.Model):
         return self.given("body", "function", "path")[0]
 
     def checked(self, checker: Checker) -> Self:
-        """Check units."""
+        """Check the loads, on the kind of linkage with which a search begins."""
+        if self.judge is not None:
+            check_loads(checker, self.judge.loads, ("synthesis", "judge", "loads"), moving=False, timed=False)
         return self

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,18 @@ class Pool:
         )  # fmt: skip
 
 
+class Judged(NamedTuple):
+    """What a linkage is worth once it is made; nan where it is not asked."""
+
+    share: float = np.nan  # of made linkages that keep the limit
+    low: float = np.nan  # ends of its interval
+    high: float = np.nan
+    effort: float = np.nan  # greatest effort of the drive, in the study's units
+
+
+_UNJUDGED = Judged()
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """One linkage that does a task."""
@@ -66,7 +79,7 @@ class Solution:
     defects: str
     transmission: float  # radians
     full_turn: bool
-    share: tuple[float, float, float] = (np.nan, np.nan, np.nan)  # of made linkages that keep the limit, and its ends
+    made: Judged = _UNJUDGED
 
     @property
     def error(self) -> float:
@@ -248,7 +261,7 @@ def ranked(
 ) -> tuple[list[Solution], list[float]]:
     """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
     measures: dict[str, Callable[[Solution], float]] = {
-        "error": lambda one: -rounded(one.error, size), "yield": lambda one: one.share[0],
+        "error": lambda one: -rounded(one.error, size), "yield": lambda one: one.made.share,
         "transmission": lambda one: one.transmission, "size": lambda one: -one.size,
     }  # fmt: skip
     total, whole = np.zeros(len(solutions)), sum(weights.values())

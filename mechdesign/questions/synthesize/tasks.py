@@ -48,6 +48,16 @@ class _Task:
     apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
 
     @property
+    def closed(self) -> bool:
+        """Whether its positions end where they begin."""
+        return self.section.path is not None and self.section.path.closed
+
+    @property
+    def directions(self) -> Complexes:
+        """Unit vectors along the body at the positions; none of a point or a function."""
+        return np.empty(0, dtype=complex)
+
+    @property
     def error_factor(self) -> float:
         """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
         return 1.0
@@ -90,10 +100,15 @@ class BodyTask(_Task):
         """Places that the point P shall pass; none of a function."""
         return self.positions.places
 
+    @property
+    def directions(self) -> Complexes:
+        """Unit vectors along the body at the positions."""
+        return self.positions.rotations
+
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what the outputs should be at each position, in the study's units."""
         turns = np.unwrap(np.angle(self.positions.rotations)) / self.factor
-        return POINT, {POINT: _pairs(self.positions.places), f"{BODY}.angle": turns.tolist()}
+        return POINT, {POINT: self.positions.places.tolist(), f"{BODY}.angle": turns.tolist()}
 
     def gaps(self, part: Candidates) -> list[Floats]:
         """Distance of the body's origin from each position, of each assembly; shape (count, positions)."""
@@ -218,7 +233,7 @@ class PathTask(_Task):
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and where it should be at each position."""
-        return POINT, {POINT: _pairs(self.path.points)}
+        return POINT, {POINT: self.path.points.tolist()}
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
@@ -261,10 +276,6 @@ def _exact(fits: paths.Fits, size: float) -> tuple[int, int, int]:
             kept.append(values)
             last = int(fits.starts[row]) + 1
     return len(kept), last, int(fits.starts.max(initial=-1)) + 1
-
-
-def _pairs(places: Complexes) -> list[list[float]]:
-    return [[place.real, place.imag] for place in places.tolist()]
 
 
 class Bound:

@@ -38,6 +38,7 @@ from mechdesign.ground.terms import path_of
 from mechdesign.ground.versions import installed
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
 from mechdesign.questions.reliability.schema.section import in_words
+from mechdesign.questions.synthesize.words import task as task_in_words
 from mechdesign.study import Study
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.text.units import text_of
@@ -109,7 +110,7 @@ def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, pl
     parts += ["sorted"] * any(table["sorted"] for section in sections for table in section["tables"])
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
-    drawing = drawing or (_sketch(study) if plots else "")
+    drawing = drawing or (_sketch(study) if plots and not study.is_task else "")
     drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
     # Each design of a front has a drawing.
     drawings += [entry.get("drawing", "") for part in moving.values() for entry in part["data"].get("choices", ())]
@@ -202,7 +203,9 @@ def _sketch(study: Study) -> str:
 
 
 def thumbnail(study: Study) -> str:
-    """A small drawing of a study's mechanism as a data URI; empty where it cannot be drawn."""
+    """A small drawing of a study's mechanism as a data URI; empty where it cannot be drawn, or there is none."""
+    if study.is_task:
+        return ""
     try:
         with style.context():
             scene = sketched(study.mechanism)
@@ -321,4 +324,5 @@ def _about(study: Study) -> dict[str, Any]:
         "links": links, "drives": drives_in_words(description), "parameters": parameters, "described": listed,
         "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
+        "task": [*task_in_words(study)],
     }  # fmt: skip

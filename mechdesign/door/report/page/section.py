@@ -73,6 +73,7 @@ def section(
         "files": list(result.files),
         "counts": plain(dict(result.counts)),
         "warnings": [*map(str, (*result.warnings, *warnings))],
+        "notes": list(result.notes),
         "interrupted": result.interrupted,
     }, warnings
 

@@ -1,73 +1,92 @@
-"""The linkages of a synthesis with their curves and the task, and error against transmission angle."""
+"""The linkages of a synthesis with their paths and the task, and error against transmission angle."""
 
 from __future__ import annotations
+
+from contextlib import suppress
 
 import numpy as np
 
 from mechdesign.drawing import style
 from mechdesign.drawing.drawing import Posed
 from mechdesign.drawing.marks import Axis, Dots, Panel, PanelMark, Picture, Trace, Words
-from mechdesign.drawing.panels import drawn_plane, quantity
+from mechdesign.drawing.panels import number, quantity
 from mechdesign.drawing.pictures import View, picture
-from mechdesign.drawing.scene import Scene
+from mechdesign.drawing.scene import Still, sketched
+from mechdesign.drawing.sweep import Sweep
+from mechdesign.ground.errors import MechdesignError, counted
 from mechdesign.ground.numerics.arrays import Complexes
+from mechdesign.questions.poses import solve_shown
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
-from mechdesign.questions.synthesize.solutions import Solution
+from mechdesign.questions.synthesize.declared import in_words
+from mechdesign.study import Study
 
-# Linkages on the page, and poses of their curves.
-_SHOWN, _POSES = 9, 181
-_FEW = 20
+# Linkages on the page and beside each other, and those of the front that have a number.
+_SHOWN, _ACROSS, _FEW = 20, 5, 20
+# Length of the line that shows the angle of a position, as a part of the extent of what is drawn.
+_AXIS = 0.08
 
 
 @picture(View, "solutions", order=10)
 def solutions_picture(view: View) -> Picture:
-    """The best linkages, each at the first position of the task, with its curve and the points."""
-    drawn, unit = DrawnSolutions.of(view.result), view.result.tables["solutions"].column("error").unit
-    panels = []
-    for number, solution in enumerate(drawn.solutions[:_SHOWN], 1):
-        first = (np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp))
-        scene = Scene(solution.variant, solution.poses.take(first))
-        still = scene.at(0)
-        assert still is not None
-        curve, points = _curve(solution), drawn.task.points
+    """The best linkages, each at the first position of the task, with the path of its point and the task."""
+    drawn, table = DrawnSolutions.of(view.result), view.result.tables["solutions"]
+    panels, angle = [], table.column("transmission_angle").unit
+    for row, study in enumerate(drawn.studies[:_SHOWN]):
+        (still, path), places = _course(study, drawn.output), drawn.places
         marks: list[PanelMark] = [Posed(still, names=False, drives=False)]
-        if len(points):
-            marks += [
-                Trace(curve.real, curve.imag, label="its curve", look={"color": style.BLUE, "linewidth": 1.2}),
-                Dots(points.real, points.imag, label="the task", look={"color": style.VERMILION, "markersize": 4}),
-            ]
-        shows = np.concatenate([curve[np.isfinite(curve)] if len(points) else points, points, [*still.points.values()]])
-        error = quantity(float(drawn.errors[number - 1]), unit)
-        words = f"{number}: {solution.kind.name.replace('_', ' ')}, error {error}"
-        faults = f"defect: {solution.defects}" if solution.defects else ""
-        panels.append(drawn_plane(marks, shows, drawn.study, "\n".join(filter(None, (words, faults)))))
-    return Picture(f"The best {len(panels)} of {len(drawn.solutions)} linkages", panels, across=3)
+        shows = np.concatenate([path[np.isfinite(path)], places, still.places])
+        marks += [Trace(path.real, path.imag, label=f"path of {drawn.output}",
+                        look={"color": style.BLUE, "linewidth": 1.2})] * bool(len(path))  # fmt: skip
+        if len(drawn.directions):
+            ends = places + _AXIS * max(np.ptp(shows.real), np.ptp(shows.imag)) * drawn.directions
+            lines = np.stack([places, ends, np.full(len(places), np.nan)], axis=1).ravel()
+            marks.append(Trace(lines.real, lines.imag, look={"color": style.VERMILION, "linewidth": 1.4}))
+        if len(places):
+            marks.append(Dots(places.real, places.imag, label="the task",
+                              look={"color": style.VERMILION, "markersize": 3.5}))  # fmt: skip
+        error = quantity(float(drawn.errors[row]), table.column("error").unit)
+        kind, defects = (str(table[name][row]) for name in ("kind", "defects"))
+        words = [f"{row + 1}: {in_words(kind)}, error {error}",
+                 f"transmission {quantity(float(table['transmission_angle'][row]), angle)}",
+                 f"yield {number(float(table['yield'][row]))}" if "yield" in table else "",
+                 f"defect: {defects}" if defects else "no defect"]  # fmt: skip
+        panels.append(Panel(marks, title="\n".join(filter(None, words)), equal=1.0, shows=shows, bare=True))
+    count = counted(len(table), "linkage")
+    title = f"The best {len(panels)} of {count}" if len(panels) < len(table) else count
+    note = ("Each has a scale of its own",) * (len(panels) > 1)
+    return Picture(f"{title} at the first position", panels, note, across=_ACROSS)
 
 
-def _curve(solution: Solution) -> Complexes:
-    """The way of the point P over a turn, or between the positions where the drive does not turn."""
-    low, high = float(solution.angles.min()), float(solution.angles.max())
-    angles = np.linspace(low, low + 2 * np.pi if solution.full_turn else high, _POSES)
-    return np.asarray(solution.kind.points(solution.kind.solve(solution.values[None], angles[None], solution.modes))[0])
+def _course(study: Study, point: str) -> tuple[Still, Complexes]:
+    """A linkage at its first position, with the path of a point through the task; empty where there is none."""
+    first, path = sketched(study.mechanism), np.empty(0, dtype=complex)
+    with suppress(MechdesignError):
+        sweep = Sweep.of(solve_shown(study))
+        return sweep.scene.at(0) or first, sweep.traces.get(point, path)
+    return first, path
 
 
 @picture(View, "trade", order=20)
 def trade_picture(view: View) -> Picture | None:
     """Error against the smallest transmission angle; the front is those that none surpasses in both."""
     table, errors = view.result.tables["solutions"], DrawnSolutions.of(view.result).errors
-    angles = np.asarray(table["transmission_angle"])
+    angles, faulty = np.asarray(table["transmission_angle"]), np.asarray(table["defects"]) != ""
     if len(table) < 2:
         return None
-    best = np.array([not ((errors < e) & (angles >= a) | (errors <= e) & (angles > a)).any()
-                     for e, a in zip(errors, angles, strict=True)])  # fmt: skip
-    order = np.flatnonzero(best)[np.argsort(angles[best])]
+    whole = np.flatnonzero(~faulty)
+    better = (errors[whole] < errors[whole, None]) & (angles[whole] >= angles[whole, None])
+    better |= (errors[whole] <= errors[whole, None]) & (angles[whole] > angles[whole, None])
+    front = whole[~better.any(axis=1)]
+    order = front[np.argsort(angles[front])]
     marks: list[PanelMark] = [
-        Trace(angles[order], errors[order], label="front: no other is better in both",
+        Trace(angles[order], errors[order], label="front: no other without a defect is better in both",
               look={"color": style.BLUE, "drawstyle": "steps-pre", "linewidth": 1.2}),
-        Dots(angles, errors, label="linkages", look={"color": style.VERMILION, "markersize": 5}),
-        *(Words(angles[k], errors[k], f" {k + 1}") for k in order[:_FEW].tolist()),
+        Dots(angles[~faulty], errors[~faulty], label="linkages", look={"color": style.VERMILION, "markersize": 5}),
     ]  # fmt: skip
+    if faulty.any():
+        hollow = {"color": style.VERMILION, "markersize": 5, "markerfacecolor": "white"}
+        marks.append(Dots(angles[faulty], errors[faulty], label="with a defect", look=hollow))
+    marks += [Words(angles[k], errors[k], f"{k + 1}", (4.0, 3.0)) for k in order[:_FEW].tolist()]
     across = Axis("smallest transmission angle, more is better", table.column("transmission_angle").unit)
-    return Picture("What error costs in transmission", [
-        Panel(marks, across, Axis("error, less is better", table.column("error").unit))
-    ])  # fmt: skip
+    up = Axis("error, less is better", table.column("error").unit, ends=(0.0, None))
+    return Picture("What error costs in transmission", [Panel(marks, across, up)])
