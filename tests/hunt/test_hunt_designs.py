@@ -29,6 +29,8 @@ NOMINAL = {"p": 10.0, "q": 20.0, "s": 5.0}
 WIDTH = 0.02
 COUNT = 4
 CLOSE = 1e-12
+# Half of the digits of a number: so well is known where a smooth function is largest.
+FLAT = 1e-8
 
 
 class Number(float):
@@ -216,11 +218,12 @@ def columns(command: str, result: Result) -> list[str]:
     return main + more
 
 
-def same(one: float, other: float) -> bool:
-    """Whether two numbers are equal to 1e-12 of their size, and of 1."""
+def same(one: float, other: float, name: str) -> bool:
+    """Whether two numbers are equal to 1e-12 of their size, and of 1; places of extremes, which are flat, to 1e-8."""
     if np.isnan(one) or np.isnan(other) or not np.isfinite(other):
         return bool(np.array_equal(one, other, equal_nan=True))
-    return abs(one - other) <= CLOSE * max(1.0, abs(other))
+    close = FLAT if name.endswith(("_at", ".at")) else CLOSE
+    return abs(one - other) <= close * max(1.0, abs(other))
 
 
 def test_designs_at_once_are_those_written_out(seeds: Seeds) -> None:
@@ -247,7 +250,7 @@ def test_designs_at_once_are_those_written_out(seeds: Seeds) -> None:
             assert (result is None) <= bool(found.reasons[k]), (seed, k)
             for j, each in enumerate(goals if result is not None else ()):
                 (value,) = each.judge(result)[0]
-                assert same(found.table[k, j], value), (seed, k, each.name, found.table[k, j], value)
+                assert same(found.table[k, j], value, each.name), (seed, k, each.name, found.table[k, j], value)
                 compared += 1
     assert compared
 
@@ -302,6 +305,6 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
                 assert whole.warned[kind].message.startswith(f"{command}: {first}"), seed
             for j, each in enumerate(wanted):
                 (expected,) = number_of(each, DesignGroup.alone(result))[0].tolist()
-                assert same(whole.number(j)[0][k], expected), (seed, each.name, whole.number(j)[0][k])
+                assert same(whole.number(j)[0][k], expected, each.name), (seed, each.name, whole.number(j)[0][k])
                 compared += 1
     assert compared
