@@ -3,8 +3,8 @@
 In a page
 - a block of YAML with a caption is a file of that name; a caption "NAME, continued" adds to it; it must pass `check`;
 - a block of YAML without one is a part of a study: laid over the page's last file, it must pass `check`;
-- a `console` block holds commands after `$ `, each with what a terminal shows; a line `...` stands for any lines, and
-  numbers agree to six digits;
+- a `console` block holds commands after `$ `, each with what a terminal shows but how far it is; a line `...` stands
+  for any lines, and numbers agree to six digits;
 - a `python` block runs with those before it; what it prints stands in the `text` block that follows, if there is one.
 
     python docs/examples.py [PAGE...]     writes what the commands print now into the pages
@@ -51,6 +51,8 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
 # Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
 _PYTHON = threading.Lock()
 _PICTURE = re.compile(r"(\w+)\.png")
+# How far a command is that takes long: on a busy machine another one does.
+_COURSE = re.compile(r": \d+ of \d+ \w+ after \d+ s\b")
 _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 
@@ -98,7 +100,8 @@ def terminal(command: str, folder: Path, tools: Path, pictures: Iterable[str]) -
             messages = process.stderr.read()
             text = shown.result().replace(b"\r\n", b"\n") + messages
     os.close(ours)
-    lines = text.decode().splitlines() + ([f"(exit code {process.returncode})"] if process.returncode else [])
+    lines = [line for line in text.decode().splitlines() if not _COURSE.search(line)]
+    lines += [f"(exit code {process.returncode})"] if process.returncode else []
     return "".join(f"{line.rstrip()}\n" for line in lines)
 
 

@@ -135,10 +135,12 @@ def _corners(times: Floats, values: Floats, near: float) -> Ints:
     corners, parts = {0, len(times) - 1}, [(0, len(times) - 1)]
     while parts:
         first, last = parts.pop()
-        share = ((times[first : last + 1] - times[first]) / (times[last] - times[first] or 1))[:, None]
-        away = np.abs(values[first : last + 1] - values[first] - share * (values[last] - values[first])).max(axis=1)
-        middle = first + int(away.argmax())
-        if away.max() > near:
+        # Two poses may stand at the same time, beside a limit where the mechanism is infinitely fast.
+        between = np.arange(first + 1, last)
+        share = ((times[between] - times[first]) / (times[last] - times[first] or 1))[:, None]
+        away = np.abs(values[between] - values[first] - share * (values[last] - values[first])).max(axis=1)
+        if away.max(initial=0.0) > near:
+            middle = int(between[away.argmax()])
             corners.add(middle)
             parts += [(first, middle), (middle, last)]
     return np.array(sorted(corners))

@@ -53,6 +53,26 @@ def test_a_word_that_is_out_of_scope_says_so_and_where_to_go(word, invoke):
     assert "docs/theory/limits.md" in done.stdout
 
 
+@pytest.mark.parametrize(("words", "told", "not_told"), [
+    (["ball", "joint"], "ball joint (out of scope)", "unit ball"),
+    (["transmission", "angle"], "loops.csv", "units.angle"),
+    (["hole"], "mechanism.plates.pin", "whole turns"),
+    (["CAD"], "docs/howto/import.md", "matches"),
+    (["four bar"], "loops.csv (table)", "did you mean"),
+    (["gear ratio"], "docs/howto/gears_and_cams.md (page)", "did you mean"),
+    (["motor torque"], "docs/howto/moving_torque.md (page)", "did you mean"),
+])  # fmt: skip
+def test_a_term_of_several_words_is_one_term_and_words_begin_where_the_term_does(words, told, not_told, invoke):
+    done = invoke("docs", *words)
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert told in done.stdout
+    assert not_told not in done.stdout
+
+
+def test_a_word_of_two_kinds_of_reasons_stands_once(invoke):
+    assert invoke("docs", "limit").stdout.count("limit (why a pose fails)") == 1
+
+
 def test_every_command_and_option_is_found_with_what_it_does():
     group = typer.main.get_command(app).commands
     known = entries(commands(group))

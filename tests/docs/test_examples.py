@@ -51,3 +51,10 @@ def test_links_of_a_page_lead_to_files(page: Path) -> None:
 )
 def test_lines_stand_for_any_and_numbers_agree_to_six_digits(told: str, shown: str, same: bool) -> None:
     assert examples.agree(told, shown) is same
+
+
+def test_how_far_a_slow_command_was_is_no_part_of_what_a_page_shows(tmp_path: Path) -> None:
+    command = (
+        "echo '3000 designs to compute'; echo 'reach: optimize: 2349 of 3000 designs after 10 s; Ctrl-C ends it' >&2"
+    )
+    assert examples.terminal(command, tmp_path, tmp_path, ()) == "3000 designs to compute\n"

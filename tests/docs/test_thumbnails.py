@@ -70,3 +70,10 @@ def test_the_linkage_of_a_task_moves_through_its_positions() -> None:
     path = mechdesign.kinematics(moving).main
     for place in (0, 19 + 13j, 46 + 21j, 67 + 18j, 89 - 2j):
         assert np.abs(path["P.x"] + 1j * path["P.y"] - place).min() < 1
+
+
+def test_frames_are_found_where_two_poses_stand_at_the_same_time() -> None:
+    # As beside a limit of a motion: the last step takes no time, and what moves goes on by 3 units.
+    places = np.array([[0.0], [10.0], [13.0]])
+    svg = thumbnails._rule("m-0", {"translate": places}, np.array([0.0, 1.0, 1.0]))
+    assert re.findall(r"translate:(\d+)px", svg)[-1] == "13"

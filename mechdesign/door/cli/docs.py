@@ -34,7 +34,10 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
         If a word is not known; the message names the nearest.
     """
     index = entries(commands(group))
-    matches = [(word, _found(index, word)) for word in words]
+    phrase = " ".join(words)
+    # Words of one term of the field are not explained apart.
+    asked = [phrase] if len(words) > 1 and (find(index, phrase) or holding(index, phrase)) else words
+    matches = [(word, _found(index, word)) for word in asked]
     for word, hits in matches:
         if not hits:
             close = near(index, word)
@@ -91,9 +94,9 @@ def _lines(index: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
     for hit in hits:
         alike.setdefault(replace(hit, word=""), []).append(hit)
     for entry, same in alike.items():
-        for twin in same:
-            bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
-            yield f"{typer.style(twin.word, bold=True) if bold else twin.word} ({twin.kind})"
+        bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+        for word in dict.fromkeys(twin.word for twin in same):
+            yield f"{typer.style(word, bold=True) if bold else word} ({entry.kind})"
         yield from (_INDENT + line for line in _body(entry, same[0].last))
         keys = below(index, same[0]) if len([twin for twin in alike if twin.kind == entry.kind]) == 1 else []
         if keys:

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 from mechdesign.door.reference.entries import Entry
 from mechdesign.door.reference.keys import KIND, place
+from mechdesign.door.reference.pages import beginning
 from mechdesign.ground.errors import nearest
 
 
@@ -35,8 +36,8 @@ def find(entries: Sequence[Entry], word: str) -> list[Entry]:
 
 def holding(entries: Sequence[Entry], words: str) -> list[Entry]:
     """Entries whose texts contain these words."""
-    folded = words.casefold()
-    return [entry for entry in entries if any(folded in text.casefold() for text in (entry.text, entry.formula))]
+    pattern = beginning(words)
+    return [entry for entry in entries if any(map(pattern.search, (entry.text, entry.formula)))]
 
 
 def below(entries: Sequence[Entry], entry: Entry) -> list[Entry]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -58,26 +58,42 @@ def _of_study(place: str, text: str) -> _Page:
     return _Page(place, name[1] if name else place, "", tuple(" ".join(part.split()) for part in paragraphs if part))
 
 
+def beginning(words: str) -> re.Pattern[str]:
+    """Where words begin in a text; they may have a hyphen between them."""
+    parts = re.split(r"[\s-]+", words.strip())
+    return re.compile(r"\b" + r"[\s-]+".join(map(re.escape, parts)), re.IGNORECASE)
+
+
 def pages(word: str, *, subjects: bool = False) -> Iterator[Entry]:
     """The pages that say most of a word, with a sentence that has it: those about it first, then by how often.
 
-    Only pages of which it is a subject, where `subjects` are asked alone.
+    Only pages of which it is a subject, where `subjects` are asked alone; else, of a term that no page has, the pages
+    with all of its words.
     """
-    # A word may end otherwise, as balance of balancing, but it does not begin inside another.
-    pattern = re.compile(rf"\b{re.escape(_ENDING.sub('', word.strip().casefold()))}")
+    # A word may end otherwise, as balance of balancing.
+    patterns = [beginning(_ENDING.sub("", word.strip()))]
+    ranked = _ranked(patterns, subjects=subjects)
+    if not ranked and not subjects:
+        patterns = [beginning(_ENDING.sub("", part)) for part in word.split()]
+        ranked = _ranked(patterns)
+    for page in ranked[:_MOST]:
+        kind = "page" if page.place.endswith(".md") else "shipped study"
+        yield Entry(page.place, kind, f"{page.title}: {_sentence(page, patterns)}")
+
+
+def _ranked(patterns: Sequence[re.Pattern[str]], *, subjects: bool = False) -> list[_Page]:
+    """The pages with all of some words."""
     ranked = []
     for page in _pages():
-        text = " ".join(page.paragraphs)
-        places = [len(pattern.findall(part.casefold())) for part in (page.title, page.subjects, text)]
-        if any(places[:2]) or (places[2] and not subjects):
-            ranked.append((not places[0], not places[1], -places[2], page.place, page))
-    for *_, page in sorted(ranked)[:_MOST]:
-        kind = "page" if page.place.endswith(".md") else "shipped study"
-        yield Entry(page.place, kind, f"{page.title}: {_sentence(page, pattern)}")
+        parts = (page.title, page.subjects, " ".join(page.paragraphs))
+        title, subject, text = ([len(pattern.findall(part)) for pattern in patterns] for part in parts)
+        if any((*title, *subject)) if subjects else all(map(any, zip(title, subject, text, strict=True))):
+            ranked.append((-sum(map(bool, title)), -sum(map(bool, subject)), -sum(text), page.place, page))
+    return [page for *_, page in sorted(ranked)]
 
 
-def _sentence(page: _Page, pattern: re.Pattern[str]) -> str:
-    """The first sentence with a word, or that a page begins with, as far as a line or two go."""
+def _sentence(page: _Page, patterns: Sequence[re.Pattern[str]]) -> str:
+    """The first sentence with most of the words, or that a page begins with, as far as a line or two go."""
     sentences = [sentence for part in page.paragraphs for sentence in re.split(r"(?<=[.:!?]) (?=[A-Z])", part)]
-    sentence = next((one for one in sentences if pattern.search(one.casefold())), sentences[0] if sentences else "")
+    sentence = max(sentences, key=lambda one: sum(bool(pattern.search(one)) for pattern in patterns), default="")
     return sentence if len(sentence) <= _LONG else f"{sentence[:_LONG].rpartition(' ')[0]} ..."

@@ -17,6 +17,14 @@ SYNONYMS: Mapping[str, tuple[str, str]] = {
         "the force of an output over that of the drive, without friction: kinematics.mechanical_advantage asks for it",
     ),
     "tolerance stack": ("contributions", "the share of each tolerance in an error: contributions.csv of reliability"),
+    "transmission angle": (
+        "transmission_min",
+        "the smallest over the motion, of every four-bar and slider-crank: loops.csv of kinematics, and the picture "
+        "'transmission'",
+    ),
+    "interference": ("collisions", "links whose outlines meet: kinematics.collisions, with mechanism.plates"),
+    "end effector": ("workspace.point", "the point, or the link, that a robot moves"),
+    "TCP": ("workspace.point", "the point, or the link, that a robot moves"),
     "toggle": ("toggles", "poses at which two links are in line: toggles.csv of kinematics"),
     "baseline": ("compare", "results to compare with: mechdesign compare BASELINE RESULTS"),
     "backlash": ("clearances", "reliability.clearances, the play in pins and gears"),
