@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -56,6 +57,13 @@ def browser() -> Iterator[Browser]:
         opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
         yield opened
         opened.close()
+
+
+@pytest.fixture
+def silent() -> Iterator[None]:
+    """NumPy does not warn, as inside a question: for tests of functions that questions call."""
+    with np.errstate(all="ignore"):
+        yield
 
 
 def seconds_of(text: str) -> float:

@@ -110,12 +110,15 @@ _SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def context(look: str = "screen") -> Iterator[None]:
-    """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again."""
+    """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again.
+
+    NumPy does not warn there, as it does not inside a question.
+    """
     wide, _, dots, reduction = LOOKS[look]
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     # As rcdefaults, which reads all styles that come with Matplotlib besides.
     defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
-    with matplotlib.rc_context(), fonts.quiet():
+    with matplotlib.rc_context(), fonts.quiet(), np.errstate(all="ignore"):
         matplotlib.rcParams.update(defaults | _SETTINGS | page | {"font.family": fonts.families()})
         yield
 

@@ -147,8 +147,7 @@ def _table(results: Sequence[Goal], numbers: Sequence[Changing], whole: Answered
     doubts = [_doubt(slopes[k, :, j].tolist(), middle[j], numbers[k], reasons[k]) for j, k in pairs]
     derivative, error, low, high = np.moveaxis(slopes, 0, 2).reshape(4, -1)
     value, at = np.repeat(middle, len(numbers)), np.array([number.value for number in numbers] * len(results))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        elasticity = np.where((value != 0) & (at != 0), derivative * np.abs(at / value), np.nan)
+    elasticity = np.where((value != 0) & (at != 0), derivative * np.abs(at / value), np.nan)
     units = [(whole.units[j], numbers[k].unit) for j, k in pairs]
     table = columns.SENSITIVITIES
     return table.table(table.columns(

@@ -50,8 +50,7 @@ class Judgement:
     ) -> Judgement:
         """Values by their nearer bounds."""
         shape = np.shape(values)
-        with np.errstate(invalid="ignore"):
-            margins = np.min([sign * (bound - values) for sign, bound in _sides(bounds)], axis=0)
+        margins = np.min([sign * (bound - values) for sign, bound in _sides(bounds)], axis=0)
         return cls(values, margins, np.broadcast_to(row, shape), np.broadcast_to(at, shape), np.full(shape, strand))
 
     @property

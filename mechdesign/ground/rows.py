@@ -150,18 +150,17 @@ class Chosen:
                 raise UnknownColumnError(self._several(int(several.max())))
             return RowSpread(values, counts).end(1)
         statistic = STATISTICS[self.statistic].of
-        with np.errstate(invalid="ignore", divide="ignore"):
-            spread = RowSpread(values, counts)
-            rows = statistic(spread)
-            if not self.courses:
-                return rows
-            courses = [*self.courses.values()]
-            rounding = max(course.rounding for course in courses)
-            lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
-            numbers = np.where(lost, rows, statistic(Several(courses, spread, rounding)))
-            if not STATISTICS[self.statistic].pure:
-                numbers = cleared(numbers, rounding)
-            return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
+        spread = RowSpread(values, counts)
+        rows = statistic(spread)
+        if not self.courses:
+            return rows
+        courses = [*self.courses.values()]
+        rounding = max(course.rounding for course in courses)
+        lost = (np.isnan(values) & counts).any(axis=1) | ~np.all([course.followed for course in courses], axis=0)
+        numbers = np.where(lost, rows, statistic(Several(courses, spread, rounding)))
+        if not STATISTICS[self.statistic].pure:
+            numbers = cleared(numbers, rounding)
+        return np.where(np.any([course.lost > 0 for course in courses], axis=0), np.nan, numbers)
 
     def _several(self, count: int) -> str:
         words = [*STATISTICS]

@@ -124,8 +124,7 @@ class Several:
         """The largest value of all, or with the sign -1 the smallest: that of a row where it is farther out."""
         between = sign * np.max([sign * part.end(sign) for part in self.parts], axis=0)
         row = self.rows.end(sign)
-        with np.errstate(invalid="ignore"):
-            return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), self.rounding), row, between)
+        return np.where(sign * (row - between) > np.maximum(AT_END * np.abs(between), self.rounding), row, between)
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of all values."""

@@ -136,8 +136,7 @@ class Ends:
         smallest = np.fmin.reduce(
             np.abs(self._curve.margins_at(np.tile(line, 3), sides)).reshape(len(own), 3, -1), axis=1
         )
-        with np.errstate(invalid="ignore"):
-            return np.asarray(own[:, None] & (smallest <= least * self._sizes[:, line]))
+        return np.asarray(own[:, None] & (smallest <= least * self._sizes[:, line]))
 
     def _causes_at(self, line: Ints, outside: Floats) -> list[Cause]:
         """Causes by which motions end just before some places: the margin that is farthest below zero there."""

@@ -83,12 +83,11 @@ class Functions(Means):
         if not len(lanes):
             return values
         piece, end = piece[lanes], chebyshev.basis(x[lanes].astype(float))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            above, below = (
-                np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
-                for table in (self._table, self._divisor)
-            )
-            limits = above / below ** self._orders[rows, None]
+        above, below = (
+            np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
+            for table in (self._table, self._divisor)
+        )
+        limits = above / below ** self._orders[rows, None]
         places = self.curve.inside(line[lanes], place[lanes])
         shape = len(rows), len(lanes)
         own, which = (part.ravel() for part in np.broadcast_arrays(rows[:, None], line[lanes]))
@@ -109,8 +108,7 @@ class Functions(Means):
         above, below = (
             chebyshev.value(chebyshev.series(table[rows, piece]), x) for table in (self._table, self._divisor)
         )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.pieces.line[piece] == line, above / below ** self._orders[rows], np.nan)
+        return np.where(self.pieces.line[piece] == line, above / below ** self._orders[rows], np.nan)
 
     def extremes(self, names: Sequence[str], still: Floats) -> Extremes:
         """Smallest and largest values of some functions; of equal ones the first along the line.
@@ -158,8 +156,7 @@ class Functions(Means):
         exact = self._true(rows, line, table[: len(rows)], sign * value)
         rows, line, row = rows[beside], line[beside], row[beside]
         at_row = self._true(rows, line, table[len(own) - len(beside) :], self._by_series(rows, line, row))
-        with np.errstate(invalid="ignore"):
-            good = np.isfinite(exact[beside]) & (sign[beside] * (at_row - exact[beside]) >= -still[beside])
+        good = np.isfinite(exact[beside]) & (sign[beside] * (at_row - exact[beside]) >= -still[beside])
         exact[beside[good]], place[beside[good]] = at_row[good], row[good]
         return exact, place
 
@@ -168,8 +165,7 @@ class Functions(Means):
         # At a corner that lies beyond the outermost node of a piece the series of a magnitude is negative.
         series = np.where(self._magnitudes[rows], np.maximum(series, 0.0), series)
         size = np.maximum(self._scale, self._sizes[:, None])[rows, line]
-        with np.errstate(invalid="ignore"):
-            near = np.abs(values - series) <= TRUE * np.where(self._poled[rows], np.abs(series), size)
+        near = np.abs(values - series) <= TRUE * np.where(self._poled[rows], np.abs(series), size)
         return np.where(near & np.isfinite(series), values, series)
 
     def _tops(self, rows: Ints, sign: Floats, still: Floats) -> tuple[Ints, Ints, Floats, Floats]:
@@ -182,34 +178,31 @@ class Functions(Means):
         values = self._quotients(rows[:half])
         # A quotient is judged by its series, but where these are not exact.
         values = np.where(np.isnan(values) | (poled & ~rough.T).T[:half, :, None], -np.inf, values)
-        with np.errstate(invalid="ignore"):
-            steps = np.nan_to_num(np.abs(np.diff(values, axis=2)), nan=np.inf).max(axis=2)
+        steps = np.nan_to_num(np.abs(np.diff(values, axis=2)), nan=np.inf).max(axis=2)
         nodes = np.concatenate([np.where(np.isinf(values), -np.inf, -values).max(axis=2), values.max(axis=2)])
         best = np.full((len(rows), self.curve.lines), -np.inf)
         largest(best, line, nodes)
         # Between its nodes a function is larger than there by less than it moves from one to the next.
         first = np.append(True, line[1:] != line[:-1])
-        with np.errstate(invalid="ignore", over="ignore"):
-            high = nodes + 2 * np.tile(steps, (2, 1)) >= best[:, line] - still[:, line]
+        high = nodes + 2 * np.tile(steps, (2, 1)) >= best[:, line] - still[:, line]
         lane, piece = np.nonzero((high | poled[:, None] | first) & ~rough)
         owner, quotient = line[piece], poled[lane]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            table = chebyshev.at_places(chebyshev.series(self._table[rows[lane], piece]))
-            below = self._divisor[rows[lane[quotient]], piece[quotient]]
-            product, divisor = table[quotient], chebyshev.at_places(chebyshev.series(below))
-            table[quotient] /= divisor ** self._orders[rows[lane[quotient]], None]
-            # Where both are zero the quotient has no meaning, and at a pole it has no sign.
-            lost = np.where(quotient[:, None], ~np.isfinite(table), np.isnan(table))
-            sizes = (scale[rows[lane], owner][quotient, None] for scale in (self._scale, self._divisor_scale))
-            lost[quotient] |= (np.abs(product) > POLE * next(sizes)) & (np.abs(divisor) <= ZERO * next(sizes))
-            table = np.where(lost, -np.inf, sign[lane, None] * table)
-            np.maximum.at(best.reshape(-1), lane * self.curve.lines + owner, table.max(axis=1))
-            top = np.ones(table.shape, dtype=bool)
-            top[:, 1:] = table[:, 1:] >= table[:, :-1]
-            top[:, :-1] &= table[:, :-1] >= table[:, 1:]
-            # A constant function has both extremes at its first place.
-            top &= np.tile(best[:half] + best[half:] > still[:half], (2, 1))[lane, owner][:, None]
-            bend = np.abs(np.nan_to_num(table[:, 2:] - 2 * table[:, 1:-1] + table[:, :-2], posinf=0, neginf=0))
+        table = chebyshev.at_places(chebyshev.series(self._table[rows[lane], piece]))
+        below = self._divisor[rows[lane[quotient]], piece[quotient]]
+        product, divisor = table[quotient], chebyshev.at_places(chebyshev.series(below))
+        table[quotient] /= divisor ** self._orders[rows[lane[quotient]], None]
+        # Where both are zero the quotient has no meaning, and at a pole it has no sign.
+        lost = np.where(quotient[:, None], ~np.isfinite(table), np.isnan(table))
+        sizes = (scale[rows[lane], owner][quotient, None] for scale in (self._scale, self._divisor_scale))
+        lost[quotient] |= (np.abs(product) > POLE * next(sizes)) & (np.abs(divisor) <= ZERO * next(sizes))
+        table = np.where(lost, -np.inf, sign[lane, None] * table)
+        np.maximum.at(best.reshape(-1), lane * self.curve.lines + owner, table.max(axis=1))
+        top = np.ones(table.shape, dtype=bool)
+        top[:, 1:] = table[:, 1:] >= table[:, :-1]
+        top[:, :-1] &= table[:, :-1] >= table[:, 1:]
+        # A constant function has both extremes at its first place.
+        top &= np.tile(best[:half] + best[half:] > still[:half], (2, 1))[lane, owner][:, None]
+        bend = np.abs(np.nan_to_num(table[:, 2:] - 2 * table[:, 1:-1] + table[:, :-2], posinf=0, neginf=0))
         bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
         # The first place of a piece counts if it is as large within rounding.
         top[:, 0] = True
@@ -228,8 +221,7 @@ class Functions(Means):
         """Values of functions at the nodes of pieces; nan where the divisor is zero."""
         divisors = self._divisor[rows, piece]
         orders = self._orders[rows].reshape(-1, *(1,) * (divisors.ndim - 1))
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return np.where(divisors != 0, self._table[rows, piece] / divisors**orders, np.nan)
+        return np.where(divisors != 0, self._table[rows, piece] / divisors**orders, np.nan)
 
     def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
         """Places in pieces, and values, of local maxima of functions times a sign near to `chebyshev.PLACES[m]`."""
@@ -259,8 +251,7 @@ class Functions(Means):
         x[turning] = at = chebyshev.root(
             lambda place: rise(turning, place), sides[0][turning], low[turning], sides[1][turning], high[turning]
         )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            refined = sign[turning] * chebyshev.value(c[turning], at) / chebyshev.value(d[turning], at)
+        refined = sign[turning] * chebyshev.value(c[turning], at) / chebyshev.value(d[turning], at)
         value[turning] = np.maximum(refined, value[turning])
         return x, value
 
@@ -324,10 +315,9 @@ class Functions(Means):
         least, most = table.min(axis=1), table.max(axis=1)
         np.minimum.at(least, turned, extreme)
         np.maximum.at(most, turned, extreme)
-        with np.errstate(invalid="ignore"):
-            slack = TOUCHED * np.maximum(np.abs(least), np.abs(most))
-            moves = most - least > 2 * slack
-            met = (every >= (least - slack)[:, None]) & (every <= (most + slack)[:, None])
+        slack = TOUCHED * np.maximum(np.abs(least), np.abs(most))
+        moves = most - least > 2 * slack
+        met = (every >= (least - slack)[:, None]) & (every <= (most + slack)[:, None])
         piece, level = np.nonzero(met & moves[:, None])
         shifted = series[piece]
         shifted[:, 0] -= every[level]

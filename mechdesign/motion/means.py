@@ -36,8 +36,7 @@ class Means(Series):
         if absolute:
             parts = self._sizes_of(values, pace, np.abs(parts))
         total, sums = (np.bincount(self.pieces.line, part, self.curve.lines) for part in (weights.sum(axis=1), parts))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mean = np.asarray(sums / np.where(total > 0, total, np.nan))
+        mean = np.asarray(sums / np.where(total > 0, total, np.nan))
         row = self.names[name]
         size = np.maximum(self._scale[row], self._sizes[row])[self.pieces.line]
         large = np.abs(np.nan_to_num(values)).max(axis=1) > (UNRESOLVED * size) ** power
@@ -57,8 +56,7 @@ class Means(Series):
             # At the pole itself a node may have no value.
             if top in (present[0], present[-1]):
                 near = inwards[:4]
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    powers = -np.diff(np.log(sizes[k, near])) / np.diff(np.log(1.0 - np.abs(chebyshev.NODES[near])))
+                powers = -np.diff(np.log(sizes[k, near])) / np.diff(np.log(1.0 - np.abs(chebyshev.NODES[near])))
                 endless[k] = (powers >= ENDLESS_POWER).all()
             else:
                 endless[k] = self.pieces.depth[k] >= MOST_HALVINGS - 1 and rises(sizes[k, inwards])

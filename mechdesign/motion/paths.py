@@ -98,8 +98,7 @@ class Polyline(PointPath):
 
         At the end it is that of the last one, of a closed line that of the first.
         """
-        with np.errstate(all="ignore"):
-            units = np.where(self._lengths > 0, np.diff(self.places, axis=1) / self._lengths, np.nan)
+        units = np.where(self._lengths > 0, np.diff(self.places, axis=1) / self._lengths, np.nan)
         moving = self._lengths > 0
         closes = self.places[:, 0] == self.places[:, -1]
         rows, last = np.arange(len(units)), moving.shape[1] - 1

@@ -273,8 +273,7 @@ class Search:
         if not len(x):
             return x
         value = self.look(pieces.line, pieces.places(x))[0][number]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            moved = x - value / chebyshev.slope(coefficients, x)
+        moved = x - value / chebyshev.slope(coefficients, x)
         return np.where(np.abs(moved - x) < BESIDE, np.clip(moved, -1.0, 1.0), x)
 
 

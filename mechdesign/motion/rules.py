@@ -231,8 +231,7 @@ class PathRows(Rows):
         way, steps = self.paths[self.path].lengths(self.designs), dict[str, Floats]()
         for name, column in self.at(line, row).items():
             rise = np.diff(self._round(column.reshape(self.designs, -1)), axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                steps[name] = np.where(rise == 0, 0.0, rise / way)
+            steps[name] = np.where(rise == 0, 0.0, rise / way)
         return steps
 
     def _round(self, rows: Floats) -> Floats:

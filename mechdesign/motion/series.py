@@ -128,8 +128,7 @@ class Series:
         divisors = np.ones_like(values)
         divisors[[*self._divisors]] = values[[*self._divisors.values()]]
         orders = self._orders[:, None, None]
-        with np.errstate(invalid="ignore", over="ignore"):
-            products = np.where(self._poled[:, None, None], values * divisors**orders, values)
+        products = np.where(self._poled[:, None, None], values * divisors**orders, values)
         # At a pole a quotient has no value: its numerator is interpolated from the other nodes.
         _fill(products, ~np.isfinite(products) & self._poled[:, None, None])
         regular = np.clip(np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape), 1e-6, 1.0)
@@ -141,11 +140,10 @@ class Series:
             lost = ~np.isfinite(table) | (noise > NOISE)
             _fill(table, lost)
             left = np.where(lost, 0.0, noise).max(axis=2)
-            with np.errstate(invalid="ignore"):
-                size = np.maximum(np.abs(table).max(axis=2), self._sizes[self._poled, None])
-                some = _remainder(table, np.count_nonzero(lost, axis=2)) <= left * size
-                # Far from singular poses a value has all its digits, whatever the largest is.
-                rounded = np.where(some & (left > DIGITS), left * size, 0.0)
+            size = np.maximum(np.abs(table).max(axis=2), self._sizes[self._poled, None])
+            some = _remainder(table, np.count_nonzero(lost, axis=2)) <= left * size
+            # Far from singular poses a value has all its digits, whatever the largest is.
+            rounded = np.where(some & (left > DIGITS), left * size, 0.0)
             own[self._poled], rounding = some, np.zeros(own.shape)
             rounding[self._poled] = rounded
             largest(self._noise, pieces.line, rounding)
@@ -188,13 +186,12 @@ class Series:
                 rounding = np.minimum(*np.split(rest, 2, axis=1)) > before / 4
                 part = np.where(pending.depth >= DEEP, ROUNDING_DEEP, ROUNDING)
                 rough &= ~(np.tile(rounding, 2) & (rest <= part * scale))
-            with np.errstate(invalid="ignore"):
-                steps = np.abs(np.diff(finite_values, axis=2))
-                steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
-                above = [
-                    is_sought[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
-                    for end, top, is_sought in zip(ends, best, self._extremes, strict=True)
-                ]
+            steps = np.abs(np.diff(finite_values, axis=2))
+            steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
+            above = [
+                is_sought[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
+                for end, top, is_sought in zip(ends, best, self._extremes, strict=True)
+            ]
             mean = np.zeros_like(rough)
             if self._means.any():
                 left = chebyshev.remainder(chebyshev.series(values[self._means] * pending.stretch))
@@ -232,8 +229,7 @@ class Series:
     def _nearly_zero(self, pieces: CurvePieces, values: Floats, divisors: Floats) -> tuple[Ints, Floats]:
         """CurvePieces, and places in them, at which magnitudes are smallest and nearly zero, or may be so."""
         rows = self._magnitudes
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            squares = (values[rows] / divisors[rows] ** self._orders[rows, None, None]) ** 2
+        squares = (values[rows] / divisors[rows] ** self._orders[rows, None, None]) ** 2
         squares[~np.isfinite(squares)] = np.nan
         sizes = np.zeros((len(squares), self.curve.lines))
         largest(sizes, pieces.line, np.nan_to_num(squares).max(axis=2, initial=0.0))
@@ -243,8 +239,7 @@ class Series:
         most, least = (f(np.nan_to_num(squares), axis=2) for f in (np.max, np.min))
         # Where a magnitude does not change along a piece, such as zero in a dwell, its least value is rounding's.
         flat = most - least <= NOISE * np.maximum(most, NOISE * sizes[:, pieces.line])
-        with np.errstate(invalid="ignore"):
-            magnitude, piece = np.nonzero((squares.min(axis=2, initial=np.inf) < small) & ~flat)
+        magnitude, piece = np.nonzero((squares.min(axis=2, initial=np.inf) < small) & ~flat)
         series = chebyshev.series(squares[magnitude, piece])
         # A value loses digits by the size of the largest, its square in proportion to both.
         size = np.sqrt(sizes[magnitude, pieces.line[piece]] * np.abs(series).max(axis=1, initial=0.0))

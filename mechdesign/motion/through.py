@@ -35,8 +35,7 @@ class Through:
         line, place = zeros.line[order], zeros.place[order]
         behind, before = (curve.inputs(line, place + side * apart)[1][0] for side in (1.0, -1.0))
         size = 1.0 if curve.plan.structure.given[0].quantity == "angle" else curve.mechanism.size
-        with np.errstate(divide="ignore"):
-            step = STEP * size * 2 * apart / np.abs(behind - before)
+        step = STEP * size * 2 * apart / np.abs(behind - before)
         # Where the motion rests at a change point no pose lies beside it.
         some = (step < curve.poses.end) & np.append(True, (np.diff(line) > 0) | (np.diff(place) > apart))[: len(line)]
         line, place, step = line[some], place[some], step[some]

@@ -89,8 +89,7 @@ class AnyMode(Field):
 
     def configuration(self, z: Complexes, places: Places, modes: Sequence[Value] | None = None) -> Configuration:
         """As `Field.configuration`, each place in the first mode that reaches it, or that comes nearest to."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            least = np.stack([mode.margins(z, places).min(axis=0, initial=np.inf) for mode in self.modes])
+        least = np.stack([mode.margins(z, places).min(axis=0, initial=np.inf) for mode in self.modes])
         least = np.where(np.isnan(least), -np.inf, least)
         first = np.where((least > 0).any(axis=0), (least > 0).argmax(axis=0), least.argmax(axis=0))
         return self._in_modes(z, places, first)

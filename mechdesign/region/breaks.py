@@ -272,8 +272,7 @@ def _solve(
 
     every = np.arange(len(pair))
     at_begin, at_end = residual_at(every, begin), residual_at(every, end)
-    with np.errstate(invalid="ignore"):
-        on_begin, on_end = np.abs(at_begin) <= ZERO * np.abs(at_end), np.abs(at_end) <= ZERO * np.abs(at_begin)
+    on_begin, on_end = np.abs(at_begin) <= ZERO * np.abs(at_end), np.abs(at_end) <= ZERO * np.abs(at_begin)
     at_begin, at_end = np.where(on_begin, 0.0, at_begin), np.where(on_end, 0.0, at_end)
     use = np.flatnonzero(((at_begin > 0) != (at_end > 0)) | on_begin | on_end)
     unknown = np.full(len(use), np.nan)
@@ -302,9 +301,8 @@ def _residual(
         margins = designs.field.margins(designs.about + (radius + x) * turn, places, assembly=assembly)
         value, other_value = margins[curve, :, lane].T, margins[other, :, lane].T
         a, b, c = parabola(x, value)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            extreme = np.where(c * side < 0, -0.5 * b / c, np.nan)
-            root = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+        extreme = np.where(c * side < 0, -0.5 * b / c, np.nan)
+        root = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
         step = np.where(touching, extreme, np.where(central, 0.0, root))
         if zero_step == TO_ZERO[-1]:
             # Each meeting settles on its own, so that its root does not depend on the others.
@@ -313,16 +311,14 @@ def _residual(
                 break
         step = np.where(settled, 0.0, step)
         radius = radius + np.clip(step, -FARTHEST * reach, FARTHEST * reach)
-    with np.errstate(invalid="ignore"):
-        zero_too = parabola(np.sqrt(value), other_value)[0]
+    zero_too = parabola(np.sqrt(value), other_value)[0]
     residual: Floats = np.where(touching, side * (a + 0.5 * b * extreme), np.where(central, b * reach, zero_too))
     return residual
 
 
 def parabola(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Coefficients of a + b x + c x^2 through three points (first axis)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        first_slope, second_slope = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
-        c = (second_slope - first_slope) / (x[2] - x[0])
-        b = first_slope - c * (x[0] + x[1])
-        return y[0] - x[0] * (b + c * x[0]), b, c
+    first_slope, second_slope = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
+    c = (second_slope - first_slope) / (x[2] - x[0])
+    b = first_slope - c * (x[0] + x[1])
+    return y[0] - x[0] * (b + c * x[0]), b, c

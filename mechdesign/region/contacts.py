@@ -108,8 +108,7 @@ class Contacts:
             around_values = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
             (dx, dy), good, _ = lowest_near(around_values[margin, :, margin, lanes].transpose(2, 0, 1))
             way = dx + 1j * dy
-            with np.errstate(invalid="ignore"):
-                good &= np.abs(way) < FARTHEST
+            good &= np.abs(way) < FARTHEST
             part = part + step * np.where(good, way, 0.0)
         way = shape.width * part.real + 1j * shape.height * part.imag
         there = margins(part)[margin, margin, lanes] < -rounding
@@ -198,8 +197,7 @@ def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
     Both are of shape (3, contacts, lanes); the scales are infinite where there are fewer.
     """
     # A side that touches a straight boundary all along is one contact.
-    with np.errstate(invalid="ignore"):
-        even = np.round(scales / scales.min(axis=0), EVEN)
+    even = np.round(scales / scales.min(axis=0), EVEN)
     after = np.roll(even, -1, axis=0)
     rises = even < after
     # A circle that touches a circular boundary all around has one contact, too.
@@ -219,8 +217,7 @@ def within_scan(designs: Designs, z: Complexes, theta: Floats) -> tuple[Floats, 
     way, step = np.broadcast_arrays(z - designs.about, np.exp(1j * theta))
     height = np.stack([(way * first).imag, -(way * last).imag])
     slope = np.stack([(step * first).imag, -(step * last).imag])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = -height / slope
+    crossing = -height / slope
     within = height >= 0
     begin = np.where(within, 0.0, np.where(slope > 0, crossing, np.inf))
     end = np.where(within & (slope < 0), crossing, np.inf)

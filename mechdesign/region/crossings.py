@@ -147,14 +147,13 @@ def _plain(values: Floats, rotations: Complexes, noise: Floats, legs: Flags) -> 
     """Lanes of even samples, shape (rows, samples, lanes), along which margins are too large for their bends to reach
     zero and links turn little.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        second = np.diff(values, 2, axis=1)
-        ends = np.abs(2 * second[:, [0, -1]] - second[:, [1, -2]])
-        bend = SAFETY * np.maximum(np.abs(second).max(axis=1), ends.max(axis=1))
-        far = 8 * values.min(axis=1) > bend
-        far[legs] = 4 * np.maximum(values[legs, 1:], values[legs, :-1]).min(axis=1) > bend[legs]
-        far[legs] |= values[legs].max(axis=1) <= noise[legs, None]
-        near = np.asarray(norm2(np.diff(rotations, axis=1)) <= FARTHEST_TURN**2)
+    second = np.diff(values, 2, axis=1)
+    ends = np.abs(2 * second[:, [0, -1]] - second[:, [1, -2]])
+    bend = SAFETY * np.maximum(np.abs(second).max(axis=1), ends.max(axis=1))
+    far = 8 * values.min(axis=1) > bend
+    far[legs] = 4 * np.maximum(values[legs, 1:], values[legs, :-1]).min(axis=1) > bend[legs]
+    far[legs] |= values[legs].max(axis=1) <= noise[legs, None]
+    near = np.asarray(norm2(np.diff(rotations, axis=1)) <= FARTHEST_TURN**2)
     return np.asarray(far.all(axis=0) & near.all(axis=(0, 1)))
 
 
@@ -173,45 +172,44 @@ def _open(
         return np.flatnonzero(same), np.zeros((len(DIVIDED), 0))
     width = np.where(same, np.diff(place), 1.0)
     positive, size = values > 0, np.abs(values)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        change = np.diff(values)
-        second = np.zeros(values.shape)
-        second[:, 1:-1] = np.diff(change / width) / (0.5 * (width[1:] + width[:-1]))
-        # At the ends of lanes second differences go on as they do beside them, and away from zero.
-        for at, step in ((np.flatnonzero(np.append(True, ~same)), 1), (np.flatnonzero(np.append(~same, True)), -1)):
-            one, two = at + step, at + 2 * step
-            share = (place[one] - place[at]) / (place[two] - place[one])
-            more = share * np.abs(second[:, one] - second[:, two])
-            second[:, at] = second[:, one] + np.copysign(more, second[:, one])
-        bend = np.abs(second)
-        bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
-        # A margin that touches zero changes no sign.
-        doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
-        doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
-        most = np.maximum(size[legs, 1:], size[legs, :-1])
-        doubtful[legs] = same & (4 * most <= bend[legs]) & (most > noise[legs, None])
-        row, cell = np.nonzero(doubtful)
-        sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, noise, safety)
-        doubtful[row[sure], cell[sure]] = False
-        # An angle outside its limits at both samples is within them on the way from one side to the other.
-        between = same & passed(away[:, :-1], away[:, 1:]) & ~(positive[:, 1:] | positive[:, :-1])
-        doubtful |= between
-        # A leg that closes at one of two samples, by rounding, hides what lies between them.
-        closes = ~np.isnan(values)
-        doubtful |= same & legs.any() & (closes[:, 1:] != closes[:, :-1])
-        turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
-        outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
-        undecided = np.flatnonzero((doubtful.any(axis=0) & ~outside) | (turned & same))
-        parts = np.tile(DIVIDED[:, None], len(undecided))
-        row, which = np.nonzero((doubtful & (positive[:, 1:] == positive[:, :-1]))[:, undecided])
-        cell = undecided[which]
-        curved = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
-        vertex = 0.5 - change[row, cell] / curved
-        middle = away[row, cell] / (away[row, cell] - away[row, cell + 1])
-        vertex = np.nan_to_num(np.where(between[row, cell], middle, vertex), nan=0.5)
-        vertex = np.clip(vertex, 2 * BESIDE, 1 - 2 * BESIDE)
-        middle = np.where(vertex < 0.5, 1 + vertex, vertex) / 2
-        parts[:, which] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
+    change = np.diff(values)
+    second = np.zeros(values.shape)
+    second[:, 1:-1] = np.diff(change / width) / (0.5 * (width[1:] + width[:-1]))
+    # At the ends of lanes second differences go on as they do beside them, and away from zero.
+    for at, step in ((np.flatnonzero(np.append(True, ~same)), 1), (np.flatnonzero(np.append(~same, True)), -1)):
+        one, two = at + step, at + 2 * step
+        share = (place[one] - place[at]) / (place[two] - place[one])
+        more = share * np.abs(second[:, one] - second[:, two])
+        second[:, at] = second[:, one] + np.copysign(more, second[:, one])
+    bend = np.abs(second)
+    bend = np.fmax(bend[:, 1:], bend[:, :-1]) * (safety * width**2)
+    # A margin that touches zero changes no sign.
+    doubtful = same & (bend > np.maximum(2 * np.abs(change), safety * noise[:, None]))
+    doubtful &= (8 * np.minimum(size[:, 1:], size[:, :-1]) <= bend) | (positive[:, 1:] != positive[:, :-1])
+    most = np.maximum(size[legs, 1:], size[legs, :-1])
+    doubtful[legs] = same & (4 * most <= bend[legs]) & (most > noise[legs, None])
+    row, cell = np.nonzero(doubtful)
+    sure = ~legs[row] & ~_curved(row, cell, lane, place, values, second, noise, safety)
+    doubtful[row[sure], cell[sure]] = False
+    # An angle outside its limits at both samples is within them on the way from one side to the other.
+    between = same & passed(away[:, :-1], away[:, 1:]) & ~(positive[:, 1:] | positive[:, :-1])
+    doubtful |= between
+    # A leg that closes at one of two samples, by rounding, hides what lies between them.
+    closes = ~np.isnan(values)
+    doubtful |= same & legs.any() & (closes[:, 1:] != closes[:, :-1])
+    turned = np.asarray(norm2(np.diff(rotations)) > FARTHEST_TURN**2).any(axis=0)
+    outside = ~(positive[:, 1:] | positive[:, :-1] | doubtful).all(axis=0)
+    undecided = np.flatnonzero((doubtful.any(axis=0) & ~outside) | (turned & same))
+    parts = np.tile(DIVIDED[:, None], len(undecided))
+    row, which = np.nonzero((doubtful & (positive[:, 1:] == positive[:, :-1]))[:, undecided])
+    cell = undecided[which]
+    curved = 0.5 * (second[row, cell] + second[row, cell + 1]) * width[cell] ** 2
+    vertex = 0.5 - change[row, cell] / curved
+    middle = away[row, cell] / (away[row, cell] - away[row, cell + 1])
+    vertex = np.nan_to_num(np.where(between[row, cell], middle, vertex), nan=0.5)
+    vertex = np.clip(vertex, 2 * BESIDE, 1 - 2 * BESIDE)
+    middle = np.where(vertex < 0.5, 1 + vertex, vertex) / 2
+    parts[:, which] = np.sort([vertex - BESIDE, vertex + BESIDE, middle], axis=0)
     return undecided, parts
 
 

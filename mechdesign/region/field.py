@@ -175,19 +175,18 @@ class Field:
 
     def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
         """Margins at points `z`, as `margins`, and the configuration to which they belong."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            if self.plan.iterative:
-                configuration, fold_distance = self._poses(z, places, beyond=True)
-            else:
-                configuration = self.configuration(z, places)
-            margins = [*configuration.closures]
-            margins += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
-            margins += [margin for _, margin in self.mechanism.margins(configuration, smooth=True)]
-            if self.plan.iterative:
-                margins.append(fold_distance)
-            if self.same_assembly and assembly:
-                signs = self._signs
-                margins += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
+        if self.plan.iterative:
+            configuration, fold_distance = self._poses(z, places, beyond=True)
+        else:
+            configuration = self.configuration(z, places)
+        margins = [*configuration.closures]
+        margins += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
+        margins += [margin for _, margin in self.mechanism.margins(configuration, smooth=True)]
+        if self.plan.iterative:
+            margins.append(fold_distance)
+        if self.same_assembly and assembly:
+            signs = self._signs
+            margins += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
         if self.plan.iterative:
             # Where continuation reaches no pose, the fold distance alone is nan: the other margins do not end there.
             unreached = np.isnan(fold_distance)
@@ -252,8 +251,7 @@ class Field:
         margins = self.margins(self.surroundings, {}, assembly=False)
         closures = [kind != LIMIT for kind, _ in self.labels[: len(margins)]]
         z = self.surroundings[(margins[closures] > 0).all(axis=0)]
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            regular = np.asarray(regularity(self.mechanism.linearize(self.configuration(z, {}))))
+        regular = np.asarray(regularity(self.mechanism.linearize(self.configuration(z, {}))))
         return len(z) > 0 and bool((regular <= REGULAR).all())
 
     @cached_property

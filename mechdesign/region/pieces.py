@@ -160,8 +160,7 @@ class Pieces:
         label = self.of_intervals(design, theta.ravel(), traced)
         sector = 0.5 * weight[traced.ray] * (traced.outer - traced.inner) * (traced.outer + traced.inner)
         area = np.bincount(label[label >= 0], sector[label >= 0], parts)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = area / np.bincount(owner, area, designs)[owner]
+        share = area / np.bincount(owner, area, designs)[owner]
         sketched = self._holding(several)
         share[sketched[sketched >= 0]] = np.inf
         slit = share < SLIT

@@ -156,10 +156,9 @@ class Raster:
             around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
             values = mode.field.margins(around, places)[margin, :, every].T
             (dx, dy), low, fall = lowest_near(values)
-            with np.errstate(invalid="ignore"):
-                converges &= low & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
-                # Twice the depth of the parabola, which only approximates the margin.
-                converges &= values[0] + fall < 0
+            converges &= low & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
+            # Twice the depth of the parabola, which only approximates the margin.
+            converges &= values[0] + fall < 0
             place = place + np.where(converges, x * dx, 0.0) + 1j * np.where(converges, y * dy, 0.0)
         return designs[lane[converges]], place[converges]
 
@@ -288,11 +287,10 @@ def _most(margin: Floats, away: Floats, row: Ints, column: Ints, lane: Ints) -> 
     The margin of an angle is positive on the way from one side of its limits to the other.
     """
     value, change = margin[row, column, lane], np.zeros(len(row))
-    with np.errstate(invalid="ignore"):
-        for place in _beside(margin, row, column):
-            change = np.fmax(change, np.abs(margin[*place, lane] - value))
-            change[passed(away[row, column, lane], away[*place, lane])] = np.inf
-        return value + np.minimum(change, np.finfo(float).max)
+    for place in _beside(margin, row, column):
+        change = np.fmax(change, np.abs(margin[*place, lane] - value))
+        change[passed(away[row, column, lane], away[*place, lane])] = np.inf
+    return value + np.minimum(change, np.finfo(float).max)
 
 
 def _beside(margin: Floats, row: Ints, column: Ints) -> list[tuple[Ints, Ints]]:
@@ -341,8 +339,7 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
             steps.append((edge.tail, edge.head, -size, size))
         else:
             along, turn = (np.stack([v.real, v.imag]).reshape(2, -1) for v in (w, d))
-            with np.errstate(invalid="ignore"):
-                ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
+            ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
             steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))
     for bound in mechanism.bounds:
         if bound.coordinate.kind == "distance" and bound.limit.max is not None:

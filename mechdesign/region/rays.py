@@ -181,8 +181,7 @@ class Designs:
         lane, closed = intervals.ray[narrow], np.zeros(len(width), dtype=bool)
         z = centre[lane] + intervals.inner[narrow] * direction[lane]
         there = self.field.margins(z, {name: picked(value, lane) for name, value in places.items()}, assembly=False)
-        with np.errstate(invalid="ignore"):
-            closed[narrow] = (there < -np.sqrt(slack) * np.abs(values).max(axis=1)[:, lane]).any(axis=0)
+        closed[narrow] = (there < -np.sqrt(slack) * np.abs(values).max(axis=1)[:, lane]).any(axis=0)
         return intervals.kept(~closed)
 
     def _cut(
@@ -265,21 +264,19 @@ def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
     """
     at_0, at_1, at_2, at_3, at_4 = (values[:, k] for k in range(5))
     a, b, c = at_0, 4 * at_2 - 3 * at_0 - at_4, 2 * (at_0 + at_4) - 4 * at_2
-    with np.errstate(invalid="ignore"):
-        allowed = QUADRATIC * np.abs(values).max(axis=1)
-        fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
-        fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
+    allowed = QUADRATIC * np.abs(values).max(axis=1)
+    fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
+    fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
     return fits, (a, b, c)
 
 
 def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
     """Margin, ray, direction (1 rising) and x of all roots in (0, 1); and how many margins of a ray begin negative."""
     roots = np.empty((2, *a.shape))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
-        np.divide(half, c, out=roots[0])
-        np.divide(a, half, out=roots[1])
-        margin_of = (roots > SAME_ROOT) & (roots < 1)
+    half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+    np.divide(half, c, out=roots[0])
+    np.divide(a, half, out=roots[1])
+    margin_of = (roots > SAME_ROOT) & (roots < 1)
     which, margin, ray = np.nonzero(margin_of)
     # The slope at the first of the two roots has the sign of -b, at the other that of b, even where they coincide.
     rising = np.signbit(b[margin, ray]) == (which == 0)

@@ -56,8 +56,7 @@ class Rule:
         """
         size = np.abs((self.spectrum @ values)[-(len(self.nodes) // self.window) * self.window :])
         groups = size.reshape(-1, self.window, values.shape[1]).max(axis=1)[-4:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            decay = np.minimum((groups[1:] / groups[:-1]).max(axis=0), 1.0)
+        decay = np.minimum((groups[1:] / groups[:-1]).max(axis=0), 1.0)
         decay = np.where(np.isfinite(decay), decay, 1.0)
         return self.weights @ values, self.safety * groups[-1] * decay**self.power
 

@@ -69,8 +69,7 @@ class Shape:
         """Distance of the outline from the centre."""
         if self.round:
             return np.broadcast_to(np.asarray(self.width) / 2, np.broadcast_shapes(theta.shape, np.shape(self.width)))
-        with np.errstate(divide="ignore"):
-            return 0.5 * np.minimum(self.width / np.abs(np.cos(theta)), self.height / np.abs(np.sin(theta)))
+        return 0.5 * np.minimum(self.width / np.abs(np.cos(theta)), self.height / np.abs(np.sin(theta)))
 
     def scale_at(self, way: Complexes) -> Floats:
         """Scale at which the outline passes through a place, seen from the centre."""

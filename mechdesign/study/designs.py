@@ -142,12 +142,11 @@ class Designs:
             for k in np.flatnonzero(np.broadcast_to(wrong, self.count) & (reasons == "")).tolist():
                 reasons[k] = message if isinstance(message, str) else message(k)
 
-        with np.errstate(all="ignore"):
-            self._judge_geometry(note)
-            for command in COMMANDS:
-                section = self.study.sections.get(command)
-                if isinstance(section, Model):
-                    self._judge(section, command, note)
+        self._judge_geometry(note)
+        for command in COMMANDS:
+            section = self.study.sections.get(command)
+            if isinstance(section, Model):
+                self._judge(section, command, note)
         return reasons
 
     def _by_design(self, value: Number) -> Floats:

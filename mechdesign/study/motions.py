@@ -80,8 +80,7 @@ class Motions(dict[str, Poses]):
         counts = []
         for sweep in (getattr(section, "sweep", None) or {}).values():
             if sweep.step is not None:
-                with np.errstate(all="ignore"):
-                    span = (numbers.of(sweep.to) - numbers.of(sweep.from_)) / numbers.of(sweep.step)
+                span = (numbers.of(sweep.to) - numbers.of(sweep.from_)) / numbers.of(sweep.step)
                 count = np.where((span >= -1e-9) & (span < MAX_POSES), np.floor(span + 1e-9), -1.0)
                 counts.append(count.astype(np.intp))
         return np.stack(counts, axis=1) if counts else np.zeros((numbers.count, 0), dtype=np.intp)
@@ -100,8 +99,7 @@ def _axis(sweep: SweepText, numbers: DesignNumbers) -> EvenValues:
         return EvenValues.from_to(begin, end, sweep.number)
     assert sweep.step is not None
     step = numbers.of(sweep.step)
-    with np.errstate(all="ignore"):
-        steps = (end - begin) / step + 1e-9
+    steps = (end - begin) / step + 1e-9
     if not (steps < MAX_POSES).all():
         raise StudyError(f"a sweep of more than {MAX_POSES} poses; take a larger step")
     if not (steps >= 0).all():

@@ -31,6 +31,7 @@ def truths(robot: Robot, assembly: str) -> Iterator[tuple[np.ndarray, np.ndarray
         before = integrals
 
 
+@np.errstate(all="ignore")
 def asked(text: str, effort: str, names: tuple[str, ...], *changes: str) -> np.ndarray:
     """Numbers of a region and the errors that are told of them, shape (2, numbers)."""
     closeness, tolerance = EFFORTS[effort]

@@ -281,16 +281,14 @@ def compare_tables(old: Table, new: Table, tolerance: Allowance, folder: str = "
         beyond = np.flatnonzero(size > atol + tolerance.rtol * scale)
         if beyond.size:
             row = beyond[np.argmax(size[beyond])]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                relative = float(size[row] / (scale[row] if np.isfinite(x[row]) else 1))
+            relative = float(size[row] / (scale[row] if np.isfinite(x[row]) else 1))
             yield differs(name, "moved", beyond.size, float(size[row]), relative, f"{x[row]:.12g}", f"{y[row]:.12g}",
                           _words(old, keys, first[row]), before.unit)  # fmt: skip
 
 
 def _distance(old: Floats, new: Floats) -> Floats:
     """Absolute differences: 0 where both are nan or the same infinity, inf where only one of them is."""
-    with np.errstate(invalid="ignore"):
-        size = np.abs(new - old)
+    size = np.abs(new - old)
     same: Flags = (old == new) | (np.isnan(old) & np.isnan(new))
     return np.where(same, 0.0, np.where(np.isfinite(size), size, np.inf))
 

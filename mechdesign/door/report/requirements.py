@@ -185,6 +185,7 @@ def foresee(
 
 
 @few_comparisons()
+@np.errstate(all="ignore")
 def requirements(study: Study, result: Result, *, fewer: Collection[str] = ()) -> tuple[Verdict, ...]:
     """Verdicts on those requirements of a study that concern a result, in the order of the study; then on its warnings.
 

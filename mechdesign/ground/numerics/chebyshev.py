@@ -57,8 +57,7 @@ _DERIVATIVE = _slope_basis(NODES).T @ _TO_SERIES
 
 def series(values: Floats) -> Floats:
     """Coefficients of the polynomials through values at the nodes, shape (..., COUNT); nan through infinite ones."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(values @ _TO_SERIES)
+    return np.asarray(values @ _TO_SERIES)
 
 
 def remainder(coefficients: Floats) -> Floats:
@@ -67,8 +66,7 @@ def remainder(coefficients: Floats) -> Floats:
     Coefficients are compared in pairs, as every other one of an even or odd function is zero.
     """
     before, last = (np.abs(coefficients[..., pair]).max(axis=-1) for pair in (slice(-4, -2), slice(-2, None)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(last < before, last * (last / before), last))
+    return np.asarray(np.where(last < before, last * (last / before), last))
 
 
 def at_places(coefficients: Floats) -> Floats:
@@ -169,18 +167,17 @@ def root(
     `function` gives all values and slopes at places of shape (n,).
     """
     low, high = low.copy(), high.copy()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = low - at_low * (high - low) / (at_high - at_low)
-        x = np.where((x >= low) & (x <= high), x, (low + high) / 2)
-        for _ in range(_STEPS):
-            values, slopes = function(x)
-            on_low_side = (values >= 0) == (at_low >= 0)
-            low, high = np.where(on_low_side, x, low), np.where(on_low_side, high, x)
-            step = x - values / slopes
-            step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-            change, x = np.abs(step - x), step
-            if not (change > _LAST_STEP).any():
-                break
+    x = low - at_low * (high - low) / (at_high - at_low)
+    x = np.where((x >= low) & (x <= high), x, (low + high) / 2)
+    for _ in range(_STEPS):
+        values, slopes = function(x)
+        on_low_side = (values >= 0) == (at_low >= 0)
+        low, high = np.where(on_low_side, x, low), np.where(on_low_side, high, x)
+        step = x - values / slopes
+        step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
+        change, x = np.abs(step - x), step
+        if not (change > _LAST_STEP).any():
+            break
     return x
 
 

@@ -87,6 +87,5 @@ def _times(matrices: Floats, vectors: Floats) -> Floats:
 
 def _longest(values: Floats, changes: Floats) -> Floats:
     """The largest fraction, at most 1, of `changes` that leaves values positive; shape (lanes, 1)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.where(changes < 0, -values / changes, np.inf)
+    parts = np.where(changes < 0, -values / changes, np.inf)
     return np.asarray(np.minimum(parts.min(axis=1, keepdims=True), 1.0))

@@ -56,33 +56,31 @@ def bracketed_roots(
             break
         al, bl, cl, fal, fbl, fcl = a[active], b[active], c[active], fa[active], fb[active], fc[active]
         width = bl - al
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            slope = (fbl - fal) / width
-            bend = ((fcl - fal) / (cl - al) - slope) / (cl - bl)
-            bend = np.where(np.isfinite(bend), bend, 0.0)
-            # Parabola about a: fal + linear x + bend x^2, solved without cancellation.
-            linear = slope - bend * width
-            square = np.sqrt(np.maximum(linear * linear - 4 * bend * fal, 0.0))
-            half = -0.5 * (linear + np.copysign(square, linear))
-            first_root, second_root = fal / half, half / bend
-            x = al + np.where((first_root / width >= 0) & (first_root / width <= 1), first_root, second_root)
-            # Where the function is nan at one end: the secant through the other two points, and not quite to its zero,
-            # so that the root is approached from the side where the function has values.
-            finite_end, f_finite = np.where(np.isnan(fal), bl, al), np.where(np.isnan(fal), fbl, fal)
-            secant = (fcl - f_finite) / (cl - finite_end)
-            ended = (np.isnan(fal) | np.isnan(fbl)) & np.isfinite(secant)
-            to_zero = f_finite / secant
-            short = np.clip(SHORT[1] * np.abs(to_zero / (cl - finite_end)), *SHORT)
-            x = np.where(ended, finite_end - (1 - short) * to_zero, x)
-            square = np.where(ended, np.abs(secant), square)
+        slope = (fbl - fal) / width
+        bend = ((fcl - fal) / (cl - al) - slope) / (cl - bl)
+        bend = np.where(np.isfinite(bend), bend, 0.0)
+        # Parabola about a: fal + linear x + bend x^2, solved without cancellation.
+        linear = slope - bend * width
+        square = np.sqrt(np.maximum(linear * linear - 4 * bend * fal, 0.0))
+        half = -0.5 * (linear + np.copysign(square, linear))
+        first_root, second_root = fal / half, half / bend
+        x = al + np.where((first_root / width >= 0) & (first_root / width <= 1), first_root, second_root)
+        # Where the function is nan at one end: the secant through the other two points, and not quite to its zero,
+        # so that the root is approached from the side where the function has values.
+        finite_end, f_finite = np.where(np.isnan(fal), bl, al), np.where(np.isnan(fal), fbl, fal)
+        secant = (fcl - f_finite) / (cl - finite_end)
+        ended = (np.isnan(fal) | np.isnan(fbl)) & np.isfinite(secant)
+        to_zero = f_finite / secant
+        short = np.clip(SHORT[1] * np.abs(to_zero / (cl - finite_end)), *SHORT)
+        x = np.where(ended, finite_end - (1 - short) * to_zero, x)
+        square = np.where(ended, np.abs(secant), square)
         halve = ~((x - al) * (x - bl) <= 0) | (ended & ((x == al) | (x == bl)))
         if step % 3 == 2:
             halve |= np.abs(width) > 0.5 * before[active]
             before[active] = np.abs(width)
         x = np.where(halve, al + 0.5 * width, x)
         fx = evaluate(active, x)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            near = np.abs(fx) <= tolerance[active] * np.where(halve, np.abs(slope), square)
+        near = np.abs(fx) <= tolerance[active] * np.where(halve, np.abs(slope), square)
         root[active] = x
         lower = (fx > 0) == (fal > 0)
         defined = ~np.isnan(fx)
@@ -114,10 +112,9 @@ def dips(
     for _ in range(steps):
         (a, b, c), (fa, fb, fc) = x[:, active], values[:, active]
         fall, rise, vertex = parabola(x[:, active], values[:, active])
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            # A convex function stays above both lines from an end of the bracket through the middle place.
-            too_high = fb - enough[active] > STEEP * np.maximum(fall * (c - b), rise * (b - a))
-            too_high &= np.isfinite(enough[active])
+        # A convex function stays above both lines from an end of the bracket through the middle place.
+        too_high = fb - enough[active] > STEEP * np.maximum(fall * (c - b), rise * (b - a))
+        too_high &= np.isfinite(enough[active])
         converged = np.abs(vertex - b) <= LOWEST_ACCURACY * np.maximum(np.abs(c), c - a)
         keep = ~(too_high | converged | (fb < enough[active]))
         active, a, b, c, fa, fb, fc, vertex = (v[keep] for v in (active, a, b, c, fa, fb, fc, vertex))
@@ -142,9 +139,8 @@ def parabola(x: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
     The slopes are those from the middle point up to the points on either side. The vertex is not finite for a line.
     """
     (a, b, c), (fa, fb, fc) = x, values
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
-        return fall, rise, b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)
+    fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
+    return fall, rise, b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)
 
 
 def lowest_near(values: Floats) -> tuple[Floats, Flags, Floats]:
@@ -160,9 +156,8 @@ def lowest_near(values: Floats) -> tuple[Floats, Flags, Floats]:
         The way in x and in y, shape (2, ...); whether the parabola is lowest there; twice its change as far as there.
     """
     here, right, left, up, down, across = values
-    with np.errstate(invalid="ignore", divide="ignore"):
-        gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-        xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
-        det = xx * yy - xy * xy
-        dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
-        return np.array([dx, dy]), np.asarray((xx > 0) & (det > 0)), gx * dx + gy * dy
+    gx, gy = 0.5 * (right - left), 0.5 * (up - down)
+    xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
+    det = xx * yy - xy * xy
+    dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
+    return np.array([dx, dy]), np.asarray((xx > 0) & (det > 0)), gx * dx + gy * dy

@@ -12,19 +12,16 @@ STILL = 1e-12
 
 def cleared(values: Floats, still: Floats | float) -> Floats:
     """Values, and 0 for those up to `still`, which is `STILL` of a size; the shapes broadcast."""
-    with np.errstate(invalid="ignore"):
-        return np.where(np.abs(values) <= still, 0.0, values)
+    return np.where(np.abs(values) <= still, 0.0, values)
 
 
 def unchanging(low: Floats | float, high: Floats | float, size: Floats | float = 0.0) -> Flags:
     """Whether values between these ends are the same up to `STILL` of theirs, or of a size: they have no extreme."""
-    with np.errstate(invalid="ignore"):
-        still = STILL * np.maximum(np.maximum(np.abs(low), np.abs(high)), size)
-        return np.asarray(np.isfinite(still) & (high - low <= still))
+    still = STILL * np.maximum(np.maximum(np.abs(low), np.abs(high)), size)
+    return np.asarray(np.isfinite(still) & (high - low <= still))
 
 
 def larger(low: Floats, high: Floats, low_at: Floats, high_at: Floats, still: Floats | float) -> Flags:
     """Whether the largest absolute value is `high` and not `low`; of equal ones the first along the motion."""
-    with np.errstate(invalid="ignore"):
-        equal = np.abs(high + low) <= still
-        return np.where(equal & np.isfinite(low_at) & np.isfinite(high_at), high_at <= low_at, high >= -low)
+    equal = np.abs(high + low) <= still
+    return np.where(equal & np.isfinite(low_at) & np.isfinite(high_at), high_at <= low_at, high >= -low)

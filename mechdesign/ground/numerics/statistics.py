@@ -50,8 +50,7 @@ def rectangle_failure(low: Floats, high: Floats, rho: Floats) -> Floats:
     h = np.stack([high[0], -low[0], high[0], -low[0]])
     k = np.stack([high[1], -low[1], -low[1], high[1]])
     sign = np.multiply.outer([1.0, 1.0, -1.0, -1.0], np.sign(rho))
-    with np.errstate(divide="ignore"):
-        reach = np.minimum(np.arctanh(np.abs(rho)), MAX_DEVIATION)
+    reach = np.minimum(np.arctanh(np.abs(rho)), MAX_DEVIATION)
     integral, panels = np.zeros(h.shape), np.ceil(reach / _PANEL)
     for count in np.unique(panels[panels > 0]).astype(int).tolist():
         lanes = panels == count

@@ -52,8 +52,7 @@ def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) ->
 
     zero, nan, every = np.zeros(len(at_low)), np.full(len(at_low), np.nan), np.arange(len(at_low))
     t = bracketed_roots(evaluate, zero, at_low, zero + 1, at_high, nan, nan, zero + ACCURACY)
-    with np.errstate(invalid="ignore"):
-        root = np.abs(evaluate(every, t)) <= JUMP * np.fmax(np.abs(at_low), np.abs(at_high))
+    root = np.abs(evaluate(every, t)) <= JUMP * np.fmax(np.abs(at_low), np.abs(at_high))
     place = np.where(root | (low == high).all(axis=0), low + t * (high - low), np.nan)
     curves = []
     for curve in np.split(place, np.cumsum([len(line) for line in lines])[:-1], axis=1):

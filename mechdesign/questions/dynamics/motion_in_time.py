@@ -131,17 +131,16 @@ class Integration(MotionInTime):
         progress.start(PARTS, "parts of the motion's time")
         seconds = MAX_SECONDS * max(1.0, self.count / MANY)
         self._deadlines = perf_counter() + seconds, thread_time() + seconds
-        with np.errstate(all="ignore"):
-            try:
-                for begin, end in pairwise([0.0, *self.corners.instants, self.end]):
-                    self._pass(begin, end, progress)
-                    if self.ending is not None:
-                        break
-            except SpentError:
-                words = f"{seconds:g} s of the processor are not enough, the motion got to {{time}}"
-                self.ending = EndOfRun("spent", words)
-            count = self.section.rows
-            return self.at(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
+        try:
+            for begin, end in pairwise([0.0, *self.corners.instants, self.end]):
+                self._pass(begin, end, progress)
+                if self.ending is not None:
+                    break
+        except SpentError:
+            words = f"{seconds:g} s of the processor are not enough, the motion got to {{time}}"
+            self.ending = EndOfRun("spent", words)
+        count = self.section.rows
+        return self.at(np.linspace(0.0, self.time, count) if self.time else np.zeros(1))
 
     def _pass(self, begin: float, end: float, progress: Progress) -> None:
         """Integrate from a corner in time to the next."""

@@ -68,8 +68,7 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
     if along is not None:
         peaks = along.functions.extremes([list(curves)[k] for k in followed], still[followed])
         still[followed] = peaks.still
-    with np.errstate(invalid="ignore"):
-        moving = high - low > still
+    moving = high - low > still
     # A curve that stands still has both extremes at its first pose.
     row = np.where(moving, row, counted.argmax(axis=2))
     values = np.stack([np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row])
@@ -77,14 +76,12 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
     ends = np.where(counted.any(axis=2), ends, np.nan)
     if along is not None and peaks is not None:
         line = np.broadcast_to(np.arange(poses.designs), (len(followed), poses.designs))
-        with np.errstate(invalid="ignore"):
-            moves = peaks.value[1] - peaks.value[0] > peaks.still
+        moves = peaks.value[1] - peaks.value[0] > peaks.still
         moving[followed] |= moves
         shown = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
         # A row is evidence: no extreme contradicts one that is farther out by more than rounding.
-        with np.errstate(invalid="ignore"):
-            inner = np.array([[[-1.0]], [[1.0]]]) * (ends[:, 0, followed] - peaks.value)
-            kept = inner > AT_ROW * np.abs(peaks.value) + peaks.still
+        inner = np.array([[[-1.0]], [[1.0]]]) * (ends[:, 0, followed] - peaks.value)
+        kept = inner > AT_ROW * np.abs(peaks.value) + peaks.still
         better = np.isfinite(peaks.place) & moves & ~kept
         for k, new in enumerate((peaks.value, shown)):
             ends[:, k, followed] = np.where(better, new, ends[:, k, followed])
@@ -95,10 +92,9 @@ def extremes(motion: PoseValues, along: KinematicAlong | None, names: Collection
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
         timed = (np.ptp(places, axis=1) >= turn * (1 - 1e-9)) & along.whole
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
-        ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
-        span = high - low
+    part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
+    ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
+    span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
     lacking = _lacking(motion, along, [targeted.get(name, name) for name in curves])
     return replace(EXTREMES.table(EXTREMES.columns(

@@ -103,8 +103,7 @@ def _inverted(mechanism: Mechanism, linear: Linearization, coordinates: Sequence
     """
     matrix, pure = unitless(mechanism, linear, coordinates)
     lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
+    return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
 
 
 def unitless(

@@ -39,8 +39,7 @@ def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
     squares, axes = np.linalg.eigh(covariance)
     b, a = np.sqrt(np.maximum(squares, 0.0)).T
     n, m = np.einsum("pij,pi->pj", axes, mean).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steps = _STEPS * np.maximum((radius + np.hypot(n, m)) / b, _OVAL * a / b) + _STEPS
+    steps = _STEPS * np.maximum((radius + np.hypot(n, m)) / b, _OVAL * a / b) + _STEPS
     steps = np.exp2(np.ceil(np.log2(np.where((radius > 0) & (steps < _MOST_STEPS), steps, _MOST_STEPS))))
     for count in np.unique(steps[steps < _MOST_STEPS]).tolist():
         rows = steps == count
@@ -52,9 +51,8 @@ def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
         beyond = size * root - nearest
         # exp(-C/2 + B^2/(2A) - beyond^2/2) is that of the distance of the circle's point from the mean.
         apart = np.exp(-0.5 * ((size * np.cos(phi) - x) ** 2 / wide**2 + (size * np.sin(phi) - y) ** 2 / narrow**2))
-        with np.errstate(over="ignore", invalid="ignore"):
-            tail = apart * (1.0 + nearest * np.sqrt(0.5 * np.pi) * erfcx(beyond / np.sqrt(2.0)))
-            failure[rows] = (tail / root**2).sum(axis=1) / (count * (a * b)[rows])
+        tail = apart * (1.0 + nearest * np.sqrt(0.5 * np.pi) * erfcx(beyond / np.sqrt(2.0)))
+        failure[rows] = (tail / root**2).sum(axis=1) / (count * (a * b)[rows])
     # Errors nearly along a line, or with a mean far outside the circle.
     for row in np.flatnonzero(np.isnan(failure)).tolist():
         failure[row] = disc_failure(covariance[row], float(radius[row]), mean[row])
@@ -98,11 +96,10 @@ def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats
     """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
     sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
     low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (
-            np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
-            np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
-        )
+    return (
+        np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
+        np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
+    )
 
 
 def _across(radius: float, a: Any, b: Any, m: Any, n: Any) -> tuple[Floats, Floats]:
@@ -167,8 +164,7 @@ def disc_and_band_failure(covariance: Floats, disc: Limit, band: Limit, mean: Fl
         inside = _between(middle, np.sqrt(np.maximum(radius**2 - away**2, 0.0)) / size)
         if least > 0:
             inside = np.maximum(inside - _between(middle, np.sqrt(np.maximum(least**2 - away**2, 0.0)) / size), 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = np.nan_to_num((low - slope * u) / rest, nan=0.0), np.nan_to_num((high - slope * u) / rest, nan=0.0)
+        ends = np.nan_to_num((low - slope * u) / rest, nan=0.0), np.nan_to_num((high - slope * u) / rest, nan=0.0)
         density = np.exp(-0.5 * u**2) / np.sqrt(2 * np.pi)
         return np.asarray(density * inside * outside(*ends) * half * np.cos(t))
 

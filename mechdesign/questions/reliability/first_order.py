@@ -115,8 +115,7 @@ class FirstOrder:
 
     def distance(self) -> Floats:
         """Mean of each channel in standard deviations, shape (channels, poses); infinite where it is nan."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.nan_to_num(self.shift() / self.deviation(), nan=np.inf, posinf=np.inf, neginf=-np.inf)
+        return np.nan_to_num(self.shift() / self.deviation(), nan=np.inf, posinf=np.inf, neginf=-np.inf)
 
     @cached_property
     def sensitivity(self) -> Floats:
@@ -161,9 +160,8 @@ class FirstOrder:
 
 def correlation(covariance: Floats) -> Floats:
     """Correlation of two errors from their covariance, (..., 2, 2); nan if one is constant [inverse of S2, eq. 11]."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
-        return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
+    product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
+    return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
 
 
 def nominal_values(

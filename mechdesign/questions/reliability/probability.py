@@ -275,8 +275,7 @@ def _lattice(
                 if hole is not None:
                     begin, end = (ndtr((sign * hole - centre[output] - mean) / root[k, k]) for sign in (-1, 1))
                     gap = end - begin
-                with np.errstate(divide="ignore"):
-                    log_success += np.log1p(-np.minimum(a + b + gap, 1.0))
+                log_success += np.log1p(-np.minimum(a + b + gap, 1.0))
                 share = a + points[:, k] * (1.0 - a - b - gap)
                 drawn[k] = ndtri(np.clip(share + np.where(share > begin, gap, 0.0), 1e-300, 1.0 - 1e-16))
             else:

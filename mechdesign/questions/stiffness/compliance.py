@@ -136,8 +136,7 @@ def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:
 def directional(soft: Floats, direction: Value) -> Floats:
     """Stiffness to a force in a direction (radians, of all poses or of each), by the displacement along it."""
     x, y = np.cos(direction), np.sin(direction)
-    with np.errstate(divide="ignore"):
-        return np.asarray(1 / (x * x * soft[:, 0, 0] + 2 * x * y * soft[:, 0, 1] + y * y * soft[:, 1, 1]))
+    return np.asarray(1 / (x * x * soft[:, 0, 0] + 2 * x * y * soft[:, 0, 1] + y * y * soft[:, 1, 1]))
 
 
 def _inverse(matrix: Floats) -> tuple[Floats, Flags]:

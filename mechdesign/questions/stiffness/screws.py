@@ -171,9 +171,8 @@ def _single(wrench: Floats, chain: LegScrews, length: Value) -> EquivalentSpring
     turning = size * length <= RANK * np.abs(wrench[2])
     norm = np.where(turning, np.abs(wrench[2]), size)
     about_tip = wrench[2] - cross(chain.tip, force)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        foot = chain.tip - 1j * force * about_tip / size**2
-        stiffness = norm**2 / compliance
+    foot = chain.tip - 1j * force * about_tip / size**2
+    stiffness = norm**2 / compliance
     return EquivalentSpring(
         stiffness, np.where(turning, chain.tip, foot), np.where(turning, np.nan, np.mod(np.angle(force), np.pi))
     )
@@ -181,41 +180,39 @@ def _single(wrench: Floats, chain: LegScrews, length: Value) -> EquivalentSpring
 
 def _parallel_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:
     """The two springs of wrenches that are reciprocal to the slide `twist`, shape (3, n)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = vector(twist[0], twist[1])
-        along = along / np.abs(along)
-        outward = np.real((chain.tip - chain.base) * np.conj(along)) < 0
-        along = np.where(outward, -along, along)
-        across = 1j * along
-        basis = np.zeros((3, 2, len(along)))
-        basis[0, 0], basis[1, 0], basis[2, 0], basis[2, 1] = across.real, across.imag, cross(chain.tip, across), 1.0
-        compliance = constraint_compliance(basis, chain)
-        c11, c22, c12 = compliance[0, 0], compliance[1, 1], compliance[0, 1]
-        arm = np.sqrt(c11 / c22)
-        angle = np.mod(np.angle(across), np.pi)
-        # Rigid in force or in moment: a pair of parallel springs would lie at the tip or infinitely far away.
-        apart = (c11 > 0) & (c22 > 0)
-        springs = []
-        for sign in (1.0, -1.0):
-            total = 2 * (c11 + sign * arm * c12)
-            stiffness = np.where(total > 4 * RIGID * c11, 1 / total, np.inf)
-            force, moment = 1 / c11, 1 / c22
-            springs.append(
-                EquivalentSpring(
-                    np.where(apart, stiffness, force if sign > 0 else moment),
-                    np.where(apart, chain.tip + sign * arm * along, chain.tip),
-                    np.where(apart, angle, angle if sign > 0 else np.nan),
-                )
+    along = vector(twist[0], twist[1])
+    along = along / np.abs(along)
+    outward = np.real((chain.tip - chain.base) * np.conj(along)) < 0
+    along = np.where(outward, -along, along)
+    across = 1j * along
+    basis = np.zeros((3, 2, len(along)))
+    basis[0, 0], basis[1, 0], basis[2, 0], basis[2, 1] = across.real, across.imag, cross(chain.tip, across), 1.0
+    compliance = constraint_compliance(basis, chain)
+    c11, c22, c12 = compliance[0, 0], compliance[1, 1], compliance[0, 1]
+    arm = np.sqrt(c11 / c22)
+    angle = np.mod(np.angle(across), np.pi)
+    # Rigid in force or in moment: a pair of parallel springs would lie at the tip or infinitely far away.
+    apart = (c11 > 0) & (c22 > 0)
+    springs = []
+    for sign in (1.0, -1.0):
+        total = 2 * (c11 + sign * arm * c12)
+        stiffness = np.where(total > 4 * RIGID * c11, 1 / total, np.inf)
+        force, moment = 1 / c11, 1 / c22
+        springs.append(
+            EquivalentSpring(
+                np.where(apart, stiffness, force if sign > 0 else moment),
+                np.where(apart, chain.tip + sign * arm * along, chain.tip),
+                np.where(apart, angle, angle if sign > 0 else np.nan),
             )
+        )
     return springs
 
 
 def _pin_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:
     """The two springs of wrenches that are reciprocal to the hinge `twist`, shape (3, n)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        place = vector(-twist[1] / twist[2], twist[0] / twist[2])
-        basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
-        low, high, angle = principal(np.moveaxis(constraint_compliance(basis, chain), 2, 0))
+    place = vector(-twist[1] / twist[2], twist[0] / twist[2])
+    basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
+    low, high, angle = principal(np.moveaxis(constraint_compliance(basis, chain), 2, 0))
     return [EquivalentSpring(high, place, angle), EquivalentSpring(low, place, np.mod(angle + np.pi / 2, np.pi))]
 
 
@@ -226,10 +223,9 @@ def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
     """
     mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
     radius = np.hypot(half, soft[:, 0, 1])
-    with np.errstate(divide="ignore"):
-        stiffest = mean - radius
-        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
-        low = 1 / (mean + radius)
+    stiffest = mean - radius
+    high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
+    low = 1 / (mean + radius)
     angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
     return low, high, angle
 

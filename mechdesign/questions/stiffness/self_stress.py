@@ -149,8 +149,7 @@ def held_of(compliance: Floats, statics: SelfStress, length: Value, size: int) -
     outer = scale[:, :, None] * scale[:, None]
     twist = np.where(np.abs(twist) > RANK, twist, 0.0 * twist) * scale
     if size == 3:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            twist = np.where(twist[:, 2:] != 0, twist / twist[:, 2:], twist)
+        twist = np.where(twist[:, 2:] != 0, twist / twist[:, 2:], twist)
     return Held(stiffness / outer, compliance * outer, size - freedom, twist, statics.margin)
 
 

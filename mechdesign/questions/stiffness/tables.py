@@ -61,8 +61,7 @@ def stiffness_table(motion: Motion, held: Held, valid: Flags, method: str, direc
     """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
     units, labels, soft = motion.units, motion.units.labels, held.compliance
     low, high, angle = principal(soft)
-    with np.errstate(divide="ignore"):
-        direct = {f"k_{axis}": 1 / soft[:, k, k] for k, axis in enumerate(("x", "y", "phi")[: soft.shape[1]])}
+    direct = {f"k_{axis}": 1 / soft[:, k, k] for k, axis in enumerate(("x", "y", "phi")[: soft.shape[1]])}
     columns = [
         *motion.columns(),
         *STIFFNESS.columns(labels, **direct, k_min=low, k_max=high, k_angle=angle / units.angle_factor),
@@ -87,8 +86,7 @@ def eigen_table(motion: Motion, soft: Floats, length: Value) -> Table:
     finite = np.isfinite(soft).all(axis=(1, 2))
     values, vectors = np.full((len(soft), 3), np.nan), np.full((len(soft), 3, 3), np.nan)
     values[finite], vectors[finite] = np.linalg.eigh((soft * scale[:, :, None] * scale[:, None])[finite])
-    with np.errstate(divide="ignore"):
-        stiffness = np.where(values > 1e-13 * values[:, -1:], 1 / values, np.where(np.isnan(values), np.nan, np.inf))
+    stiffness = np.where(values > 1e-13 * values[:, -1:], 1 / values, np.where(np.isnan(values), np.nan, np.inf))
     # Softest first; the first entry of a twist that is not zero is positive.
     order = slice(None, None, -1)
     stiffness, twists = stiffness[:, order], vectors.swapaxes(1, 2)[:, order]

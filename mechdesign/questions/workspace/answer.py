@@ -84,12 +84,11 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     results = {"area": (integral.area, np.maximum(integral.area_error + panels.undecided, missing))}
     if {"SUI", "box_area"} & set(question.columns):
         box, doubt = bounding_box(panels, integral.boundary)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = integral.area / box
-            results |= {
-                "box_area": (box, doubt),
-                "SUI": (share, (results["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
-            }
+        share = integral.area / box
+        results |= {
+            "box_area": (box, doubt),
+            "SUI": (share, (results["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
+        }
     shapes = inscribed(panels, [name for name in question.columns if name in INSCRIBED])
     results |= {name: (size, np.zeros(count)) for name, size in shapes.items()}
     for column, (name, kind) in question.statistics.items():
@@ -130,11 +129,10 @@ def _spread(
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Standard deviation of an index over each region, and its error, by the means of the index and its square."""
     (mean, doubt), (square, square_doubt) = (_mean(integrands, means, doubts, name, power) for power in (1, 2))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
-        total = square_doubt + 2 * np.abs(mean) * doubt
-        # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
-        error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
+    spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
+    total = square_doubt + 2 * np.abs(mean) * doubt
+    # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
+    error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
     return spread, error
 
 

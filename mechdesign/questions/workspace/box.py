@@ -55,9 +55,8 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Intervals]) -> tu
     np.maximum.at(best, (EVERY, EVERY, design), away)
     same = (design[2:] == design[:-2]) & ~at_end[1:-1]
     before, here, after = away[:, :-2], away[:, 1:-1], away[:, 2:]
-    with np.errstate(invalid="ignore"):
-        fall = np.maximum(*(np.where(np.isfinite(other), here - other, 0.0) for other in (before, after)))
-        top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[0][:, design[1:-1]])
+    fall = np.maximum(*(np.where(np.isfinite(other), here - other, 0.0) for other in (before, after)))
+    top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[0][:, design[1:-1]])
     # Where a curve cannot rise by more than two ends of an interval that are one, there is nothing to climb.
     top &= RISE * fall > FLAT * panels.reach[design[1:-1]]
     side, middle = np.nonzero(top)
@@ -68,10 +67,9 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Intervals]) -> tu
     # A tip that was not climbed to may lie as far as the lines through rays on either side of it say.
     beside, step = beside.reshape(len(SIDES), len(BESIDE), -1), np.diff(BESIDE)[:, None]
     here = beside[:, 1:-1]
-    with np.errstate(invalid="ignore"):
-        nearer, farther = here - beside[:, :-2], here - beside[:, 2:]
-        more = np.minimum(nearer * step[1:] / step[:-1], farther * step[:-1] / step[1:])
-        more = np.where((more > 0) & np.isfinite(more), more, 0.0)
+    nearer, farther = here - beside[:, :-2], here - beside[:, 2:]
+    more = np.minimum(nearer * step[1:] / step[:-1], farther * step[:-1] / step[1:])
+    more = np.where((more > 0) & np.isfinite(more), more, 0.0)
     np.maximum.at(best[1], (EVERY, owner[: 2 * len(width)]), (here + more).max(axis=1))
     size = (best[:, 0] + best[:, 1]) * (best[:, 2] + best[:, 3])
     area, most = np.where(np.isfinite(size), size, 0.0)
@@ -103,8 +101,7 @@ def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats
     gaps = np.stack([ends[after - 1].imag, ends[after].imag]) - place
     gap = np.take_along_axis(gaps, np.abs(gaps).argmin(axis=0)[None], axis=0)[0]
     nearer, beside, farther = (-depth(every, place + part * gap) for part in (TOWARDS, -TOWARDS, -1.0))
-    with np.errstate(invalid="ignore"):
-        tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
-        tip &= np.abs(gap) < theta[2] - theta[0]
-        more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
+    tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
+    tip &= np.abs(gap) < theta[2] - theta[0]
+    more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
     return np.stack([-low + more, -low + (1 + TIP) * more])

@@ -134,8 +134,7 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
 
     def evaluate(configuration: Configuration) -> Floats:
         soft = hold(question, configuration)[0].compliance
-        with np.errstate(divide="ignore", invalid="ignore"):
-            values = value(soft)
+        values = value(soft)
         return np.where(np.isnan(soft).any(axis=(1, 2)), free, values)
 
     return of_configurations(evaluate)

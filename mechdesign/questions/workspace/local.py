@@ -24,17 +24,16 @@ class Local(Jacobian):
     @staticmethod
     def at(field: Field, z: Complexes, places: Places) -> Local:
         """What local indices at points `z` are computed from."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            configuration = field.configuration(z, places)
-            jacobian = Jacobian.of(
-                field.mechanism.linearize(configuration), field.outputs, places.get(LENGTH, field.length)
-            )
-            # Of a table on two slides they are the same everywhere.
-            entries, homogeneous = (
-                [[np.broadcast_to(entry, jacobian.shape) for entry in row] for row in rows]
-                for rows in (jacobian.entries, jacobian.homogeneous)
-            )
-            return Local(entries, homogeneous, jacobian.shape, configuration)
+        configuration = field.configuration(z, places)
+        jacobian = Jacobian.of(
+            field.mechanism.linearize(configuration), field.outputs, places.get(LENGTH, field.length)
+        )
+        # Of a table on two slides they are the same everywhere.
+        entries, homogeneous = (
+            [[np.broadcast_to(entry, jacobian.shape) for entry in row] for row in rows]
+            for rows in (jacobian.entries, jacobian.homogeneous)
+        )
+        return Local(entries, homogeneous, jacobian.shape, configuration)
 
     @staticmethod
     def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:

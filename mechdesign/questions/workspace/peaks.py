@@ -133,9 +133,8 @@ def _at_ends(panels: Panels, indices: Sequence[Prepared], value: Floats, order: 
         radius = end[at] + side * NEAR[:, None] * (traced.outer - traced.inner)[at]
         local = Local.on_rays(panels.designs, design[ray], theta[ray], radius)
         for k, index in enumerate(indices):
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
-                power = np.log(far / near) / np.log(NEAR[1] / NEAR[0])
+            near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
+            power = np.log(far / near) / np.log(NEAR[1] / NEAR[0])
             vanishes, grows = power > POWER, (power < -POWER) & (index.index.bounds[1] == np.inf)
             value[0, k, design[ray[vanishes]]] = 0.0
             value[1, k, design[ray[grows]]] = np.inf
@@ -220,8 +219,7 @@ def _climb(
     endless = np.zeros(len(u), dtype=bool)
     if corner.size:
         back = np.where(u[corner] < 0.5, BACK * EDGE_U, 1 - BACK * EDGE_U)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            power = np.log(best[corner] / look(corner, back[None], v[corner][None])[0]) / np.log(BACK)
+        power = np.log(best[corner] / look(corner, back[None], v[corner][None])[0]) / np.log(BACK)
         # What has an upper bound may grow in a corner, but not without end.
         unbounded = np.array([index.index.bounds[1] == np.inf for index in indices])[which[corner]]
         endless[corner] = (sign[corner] * power > POWER) & ((sign[corner] < 0) | unbounded)

@@ -107,8 +107,7 @@ def point_path(study: Study) -> Result:
         (arc, error), travel = functions.integral(_SPEED, line, part), path.high - path.low
         arc, error = arc * travel, error * travel
         box = functions.extremes(outputs, np.zeros((2, 1))).value[..., 0]
-        with np.errstate(divide="ignore"):
-            rows.append([np.full(ROWS, k), path.low + travel * part, *places, ratio, 1 / ratio, arc])
+        rows.append([np.full(ROWS, k), path.low + travel * part, *places, ratio, 1 / ratio, arc])
         totals.append([
             arc[-1], error, *box[0], *(box[1] - box[0]), arc[-1] / travel, ratio.min(), ratio.max(),
         ])  # fmt: skip

@@ -114,9 +114,8 @@ def integrate(
     of_area = min(AREA * tolerance, FINEST_AREA)
 
     def allowance(total: Floats) -> Floats:
-        with np.errstate(invalid="ignore"):
-            area = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
-            return np.concatenate([area, np.where(endless, np.inf, np.fmax(tolerances * total[2:], 0.0))])
+        area = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
+        return np.concatenate([area, np.where(endless, np.inf, np.fmax(tolerances * total[2:], 0.0))])
 
     first = Fan.of(panels, integrands, cells)
     new = first.integrals(integrands, np.full_like(tolerances, np.inf))
@@ -137,8 +136,7 @@ def integrate(
         undecided = done.undecided(count)
         most, number = allowance(total), np.bincount(owner, minlength=count)
         most[:2] = np.maximum(most[:2], undecided)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            most[2:] = np.fmax(most[2:], undecided[1] * np.abs(total[2:]) / total[1])
+        most[2:] = np.fmax(most[2:], undecided[1] * np.abs(total[2:]) / total[1])
         late = (doubt > most).any(axis=0) & (number < MOST_CELLS)
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
         allowed = np.where(late, LESS, 1.0) * allowed
@@ -156,9 +154,8 @@ def integrate(
         done = done.kept(~split).joined(Fan.of(panels, integrands, fresh).integrals(integrands, allowed))
     total, doubt = done.of_designs(count)
     doubt[:2] += done.undecided(count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = total[2:] / total[1]
-        mean_error = (doubt[2:] + np.abs(mean) * doubt[1]) / total[1]
+    mean = total[2:] / total[1]
+    mean_error = (doubt[2:] + np.abs(mean) * doubt[1]) / total[1]
     mean[endless & (total[1] > 0)], mean_error[endless] = np.inf, 0.0
     return Integral(total[0], doubt[0], mean, mean_error, first.boundary)
 
@@ -302,5 +299,4 @@ def simple_means(
         for index, integrand in enumerate(integrands):
             total[index, at] = (integrand.values(local) * weight).sum(axis=0)
     area = np.bincount(owner, sector, count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.array([np.bincount(owner, row * sector, count) for row in total]).reshape(-1, count) / area
+    return np.array([np.bincount(owner, row * sector, count) for row in total]).reshape(-1, count) / area

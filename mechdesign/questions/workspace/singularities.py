@@ -112,8 +112,7 @@ def _inside(field: Field, patches: Sequence[Patch]) -> list[tuple[str, str, list
         return []
 
     def values(z: Complexes) -> Floats:
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            sizes = determinants(field.mechanism.linearize(field.configuration(z, {})))
+        sizes = determinants(field.mechanism.linearize(field.configuration(z, {})))
         return np.stack([np.broadcast_to(np.asarray(d, dtype=float), z.shape) for d in sizes])
 
     curves: list[list[Complexes]] = [[] for _ in names]
@@ -215,18 +214,17 @@ def _end(
         place, inwards = on_boundary(foot + along * tangent)
         return determinant(place + BESIDE * width * inwards)
 
-    with np.errstate(invalid="ignore", divide="ignore"):
-        foot, normal = on_boundary(np.array([near]))
-        tangent = 1j * normal
-        # The secant method along the boundary, at two distances from it at once.
-        before, now = np.full(2, -FIRST_STEP * reach), np.zeros(2)
-        value = determinants_at(before)
-        for _ in range(SECANTS):
-            last, value = value, determinants_at(now)
-            change = np.where(value == 0, 0.0, -value * (now - before) / (value - last))
-            before, now = now, now + change
-            if not (np.abs(change) > ACCURACY * reach).any():
-                break
-        (met,), _ = on_boundary(foot + (2 * now[0] - now[1]) * tangent)
+    foot, normal = on_boundary(np.array([near]))
+    tangent = 1j * normal
+    # The secant method along the boundary, at two distances from it at once.
+    before, now = np.full(2, -FIRST_STEP * reach), np.zeros(2)
+    value = determinants_at(before)
+    for _ in range(SECANTS):
+        last, value = value, determinants_at(now)
+        change = np.where(value == 0, 0.0, -value * (now - before) / (value - last))
+        before, now = now, now + change
+        if not (np.abs(change) > ACCURACY * reach).any():
+            break
+    (met,), _ = on_boundary(foot + (2 * now[0] - now[1]) * tangent)
     good = (np.abs(change) <= ACCURACY * reach).all() and abs(met - near) <= reach
     return complex(met) if good else None

@@ -55,8 +55,7 @@ class Integrand:
     def values(self, local: Local) -> Floats:
         """Values at points; 0 where there is none: on the boundary itself rounding leaves an interval of no width."""
         integrand = np.broadcast_to(np.asarray(self.index.values(local), dtype=float), local.configuration.shape)
-        with np.errstate(over="ignore", invalid="ignore"):
-            integrand = integrand**self.power
+        integrand = integrand**self.power
         return np.where(np.isfinite(integrand), integrand, 0.0)
 
 
@@ -149,8 +148,7 @@ def along(
 
 def _worst(owner: Ints, error: Floats, noise: Floats, allowed: Floats) -> Flags:
     """Strips to be divided: of designs that exceed what is allowed all but those that together err by `KEPT` of it."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(error > noise, np.minimum(error / allowed[:, owner], 2.0), 0.0).max(axis=0, initial=0.0)
+    share = np.where(error > noise, np.minimum(error / allowed[:, owner], 2.0), 0.0).max(axis=0, initial=0.0)
     order = np.lexsort((share, owner))
     total = np.append(0.0, np.cumsum(share[order]))
     split = np.zeros(len(owner), dtype=bool)
@@ -196,10 +194,9 @@ def evaluate(designs: Designs, integrands: Sequence[Integrand], segments: Parts)
             value[j, at], doubt[j, at] = RADII.apply(values)
             sums[j, :, begin:end] += np.add.reduceat(values * part["weight"], begins, axis=1)
     error = np.array([RADII.apply(row)[1] for row in sums]).reshape(len(integrands), len(first))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # What an inverse square root has within `NEAREST` of the boundary.
-        width = segments["outer"] - segments["inner"]
-        noise = np.nan_to_num(np.sqrt(NEAREST * segments["outer"] / width) * np.abs(value)) * segments["weight"]
+    # What an inverse square root has within `NEAREST` of the boundary.
+    width = segments["outer"] - segments["inner"]
+    noise = np.nan_to_num(np.sqrt(NEAREST * segments["outer"] / width) * np.abs(value)) * segments["weight"]
     doubt = np.maximum(doubt * segments["weight"] - noise, 0.0)
     if len(first):
         noise = np.add.reduceat(noise, first, axis=1)
@@ -235,10 +232,9 @@ def _evenest(r: Floats, uneven: Floats) -> tuple[Floats, Floats]:
     near = np.clip(lowest, 1, len(r) - 2) + np.arange(-1, 2)[:, None]
     before, here, after = uneven[near, lane]
     left, right = np.diff(r[near, lane], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        fall, rise = (before - here) / left, (after - here) / right
-        way = 0.5 * (fall * right - rise * left) / (fall + rise)
-        least = here - (fall + rise) / (left + right) * way * way
+    fall, rise = (before - here) / left, (after - here) / right
+    way = 0.5 * (fall * right - rise * left) / (fall + rise)
+    least = here - (fall + rise) / (left + right) * way * way
     inside = (fall > 0) & (rise > 0)
     return np.where(inside, np.maximum(least, 0.0), uneven[lowest, lane]), np.where(
         inside, r[near[1], lane] + way, r[lowest, lane]
@@ -247,8 +243,7 @@ def _evenest(r: Floats, uneven: Floats) -> tuple[Floats, Floats]:
 
 def _inverse_determinant(local: Local, shape: tuple[int, ...]) -> Floats:
     """One by the determinant of the Jacobian, which changes its sign at a forward singularity."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.broadcast_to(1 / local.determinant, shape)
+    return np.broadcast_to(1 / local.determinant, shape)
 
 
 def _sign_change(x: Floats, values: Floats) -> Floats:
@@ -258,8 +253,7 @@ def _sign_change(x: Floats, values: Floats) -> Floats:
     change = (values[1:] > 0) != (values[:-1] > 0)
     first, lane = change.argmax(axis=0), np.arange(values.shape[1])
     a, b = values[first, lane], values[first + 1, lane]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = x[first, lane] + (x[first + 1, lane] - x[first, lane]) * a / (a - b)
+    root = x[first, lane] + (x[first + 1, lane] - x[first, lane]) * a / (a - b)
     return np.where(finite & change.any(axis=0), root, np.nan)
 
 
@@ -270,6 +264,5 @@ def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
     r = spread(segments["inner"], segments["outer"], around, cosine)[0]
     local = Local.on_rays(designs, segments["design"], segments["theta"], r)
     low, middle, high = _inverse_determinant(local, r.shape)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = 2 * middle / (low - high)
+    shift = 2 * middle / (low - high)
     return np.asarray(v + step * np.where(np.abs(shift) < 1, shift, 0.0))

@@ -116,8 +116,7 @@ def _totals(indices: Table, held: Sequence[str]) -> Table:
     least = np.argmin(np.where(present, values, np.inf), axis=1)
     most = np.argmax(np.where(present, values, -np.inf), axis=1)
     row, some = np.arange(len(statistics)), present.any(axis=1)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(present, values, 0.0).sum(axis=1) / np.where(some, present.sum(axis=1), np.nan)
+    mean = np.where(present, values, 0.0).sum(axis=1) / np.where(some, present.sum(axis=1), np.nan)
     ends = {"smallest": least, "largest": most}
     return TOTALS.table([
         *TOTALS.columns({}, statistic=np.array([column.name for column in statistics]), smallest=values[row, least],

@@ -82,14 +82,13 @@ def _solved(panels: Panels, design: Ints, z: Complexes) -> tuple[Complexes, Floa
     places = designs.of(design)
     for _ in range(STEPS):
         (a, b), (c, d) = Local.at(designs.field, z + step, places).homogeneous
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # Every matrix is the sum of a turning and a reflection, each times a size.
-            turning, reflection = np.asarray((a + d) + 1j * (c - b)), np.asarray((a - d) + 1j * (c + b))
-            less = np.where(np.abs(turning[0]) > np.abs(reflection[0]), reflection / turning, turning / reflection)
-            here, by_x, by_y = less[0], less[1] - less[0], less[2] - less[0]
-            det = cross(by_x, by_y)
-            way = -(cross(here, by_y) + 1j * cross(by_x, here)) / det * np.abs(step[1])
-            way *= np.minimum(1.0, LONGEST * reach / np.abs(way))
+        # Every matrix is the sum of a turning and a reflection, each times a size.
+        turning, reflection = np.asarray((a + d) + 1j * (c - b)), np.asarray((a - d) + 1j * (c + b))
+        less = np.where(np.abs(turning[0]) > np.abs(reflection[0]), reflection / turning, turning / reflection)
+        here, by_x, by_y = less[0], less[1] - less[0], less[2] - less[0]
+        det = cross(by_x, by_y)
+        way = -(cross(here, by_y) + 1j * cross(by_x, here)) / det * np.abs(step[1])
+        way *= np.minimum(1.0, LONGEST * reach / np.abs(way))
         size, z = np.abs(here), np.where(np.isfinite(way), z + way, z)
     single = np.abs(det) > ALONG * np.abs(by_x) * np.abs(by_y)
     return z, np.where(np.isfinite(size) & single, size, 1.0)

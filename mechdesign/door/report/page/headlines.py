@@ -80,6 +80,7 @@ def shown(value: float) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+@np.errstate(all="ignore")
 def headlines(result: Result) -> list[Headline]:
     """The headlines of a result, at most `MOST`, no name twice."""
     numbers = {number.label: number for number in _of_cases(result)}

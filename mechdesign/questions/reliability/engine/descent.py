@@ -66,9 +66,8 @@ def descend(
         margins, gradients = problem.gradients(u[:, lanes])
         rows, k = limit[lanes], np.arange(len(lanes))
         # Squares may overflow; such a start is given up below.
-        with np.errstate(over="ignore"):
-            g, slope = margins[rows, k] / scale[rows], is_normal * gradients[rows, :, k].T / scale[rows]
-            size = (slope**2).sum(axis=0)
+        g, slope = margins[rows, k] / scale[rows], is_normal * gradients[rows, :, k].T / scale[rows]
+        size = (slope**2).sum(axis=0)
         finite = np.isfinite(g) & np.isfinite(size) & (size > 0)
         active[lanes[~finite]] = False
         if not finite.any():

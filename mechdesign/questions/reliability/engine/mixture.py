@@ -94,16 +94,14 @@ class Mixture:
             z = self.inverse[k] @ normal
             z -= (self.inverse[k] @ self.centre[k])[:, None]
             row[:] = one + half - 0.5 * np.einsum("dn,dn->n", z, z) + self.heading[k].ravel() @ directions
-        with np.errstate(divide="ignore"):
-            logs[-1] = np.where(half >= 0.5 * self.beyond**2, np.log(self.rest / self._outside), -np.inf)
+        logs[-1] = np.where(half >= 0.5 * self.beyond**2, np.log(self.rest / self._outside), -np.inf)
         return logs
 
     def worth(self, u: Floats) -> Floats:
         """Density of the law over that of the mixture, shape (n,)."""
         logs = self.logs(u)
         most = logs.max(axis=0, initial=-np.inf)
-        with np.errstate(over="ignore"):
-            return np.asarray(np.exp(-most) / np.exp(logs - most).sum(axis=0))
+        return np.asarray(np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
     def joined(self, other: Mixture, share: float) -> Mixture:
         """The mixture of both, in which the other has this share."""

@@ -121,8 +121,7 @@ def _chances(problem: LimitStates, points: DesignPoints, u: Floats, rng: np.rand
     lanes = np.arange(count)
     own = normal[:, half, lanes]
     z = rng.standard_normal((len(u), _POINTS_DRAWN, count)) * problem.is_normal[:, None, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        depth = -ndtri(chance[half, lanes] * (1.0 - rng.random((_POINTS_DRAWN, count))))
-        z += own * np.nan_to_num(depth - (own * z).sum(axis=0))
-        held = (np.einsum("dhn,dmn->hmn", normal, z) > distance[:, None]).sum(axis=0)
+    depth = -ndtri(chance[half, lanes] * (1.0 - rng.random((_POINTS_DRAWN, count))))
+    z += own * np.nan_to_num(depth - (own * z).sum(axis=0))
+    held = (np.einsum("dhn,dmn->hmn", normal, z) > distance[:, None]).sum(axis=0)
     return np.asarray(np.minimum(total * (1.0 / np.maximum(held, 1)).mean(axis=0), 1.0))
