@@ -12,12 +12,14 @@ from mechdesign.questions.synthesize.dyads import LINK, Dyads
 # Largest and smallest step between two points (the unknowns have the length 1), and largest turn of its direction.
 _STEP, _LEAST, _BEND = 0.02, 1e-4, 0.05
 _MOST, _NEWTON = 4000, 3
+# Links that are longer, in sizes of the task, are slides within rounding.
+_LONGEST = 1e4
 # Lines from which each branch is begun: directions, and distances from the middle in sizes of the task.
 _LINES = [(np.exp(1j * angle), away) for angle in np.arange(0, 3, 0.5) for away in (-2.0, -0.5, 0.1, 1.0)]
 
 
-def centre_points(task: Positions) -> list[Dyads]:
-    """The links of four positions along the curve of their pivots, one record a closed branch."""
+def centre_points(task: Positions, reach: float) -> list[Dyads]:
+    """The links of four positions along the curve of their pivots, in parts within a reach of the task's middle."""
     centre, size = task.centre, task.size
     known = dyads.independent(dyads.rows((task.places - centre) / size, task.rotations))
     normals, away = (np.array(part, dtype=complex) for part in zip(*_LINES, strict=True))
@@ -30,11 +32,18 @@ def centre_points(task: Positions) -> list[Dyads]:
         start = start / np.linalg.norm(start)
         if all(np.abs(branch @ start).max() < np.cos(_STEP) for branch in branches):
             branches.append(_followed(forms, start))
-    links = []
+    parts = list[Dyads]()
     for branch in branches:
-        part = dyads.links(branch @ free.T)
-        links.append(Dyads(LINK, part.pivot * size + centre, part.pin * size, part.normal, part.length * size))
-    return links
+        branch = branch[np.abs(branch @ free[0]) > dyads.NOTHING]
+        link = dyads.links(branch @ free.T)
+        far = (np.abs(link.pivot) > reach / size) | (link.length > _LONGEST)
+        # A branch is closed, and passes the infinite where its weight changes its sign.
+        side = np.where(far, 0.0, np.sign(branch @ free[0]))
+        first = int((side != np.roll(side, 1)).argmax())
+        order = np.roll(np.arange(len(side)), -first)
+        breaks = np.flatnonzero(np.diff(side[order])) + 1
+        parts += [link.take(rows) for rows in np.split(order, breaks) if len(rows) and not far[rows[0]]]
+    return [Dyads(LINK, part.pivot * size + centre, part.pin * size, part.normal, part.length * size) for part in parts]
 
 
 def _followed(forms: Floats, start: Floats) -> Floats:

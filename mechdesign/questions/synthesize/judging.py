@@ -86,9 +86,9 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
     around = np.pad(sine, ((0, 0), (1, 1)), constant_values=np.inf)
     lowest = (sine <= around[:, :-2]) & (sine <= around[:, 2:])
     swift = np.zeros((len(values), POSES - 1), dtype=bool)
-    for turned in poses.rotations:
-        rate = np.conj(turned[..., :-1]) * turned[..., 1:] if np.ndim(turned) and np.shape(turned)[-1] == POSES else 1.0
-        swift |= np.real(rate) < _SLOW
+    for rotation in poses.rotations:
+        turned = np.broadcast_to(rotation, poses.shape)
+        swift |= (np.conj(turned[:, :-1]) * turned[:, 1:]).real < _SLOW
     lane, pose = np.nonzero(lowest & ~dead[:, None])
     hasty, before = np.nonzero(swift & ~dead[:, None])
     lane = np.concatenate([lane, hasty])
