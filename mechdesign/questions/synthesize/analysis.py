@@ -14,10 +14,11 @@ from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result, Table
 from mechdesign.ground.work.threads import one_thread
-from mechdesign.questions.synthesize.columns import SOLUTIONS
+from mechdesign.questions.synthesize.columns import CENTRE_POINTS, SOLUTIONS
+from mechdesign.questions.synthesize.curves import centre_points
 from mechdesign.questions.synthesize.files import judged, study_data, study_text
 from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
-from mechdesign.questions.synthesize.tasks import Task, task_of
+from mechdesign.questions.synthesize.tasks import BodyTask, Task, task_of
 from mechdesign.questions.synthesize.words import linkage
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
@@ -83,7 +84,8 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     output, _ = task.targets(solutions[0])
     drawn = DrawnSolutions(tuple(data), study.folder, output, task.points, task.directions, errors)
     told = [f"best: {', '.join(linkage(table, 0, float(errors[0])))}", *told]
-    return Result("synthesize", {table.name: table}, counts=counts, files=files, drawn=drawn, notes=told)
+    tables = {table.name: table, **curve_tables(study, task)}
+    return Result("synthesize", tables, counts=counts, files=files, drawn=drawn, notes=told)
 
 
 def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
@@ -111,7 +113,8 @@ def _none(
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])
     files = {"nearest.yaml": study_text(data, [f"Nearest to {study.name}: {missed}"])}
-    return AssemblyError(message, Result("synthesize", {table.name: table}, failed=message, files=files))
+    tables = {table.name: table, **curve_tables(study, task)}
+    return AssemblyError(message, Result("synthesize", tables, failed=message, files=files))
 
 
 def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], scores: Sequence[float]) -> Table:
@@ -144,3 +147,17 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
         values = values / task.factor if quantity == "angle" else values
         columns.append(SOLUTIONS["<dimension>"].column(values, labels[quantity], dimension=place))
     return SOLUTIONS.table(columns)
+
+
+def curve_tables(study: Study, task: Task) -> dict[str, Table]:
+    """The links of four positions of a body along the curve of their pivots; empty for other tasks."""
+    if not isinstance(task, BodyTask) or len(task.positions.places) != 4 or task.positions.shifts:
+        return {}
+    parts = centre_points(task.positions, task.section.limits.reach * task.size)
+    columns = CENTRE_POINTS.columns(
+        study.units.labels, curve=np.repeat(np.arange(1, len(parts) + 1), [len(part) for part in parts]),
+        **{f"{name}.{way}": np.concatenate([getattr(getattr(part, field), side) for part in parts] or [np.empty(0)])
+           for name, field in (("centre", "pivot"), ("circle", "pin")) for way, side in (("x", "real"), ("y", "imag"))},
+        length=np.concatenate([part.length for part in parts] or [np.empty(0)]),
+    )  # fmt: skip
+    return {CENTRE_POINTS.name: CENTRE_POINTS.table(columns)}

@@ -22,6 +22,12 @@ SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("peak_effort", "greatest effort of the drive on its way through the task under the loads of `judge`", "torque"),
     ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),
     ColumnKind("<dimension>", "dimension of the linkage by its name in its study", "as the dimension"))  # fmt: skip
+CENTRE_POINTS = TableKind.of("centre_points", "links that pass four positions, along the curve of their pivots as far "
+    "as limits.reach",
+    ("curve", "number of the part of the curve, along which rows follow each other"),
+    ("centre.x", "pivot in the frame", "length"), ("centre.y", "pivot in the frame", "length"),
+    ("circle.x", "its pin in the body, which passes a circle about the pivot", "length"),
+    ("circle.y", "its pin in the body", "length"), ("length", "of the link", "length"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(SOLUTIONS, "error", "error of the best", "first"),
     KeyNumber(SOLUTIONS, "transmission_angle", "its smallest transmission angle", "first"),

@@ -134,10 +134,10 @@ def _complex(w: Floats, k: int) -> Complexes:
     return w[..., k] + 1j * w[..., k + 1]
 
 
-def _quadric(free: Floats) -> Floats:
-    """The two conics of w q - conj(A) X for unknowns that are sums of three, shape (count, 2, 3, 3)."""
-    three = np.swapaxes(free, 1, 2)
-    w, a, x, q = three[..., 0], np.conj(_complex(three, 4)), _complex(three, 2), _complex(three, 6)
+def quadrics(free: Floats) -> Floats:
+    """The real and imaginary forms of w q - conj(A) X of unknowns that are sums of n, shape (count, 2, n, n)."""
+    sums = np.swapaxes(free, 1, 2)
+    w, a, x, q = sums[..., 0], np.conj(_complex(sums, 4)), _complex(sums, 2), _complex(sums, 6)
     form = w[:, :, None] * q[:, None] - a[:, :, None] * x[:, None]
     form = (form + np.swapaxes(form, 1, 2)) / 2
     return np.stack([form.real, form.imag], axis=1)
@@ -146,7 +146,7 @@ def _quadric(free: Floats) -> Floats:
 def _points(free: Floats) -> Floats:
     """The unknowns at the points in which two conics meet, shape (count, 8)."""
     free = free @ _TURN
-    one, other = _quadric(free).swapaxes(0, 1)
+    one, other = quadrics(free).swapaxes(0, 1)
     # Each is a u^2 + b u + c with polynomials in v of degree 0, 1, 2; their resultant has degree four.
     parts = []
     for m in (one, other):
@@ -198,6 +198,14 @@ def _product(one: Floats, other: Floats) -> Floats:
     return whole
 
 
+def links(w: Floats) -> Dyads:
+    """The links with unknowns of shape (count, 8), of which w is not zero."""
+    w = w / w[:, :1]
+    pin, pivot = _complex(w, 2), _complex(w, 4)
+    length = np.sqrt(np.maximum(np.abs(pin) ** 2 + np.abs(pivot) ** 2 - w[:, 1], 0.0))
+    return Dyads(LINK, pivot, pin, np.ones(len(pin), dtype=complex), length)
+
+
 def dyads(equations: Floats) -> dict[str, Dyads]:
     """All dyads that fulfil rows of equations, shape (..., rows, 8); by their kinds."""
     w = unknowns(equations)
@@ -205,11 +213,8 @@ def dyads(equations: Floats) -> dict[str, Dyads]:
     link = np.abs(weight) > NOTHING
     slide = ~link & (np.abs(x) <= np.sqrt(NOTHING)) & (np.abs(a) > np.sqrt(NOTHING))
     guide = ~link & (np.abs(a) <= np.sqrt(NOTHING)) & (np.abs(x) > np.sqrt(NOTHING))
-    every = []
+    every = [links(w[link])]
     with np.errstate(all="ignore"):
-        pin, pivot = x[link] / weight[link], a[link] / weight[link]
-        length = np.sqrt(np.maximum(np.abs(pin) ** 2 + np.abs(pivot) ** 2 - w[link, 1] / weight[link], 0.0))
-        every.append(Dyads(LINK, pivot, pin, np.ones(len(pin), dtype=complex), length))
         normal = a[slide] / np.abs(a[slide])
         offset = w[slide, 1] / (2 * np.abs(a[slide]))
         pin = q[slide] / np.conj(a[slide])

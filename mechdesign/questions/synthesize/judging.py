@@ -17,6 +17,10 @@ POSES, FINER = 181, 17
 # Linkages that are followed at once: their poses stay in the processor's cache.
 _AT_ONCE = 100
 _TURN = 2 * np.pi
+# Cosine of the turn of a link between two poses, from which on it is swift.
+_SLOW = 0.97
+# Below this sine of the transmission angle a linkage is at a dead centre, which the finest poses miss by less.
+_DEAD = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +82,18 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
     poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
     sine = sines(kind, poses)
     worst, dead = sine.min(axis=1), np.asarray(~poses.valid.all(axis=1))
-    # Between poses it is lowest beside the lowest of them; a few local minima are looked at.
-    lowest = (sine[:, 1:-1] <= sine[:, :-2]) & (sine[:, 1:-1] <= sine[:, 2:])
-    lane, before = np.nonzero(lowest & ~dead[:, None])
-    low, high = parts[before], parts[before + 2]
+    # Between poses it is lowest beside the lowest of them, or where a link turns swiftly, as beside a pivot.
+    around = np.pad(sine, ((0, 0), (1, 1)), constant_values=np.inf)
+    lowest = (sine <= around[:, :-2]) & (sine <= around[:, 2:])
+    swift = np.zeros((len(values), POSES - 1), dtype=bool)
+    for rotation in poses.rotations:
+        turned = np.broadcast_to(rotation, poses.shape)
+        swift |= (np.conj(turned[:, :-1]) * turned[:, 1:]).real < _SLOW
+    lane, pose = np.nonzero(lowest & ~dead[:, None])
+    hasty, before = np.nonzero(swift & ~dead[:, None])
+    lane = np.concatenate([lane, hasty])
+    low = parts[np.concatenate([np.maximum(pose - 1, 0), before])]
+    high = parts[np.concatenate([np.minimum(pose + 1, POSES - 1), before + 1])]
     for _ in range(5):
         if not len(lane):
             break
@@ -92,6 +104,7 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
         np.logical_or.at(dead, lane, ~own.valid.all(axis=1))
         at, rows = np.clip(sine.argmin(axis=1), 1, FINER - 2), np.arange(len(lane))
         low, high = fine[rows, at - 1], fine[rows, at + 1]
+    dead |= worst < _DEAD
     worst = np.where(dead, 0.0, worst)
     return dead, np.arcsin(np.clip(worst, 0, 1))
 
