@@ -78,7 +78,7 @@ def paths_panel(sweep: Sweep, more: Sequence[PanelMark] = (), before: Before | N
     """
     goals = [
         target.table[:, -2] + 1j * target.table[:, -1]
-        for target in sweep.study.targets.values()
+        for target in (*sweep.study.targets.values(), *sweep.study.curves.values())
         if target.table is not None and len(target.coordinates) == 2
     ]
     dotted = {"marker": "o", "color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (1, 2.5)), "markersize": 3,
