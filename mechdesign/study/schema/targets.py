@@ -139,11 +139,8 @@ def check_poses(targets: Mapping[str, Target], mechanism: Mechanism, poses: Pose
             continue
         if target.closed is not None:
             if not poses.followed:
-                drive = mechanism.drives[0]
-                message = (
-                    f"a curve is passed by a motion; give kinematics one, as sweep: {{{drive}: {{from: 0, to: 360}}}}"
-                )
-                reporter.report((*ROOT, owner), message)
+                sweep = f"sweep: {{{mechanism.drives[0]}: {{from: 0, to: 360}}}}"
+                reporter.report((*ROOT, owner), f"a curve is passed by a motion; give kinematics one, such as {sweep}")
             continue
         rows = len(target.table)
         drive = timing(mechanism.drives, poses)
