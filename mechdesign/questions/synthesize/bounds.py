@@ -10,7 +10,6 @@ from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.synthesize.judging import sines
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.own import OwnKind
-from mechdesign.questions.synthesize.paths import Points
 from mechdesign.questions.synthesize.schema import Region, SynthesisSection
 
 # Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
@@ -19,11 +18,21 @@ _AROUND, _AT_ONCE = 32, 1000
 _SURE = 1e-3
 
 
-class Bound:
-    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can."""
+class KindBounds:
+    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can.
 
-    def __init__(self, kind: Kind, section: SynthesisSection, path: Points, factor: float) -> None:
-        self.kind, self.section, self.path = kind, section, path
+    Attributes
+    ----------
+    fixed : ndarray of bool, shape (places,)
+        Which values are given.
+    in_place : bool
+        Whether samples are where they must be, so that only their forms are free.
+    turning : bool
+        Whether drives must turn fully.
+    """
+
+    def __init__(self, kind: Kind, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
+        self.kind, self.section, self.centre, self.size = kind, section, centre, size
         self.turning, self.fixed = section.needs_turn, np.zeros(len(kind.places), dtype=bool)
         #: sine of the transmission angle that is asked over a turn
         least = section.transmission if section.needs_turn else None
@@ -43,22 +52,20 @@ class Bound:
     def placed(self, values: Floats) -> Floats:
         """Linkages turned, scaled and shifted to the first two of the given pivots."""
         assert self.given is not None
-        first, second = (values[:, self.kind[f"ground.{name}.x"]] + 1j * values[:, self.kind[f"ground.{name}.y"]]
-                         for name in "OD")  # fmt: skip
+        first, second, *_ = self.kind.frame(values).T
         turned = (self.given[1] - self.given[0]) / (second - first)
         return self(self.kind.moved(values, turned, self.given[0] - turned * first))
 
     def __call__(self, values: Floats) -> Floats:
+        """The nearest values within the limits of each."""
         values, limits = values.copy(), self.section.bounds
-        for x, y in self.kind.pivots:
+        for number, (x, y) in enumerate(self.kind.pivots):
             place = values[:, x] + 1j * values[:, y]
-            if self.fixed.any():
-                assert self.given is not None
-                # In the order of the points: D before O in the columns, O first as given.
-                place = np.full(len(values), self.given[self._order(x)])
-            away = place - self.path.centre
-            far = np.maximum(np.abs(away) / (limits.reach * self.path.size), 1.0)
-            place = self.path.centre + away / far
+            if self.given is not None and self.in_place:
+                place = np.full(len(values), self.given[number])
+            away = place - self.centre
+            far = np.maximum(np.abs(away) / (limits.reach * self.size), 1.0)
+            place = self.centre + away / far
             if self.box is not None:
                 place = np.clip(place.real, *_ends(self.box.x)) + 1j * np.clip(place.imag, *_ends(self.box.y))
             values[:, x], values[:, y] = place.real, place.imag
@@ -69,7 +76,7 @@ class Bound:
             values[:, column] = np.clip(values[:, column], low, high)
         if not self.in_place and self.links:
             # The frame keeps the ratio by its second pivot.
-            (x, y), (u, v) = ((self.kind[f"ground.{name}.x"], self.kind[f"ground.{name}.y"]) for name in "OD")
+            (x, y), (u, v), *_ = self.kind.pivots
             own, frame = values[:, self.links], values[:, u] - values[:, x] + 1j * (values[:, v] - values[:, y])
             length = np.maximum(np.abs(frame), np.finfo(float).tiny)
             low, high = self.ground
@@ -94,17 +101,12 @@ class Bound:
             good[some] = least - (before - after) ** 2 / (8 * bend) >= self.least * (1 + _SURE)
         return good
 
-    def _order(self, column: int) -> int:
-        names = sorted(self.kind.places[x].split(".")[1] for x, _ in self.kind.pivots)
-        names.sort(key="ODF".index)
-        return names.index(self.kind.places[column].split(".")[1])
 
-
-class Ranges(Bound):
+class RangeBounds(KindBounds):
     """Keeps the parameters of a study's own mechanism within their ranges; it is where they say."""
 
-    def __init__(self, kind: OwnKind, section: SynthesisSection, path: Points, factor: float) -> None:
-        super().__init__(kind, section, path, factor)
+    def __init__(self, kind: OwnKind, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
+        super().__init__(kind, section, centre, size, factor)
         self.in_place, self.low, self.high = True, kind.low, kind.high
 
     def placed(self, values: Floats) -> Floats:

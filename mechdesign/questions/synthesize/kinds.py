@@ -66,9 +66,8 @@ class Kind:
 
     @cached_property
     def pivots(self) -> tuple[tuple[int, int], ...]:
-        """Columns of x and y of the points of the frame."""
-        ground = [place for place in self.places if place.startswith("ground.") and place.endswith(".x")]
-        return tuple((self[place], self[f"{place[:-1]}y"]) for place in ground)
+        """Columns of x and y of the points O, D and F of the frame."""
+        return tuple(self._pair(f"ground.{name}") for name in "ODF" if f"ground.{name}.x" in self.places)
 
     @cached_property
     def directions(self) -> tuple[int, ...]:
@@ -150,9 +149,9 @@ class Kind:
         lengths = [k for k, place in enumerate(self.places) if place.endswith(".length")]
         values[:, lengths] = np.exp(random.uniform(0, few, (count, len(lengths))))
         for number, (x, y) in enumerate(self.pivots):
-            # The frame begins at O.
+            # The frame begins at O and runs along x to D.
             away = np.exp(random.uniform(0, few, count) + 1j * random.uniform(-np.pi, np.pi, count))
-            away = 0 * away if self.places[x] == "ground.O.x" else np.abs(away) if not number else away
+            away = (0 * away, np.abs(away), away)[number]
             values[:, x], values[:, y] = away.real, away.imag
         for x, y in self._points():
             link = self.places[x].partition(".")[0]
@@ -161,7 +160,7 @@ class Kind:
             values[:, x], values[:, y] = length / 2 + arm.real, arm.imag
         if self.directions:
             # The slide runs along x, beside the crank's pivot by up to its coupler.
-            (x, y), (crank, coupler) = self.pivots[0], (self["crank.length"], self["coupler.length"])
+            (x, y), (crank, coupler) = self.pivots[1], (self["crank.length"], self["coupler.length"])
             values[:, self.directions] = 0.0
             values[:, x], values[:, y] = 0.0, values[:, coupler] * random.uniform(-0.8, 0.8, count)
             values[:, crank] = values[:, coupler] * np.exp(random.uniform(-few, 0, count))

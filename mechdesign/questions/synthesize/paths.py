@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.synthesize.bounds import KindBounds
 from mechdesign.questions.synthesize.kinds import Kind
 
 _Numbers = TypeVar("_Numbers", Floats, Complexes)
@@ -87,22 +88,8 @@ class Fits:
     starts: Ints  # which of the linkages that were polished each was, from 0
 
 
-class Bound(Protocol):
-    """What keeps linkages within their conditions while they are polished."""
-
-    fixed: Flags  #: which places have their values
-    in_place: bool  #: whether samples are where they must be, so that only their forms are free
-    turning: bool  #: whether drives must turn fully
-
-    def __call__(self, values: Floats) -> Floats:
-        """The nearest values within the limits of each."""
-
-    def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
-        """Which linkages keep what their motion is asked for."""
-
-
 def fits(
-    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: Bound, polished: int = POLISHED
+    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: KindBounds, polished: int = POLISHED
 ) -> Fits:
     """The linkages among samples whose curves have the form of the task, polished; `bound` keeps their values."""
     samples = samples[bound.accepts(modes, samples)]
@@ -141,7 +128,7 @@ def _centred(curves: Complexes) -> tuple[Complexes, Complexes, Floats]:
 
 
 def begun(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int, bound: Bound
+    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int, bound: KindBounds
 ) -> tuple[Floats, Floats]:
     """The linkages with a curve that comes nearest to the task, and the drive at its points.
 
@@ -222,7 +209,7 @@ def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints
 
 
 def polish(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, bound: Bound,
+    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, bound: KindBounds,
     *, culled: bool = True,
 ) -> Fits:  # fmt: skip
     """All linkages at once by Levenberg and Marquardt's method, the worse ones left behind on the way if `culled`."""

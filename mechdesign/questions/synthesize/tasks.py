@@ -12,7 +12,7 @@ from mechdesign.ground.errors import StudyError
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
-from mechdesign.questions.synthesize.bounds import Bound, Ranges
+from mechdesign.questions.synthesize.bounds import KindBounds, RangeBounds
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
 from mechdesign.questions.synthesize.judging import in_order, passed
@@ -264,7 +264,8 @@ class PathTask(_Task):
     def _fits(self, kind: Kind, modes: tuple[int, ...], random: np.random.Generator) -> paths.Fits:
         """Linkages of a kind in an assembly, from samples of it."""
         section = self.section
-        bound = (Ranges if isinstance(kind, OwnKind) else Bound)(kind, section, self.path, self.factor)  # type: ignore[arg-type]
+        limits = section, self.centre, self.size, self.factor
+        bound = RangeBounds(kind, *limits) if isinstance(kind, OwnKind) else KindBounds(kind, *limits)
         ratio = min(section.bounds.ratio, _SAMPLED) if bound.in_place else section.bounds.ratio
         count = section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         samples = kind.samples(random, count, ratio, full_turn=section.needs_turn)
