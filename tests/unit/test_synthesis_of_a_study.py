@@ -101,7 +101,7 @@ def test_timing_is_kept_where_it_is_given(tmp_path: Path) -> None:
         (FOUR_BAR, {"point": "Q"}, "has no point 'Q'"),
         (FOUR_BAR.replace("outputs: [P]", "outputs: [P, B]"), {}, "which point of own.yaml passes them"),
         (FOUR_BAR.replace("mechanism", "units: {length: m}\nmechanism", 1), {}, "its units are not those of the task"),
-        (SLIDER, {"closed": True, "ranges": {"b": [40, 100]}}, "s of own.yaml slides"),
+        (SLIDER, {"closed": True, "ranges": {"b": [40, 100]}}, "s of own.yaml does not turn fully"),
         (FOUR_BAR, {"kinds": "four_bar"}, "and no 'kinds'"),
         (FOUR_BAR, {"closed": True, "full_turn": False}, "the same way forth and back"),
         (FOUR_BAR, {"of": "other.yaml"}, "other.yaml cannot be read"),

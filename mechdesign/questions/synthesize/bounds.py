@@ -29,14 +29,14 @@ class KindBounds:
         Whether samples are where they must be, so that only their forms are free.
     turning : bool
         Whether drives must turn fully.
+    least : float
+        Sine of the transmission angle that they keep then.
     """
 
     def __init__(self, kind: Kind, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
         self.kind, self.section, self.centre, self.size = kind, section, centre, size
         self.turning, self.fixed = section.needs_turn, np.zeros(len(kind.places), dtype=bool)
-        #: sine of the transmission angle that is asked over a turn
-        least = section.transmission if section.needs_turn else None
-        self.least = 0.0 if least is None else np.sin(float(least.at_least) * factor)
+        self.least = section.least_sine(factor)
         self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
         self.ends = {
             kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
@@ -105,9 +105,10 @@ class KindBounds:
 class RangeBounds(KindBounds):
     """Keeps the parameters of a study's own mechanism within their ranges; it is where they say."""
 
-    def __init__(self, kind: OwnKind, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
-        super().__init__(kind, section, centre, size, factor)
-        self.in_place, self.low, self.high = True, kind.low, kind.high
+    def __init__(self, kind: OwnKind, *, turning: bool, least: float = 0.0) -> None:
+        self.kind, self.turning, self.least = kind, turning, least
+        self.in_place, self.fixed = True, np.zeros(len(kind.places), dtype=bool)
+        self.low, self.high = kind.low, kind.high
 
     def placed(self, values: Floats) -> Floats:
         return values

@@ -28,10 +28,13 @@ class OwnKind(Kind):
     def __init__(self, study: Study, point: str, ranges: dict[str, tuple[float, float]]) -> None:
         super().__init__(study.name, study, point, tuple(ranges))
         self.low, self.high = np.array([*ranges.values()], dtype=float).T
-        self.turns = self.mechanism.quantity(self.drive) == "angle"
-        if not self.turns:
-            run = study.motions["kinematics"].values[self.drive]
-            self.course = (float(run.min()), float(np.ptp(run)))
+        factor = study.units.angle_factor if self.mechanism.quantity(self.drive) == "angle" else 1.0
+        run = study.motions["kinematics"].values.get(self.drive, np.zeros(1)) * factor
+        begin, span = float(run.min()), float(np.ptp(run))
+        # Of a motion over less than a turn no more is used.
+        part = study.motions["kinematics"].followed and 0 < span < 2 * np.pi * (1 - 1e-9)
+        if part or self.mechanism.quantity(self.drive) != "angle":
+            self.turns, self.course = False, (begin, span)
 
     @property
     def pivots(self) -> tuple[tuple[int, int], ...]:
@@ -129,7 +132,7 @@ def own_kind(study: Study, section: SynthesisSection) -> OwnKind:
     kind = OwnKind(own, point, section.ranges)
     if not kind.turns and (section.needs_turn or section.path.timing is not None or not kind.course[1] > 0):
         raise wrong(
-            f"{drives[0]} of {section.of} slides: it passes open paths without timing, over the range that its "
-            "kinematics sweeps", "path",
+            f"{drives[0]} of {section.of} does not turn fully: it passes open paths without timing, over the range "
+            "that its kinematics sweeps", "path",
         )  # fmt: skip
     return kind

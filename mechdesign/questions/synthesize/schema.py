@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
@@ -282,6 +283,11 @@ class SynthesisSection(fields.Model):
         return Limits.model_construct(
             **dict.fromkeys(("reach", "ratio"), np.inf) | self.limits.model_dump(exclude_unset=True)
         )
+
+    def least_sine(self, factor: float) -> float:
+        """Sine of the transmission angle that is asked over a turn, `factor` radians being its unit; else 0."""
+        asked = self.transmission if self.needs_turn else None
+        return 0.0 if asked is None else math.sin(asked.at_least * factor)
 
     @property
     def needs_turn(self) -> bool:

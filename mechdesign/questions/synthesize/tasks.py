@@ -264,8 +264,10 @@ class PathTask(_Task):
     def _fits(self, kind: Kind, modes: tuple[int, ...], random: np.random.Generator) -> paths.Fits:
         """Linkages of a kind in an assembly, from samples of it."""
         section = self.section
-        limits = section, self.centre, self.size, self.factor
-        bound = RangeBounds(kind, *limits) if isinstance(kind, OwnKind) else KindBounds(kind, *limits)
+        if isinstance(kind, OwnKind):
+            bound: KindBounds = RangeBounds(kind, turning=section.needs_turn, least=section.least_sine(self.factor))
+        else:
+            bound = KindBounds(kind, section, self.centre, self.size, self.factor)
         ratio = min(section.bounds.ratio, _SAMPLED) if bound.in_place else section.bounds.ratio
         count = section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         samples = kind.samples(random, count, ratio, full_turn=section.needs_turn)
