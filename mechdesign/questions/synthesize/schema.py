@@ -167,7 +167,9 @@ class JudgeSection(fields.Model):
     clearances: dict[str, Clearance] = Field(default_factory=dict)
     """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: {radial: 0.02}}"""
     within: Annotated[float, fields.number(None, 0.0, exclusive=True)] | None = None
-    """Largest error of a made linkage at a point of the task. Example: 0.5 mm"""
+    """By how much a made linkage may deviate from the drawn one, at the positions and over a full turn; of a path the
+    distance of its point. How far the drawn one is from the task is its ``max_error``. Example: 0.5 mm
+    """
     loads: tuple[Load, ...] = ()
     """Forces and moments under which the peak effort of the drive is told, as ``dynamics.loads`` takes them. Example:
     [{at: P, force: [0, -20 N]}]
@@ -182,7 +184,7 @@ class JudgeSection(fields.Model):
         if self.within is not None and not deviates:
             yield "what deviates? give 'tolerance', 'dimensions' or 'clearances'"
         if self.within is None and (deviates or not self.loads):
-            yield "a yield needs 'within', the largest error of a made linkage, such as 0.5 mm"
+            yield "a yield needs 'within', by how much a made linkage may deviate, such as 0.5 mm"
 
 
 Rank = Annotated[str, fields.choice(_RANKS, "order of solutions")]
