@@ -113,7 +113,8 @@ class Goal:
             return Scored(judged.values, None)
         if chosen.table.name == "targets" and chosen.column == "rms" and "motion" in result.tables:
             outputs = {str(name) for name in chosen.table["output"][chosen.counts]}
-            if len(outputs) == 1:
+            # A curve has errors at its points, and none at poses.
+            if len(outputs) == 1 and all(f"{name}_error" in result.tables["motion"] for name in outputs):
                 return Scored(judged.values, _errors(result, outputs.pop(), judged.values), squares=True)
         values, counts = chosen.shaped(designs, assembled=self.unassembled)
         if not designs or np.ptp(counts.sum(axis=1)):

@@ -94,6 +94,7 @@ class Designs:
             study.with_sections(**sections),
             requirements=tuple(requirement.with_numbers(number) for requirement in study.requirements),
             targets={owner: _retabled(target, number) for owner, target in study.targets.items()},
+            curves={owner: _retabled(target, number) for owner, target in study.curves.items()},
             resolved=resolved,
             mechanism=Variant(study.mechanism, replace(description, places={**description.places, **new})),
             parameters=replace(

@@ -82,6 +82,7 @@ class Study:
     requirements: tuple[Requirement, ...]  #: in the order of the file
     fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
     targets: Mapping[str, Target]  # by the coordinate or point
+    curves: Mapping[str, Target]  # by the point whose path shall pass them at whatever time
     kinds: Mapping[KeyPath, str]  # kinds of quantities of entries outside the geometry, and of the entries below them
     fixed: frozenset[str]  # parameters used in whole numbers, which are the same for every design
     folder: Folder  #: folder of the files that it names, with their contents when it was loaded

@@ -177,7 +177,8 @@ def load_document(
         requirements=parts["requirements"],
         fail_on=parts["fail_on"],
         strict=False,
-        targets=parts["targets"],
+        targets={owner: target for owner, target in parts["targets"].items() if target.closed is None},
+        curves={owner: target for owner, target in parts["targets"].items() if target.closed is not None},
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
         folder=source.folder,
@@ -321,12 +322,12 @@ def _check_poses(study: Study, reporter: Reporter) -> None:
                     "the path's point does not move: it has no direction; give two different places",
                     at_key=True,
                 )
-        if command == "kinematics" and study.targets:
+        if command == "kinematics" and (study.targets or study.curves):
             try:
                 assumed = study.motions[command]
             except StudyError:
                 continue
-            targets.check_poses(study.targets, study.mechanism, assumed, reporter)
+            targets.check_poses({**study.targets, **study.curves}, study.mechanism, assumed, reporter)
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:

@@ -231,7 +231,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return None
     text, document = study.text.decode("utf-8-sig"), read(study.text, "")
     written = document.data
-    target = {key: value for key, value in data.items() if key in written}
+    target = {key: value for key, value in data.items() if key in written or key not in study.resolved}
     # The loader fills in all units; the text may name only some.
     if "units" in written:
         target["units"] = written["units"]
@@ -246,6 +246,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
             return None
         between = ", " if inside_flow else "\n" + " " * (name.column - 1)
         edits.append((name.start, value.end, between.join(in_one_line(*entry) for entry in entries.items())))
+    edits += _additions(text, document, written, target)
     now = dict(leaves(written))
     for keys, new in leaves(target):
         if keys in now and new != now[keys]:
@@ -273,15 +274,47 @@ def _replaced(old: Any, new: Any, keys: KeyPath) -> Iterator[tuple[KeyPath, dict
             yield from _replaced(old[key], new[key], (*keys, key))
 
 
+def _additions(text: str, document: Document, old: Any, new: Any, keys: KeyPath = ()) -> Iterator[tuple[int, int, str]]:
+    """The edits that add keys, where none is missing, and entries at the end of lists, each in lines of its own."""
+    entries: list[Any] = []
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        more = {key: value for key, value in new.items() if key not in old} if old.keys() <= new.keys() else {}
+        entries = [{key: value} for key, value in more.items()]
+        for key in old.keys() & new.keys():
+            yield from _additions(text, document, old[key], new[key], (*keys, key))
+    elif isinstance(old, list) and isinstance(new, list):
+        entries = [[value] for value in new[len(old) :]]
+        for k, (one, other) in enumerate(zip(old, new, strict=False)):
+            yield from _additions(text, document, one, other, (*keys, k))
+    else:
+        return
+    if not entries or not old:
+        return
+    first = (*keys, next(iter(old)) if isinstance(old, Mapping) else 0)
+    if keys and text[document.values[keys].start] in "{[":
+        end = document.values[keys].start + len(text[document.values[keys].start : document.values[keys].end].rstrip())
+        words = [yaml.safe_dump(one, default_flow_style=True, width=10**6).strip()[1:-1] for one in entries]
+        yield end - 1, end - 1, "".join(f", {word}" for word in words)
+        return
+    begin = document.values[first].start if isinstance(old, list) else document.keys[first].start
+    indent = begin - (text.rfind("\n", 0, begin) + 1) - 2 * isinstance(old, list)
+    at = text.find("\n", _last(text, document, keys))
+    lines = "".join(yaml.safe_dump(one, sort_keys=False, default_flow_style=None, width=100) for one in entries)
+    at = len(text.rstrip("\n")) if at < 0 or not keys else at
+    yield at, at, "".join(f"\n{' ' * indent}{line}" for line in lines.splitlines())
+
+
+def _last(text: str, document: Document, keys: KeyPath) -> int:
+    """Where the last value below a key ends."""
+    # A mapping in lines of its own ends where the next key begins; its last value ends before.
+    inside = (mark for path, mark in document.values.items() if path[: len(keys)] == keys)
+    return max(mark.start + len(text[mark.start : mark.end].rstrip()) for mark in inside
+               if "\n" not in text[mark.start : mark.end].rstrip() or text[mark.start] in "{[")  # fmt: skip
+
+
 def _removal(text: str, document: Document, keys: KeyPath) -> tuple[int, int, str]:
     """The edit that removes a key, with its lines or with the comma beside it."""
-    start, inside = (
-        document.keys[keys].start,
-        (mark for path, mark in document.values.items() if path[: len(keys)] == keys),
-    )
-    # A mapping in lines of its own ends where the next key begins; its last value ends before.
-    end = max(mark.start + len(text[mark.start : mark.end].rstrip()) for mark in inside
-              if "\n" not in text[mark.start : mark.end].rstrip() or text[mark.start] in "{[")  # fmt: skip
+    start, end = document.keys[keys].start, _last(text, document, keys)
     if text[document.values[keys[:-1]].start] != "{":
         return text.rfind("\n", 0, start) + 1, (text.find("\n", end) + 1) or len(text), ""
     before = text[:start].rstrip()

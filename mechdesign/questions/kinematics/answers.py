@@ -101,7 +101,7 @@ class Kinematics(KinematicQuestion, MotionQuestion):
             tables["extremes"] = extremes(values, along, outputs)
         if loops:
             tables["loops"] = loops_table(self, shapes, loops, along)
-        if self.study.targets and "targets" in names:
+        if (self.study.targets or self.study.curves) and "targets" in names:
             tables["targets"] = targets_table(values, along)
         return tables
 

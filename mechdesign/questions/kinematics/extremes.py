@@ -15,6 +15,7 @@ from mechdesign.motion.along import of_swept
 from mechdesign.motion.question import PoseValues
 from mechdesign.questions.kinematics.along import KinematicAlong, over
 from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
+from mechdesign.questions.kinematics.curves import distances
 from mechdesign.questions.kinematics.targets import error, judged
 
 # A row within this part of an extreme of the motion between the rows does not contradict it.
@@ -116,13 +117,14 @@ def _lacking(motion: PoseValues, along: KinematicAlong | None, outputs: Sequence
 def targets_table(motion: PoseValues, along: KinematicAlong | None) -> Table:
     """Mean and largest errors of each design over the motion, or over the valid poses that have a target.
 
-    `along` is the motion between the poses, None of listed poses and grids.
+    Those of a curve are the distances of its points from the motion. `along` is the motion between the poses, None of
+    listed poses and grids.
     """
     study, poses, valid = motion.question.study, motion.question.poses, motion.valid
     errors, sizes = judged(study), motion.question.sizes
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
     at = poses.abscissa
-    numbers = np.full((4, poses.designs, len(errors)), np.nan)
+    numbers = np.full((4, poses.designs, len(errors) + len(study.curves)), np.nan)
     for k, (output, quantity) in enumerate(errors.items()):
         name, column = error(output), motion.arrays[error(output)]
         counted = (valid & np.isfinite(column)).reshape(shape)
@@ -145,10 +147,17 @@ def targets_table(motion: PoseValues, along: KinematicAlong | None) -> Table:
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
         numbers[:3, :, k] = cleared(numbers[:3, :, k], STILL * sizes.get(quantity, 1.0))
         numbers[3, numbers[2, :, k] == 0, k] = np.nan
+    for k, curve in enumerate(study.curves.values(), len(errors)):
+        gaps, place = distances(motion, along, curve)
+        last, lane = gaps.argmax(axis=1), np.arange(len(gaps))
+        numbers[:, :, k] = (
+            np.sqrt((gaps**2).mean(axis=1)), gaps.mean(axis=1), gaps[lane, last], place[lane, last],
+        )  # fmt: skip
     rms, mean, largest, where = numbers.reshape(4, -1)
     words = of_swept(motion.question.motion, swept, "row (from 0)")
-    units = np.tile(np.array([*map(study.units.label, errors.values())], dtype=str), poses.designs)
-    outputs = np.tile(np.array([*errors], dtype=str), poses.designs)
+    quantities = [*errors.values(), *("length" for _ in study.curves)]
+    units = np.tile(np.array([*map(study.units.label, quantities)], dtype=str), poses.designs)
+    outputs = np.tile(np.array([*errors, *study.curves], dtype=str), poses.designs)
     columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)
     table = TARGETS.table(columns, **over(along, [*map(error, errors)]))
-    return replace(table, lacking=_lacking(motion, along, [*errors]))
+    return replace(table, lacking=_lacking(motion, along, [*errors, *study.curves]))

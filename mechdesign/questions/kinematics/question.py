@@ -69,7 +69,7 @@ class KinematicQuestion(MovedQuestion):
         outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
         listed = outputs if section.jacobian is None else expand_outputs(study, section.jacobian)
         shown = {output.name: output for output in outputs}
-        for target in study.targets.values():
+        for target in (*study.targets.values(), *study.curves.values()):
             shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
         targeted = targets.needed(study, poses)
         return cls(

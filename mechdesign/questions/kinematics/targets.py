@@ -60,7 +60,7 @@ def knots(study: Study, target: Target, poses: Poses) -> list[Corner]:
         return []
     turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 0.0
     values = Expression(drive, (("name", drive),))
-    return [Corner(values, tuple(np.unique(table[:, 0]).tolist()), turn) for table in _tables(target, poses)]
+    return [Corner(values, tuple(np.unique(table[:, 0]).tolist()), turn) for table in own_tables(target, poses)]
 
 
 def path(target: Target, poses: Poses) -> bool:
@@ -70,7 +70,7 @@ def path(target: Target, poses: Poses) -> bool:
 
 def owner(target: Target, poses: Poses, points: Complexes, line: Ints) -> Ints:
     """Corner or side of its path without timing that is nearest to each point, of the motion of a line."""
-    tables, owners = _tables(target, poses), np.zeros(len(points), dtype=np.intp)
+    tables, owners = own_tables(target, poses), np.zeros(len(points), dtype=np.intp)
     for k, table in enumerate(tables):
         some = np.flatnonzero((line == k) | (len(tables) == 1))
         owners[some] = nearest(points[some], table[:, 0] + 1j * table[:, 1])[1]
@@ -126,7 +126,7 @@ def _goals(
         return [np.asarray(target.expression.evaluate(env), dtype=float) + 0 * values[target.owner]]
     if between and _a_value_each(target, poses):
         return None
-    tables = _tables(target, poses)
+    tables = own_tables(target, poses)
     if len(tables) == 1:
         return _by_table(study, target, tables[0], poses, values, rows)
     design = rows // (poses.count // poses.designs)
@@ -138,7 +138,7 @@ def _goals(
     return list(goals)
 
 
-def _tables(target: Target, poses: Poses) -> Floats:
+def own_tables(target: Target, poses: Poses) -> Floats:
     """The target's table for each design, shape (designs, rows, columns); one where it follows no parameter."""
     assert target.table is not None
     if not target.rows or not poses.own.parameters:
@@ -195,7 +195,8 @@ def nearest(points: Complexes, corners: Complexes) -> tuple[Complexes, Ints]:
         some = points[first : first + step, None]
         parts = np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0)
         feet = begins + parts * spans
-        best = np.argmin(norm2(some - feet), axis=1)
+        # The sides beside a corner that is nowhere are nowhere.
+        best = np.argmin(np.nan_to_num(norm2(some - feet), nan=np.inf), axis=1)
         lanes = np.arange(len(feet))
         nearest_feet[first : first + step] = feet[lanes, best]
         part = parts[lanes, best]

@@ -26,6 +26,7 @@ from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize import pareto
 from mechdesign.questions.optimize import search as searching
+from mechdesign.questions.optimize.curves import near_curves
 from mechdesign.questions.optimize.explorer import Explorer
 from mechdesign.questions.optimize.files import design_files
 from mechdesign.questions.optimize.judge import DesignSet, Judge
@@ -130,7 +131,8 @@ def _ask(
     )
     if section.method == "search":
         use_all = section.evaluations is not None
-        ending = searching.search(explorer, signs, weights.tolist(), seed, use_all=use_all)
+        near = near_curves(study, judge.goals, judge.conditions, seed)
+        ending = searching.search(explorer, signs, weights.tolist(), seed, use_all=use_all, near=near)
         names = [[goal.name for goal, weight in zip(judge.goals, row, strict=True) if weight] for row in weights]
         objectives = [own[0] if len(own) == 1 else "a weighted sum" for own in names]
         return tuple(_doubts(ending, budget, objectives))

@@ -98,8 +98,9 @@ def allowance(dimensions: int, rows: int, *, alone: bool = False) -> int:
 
 
 def search(
-    explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], seed: int, *, use_all: bool = True
-) -> Ending:
+    explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], seed: int, *, use_all: bool = True,
+    near: Floats | None = None,
+) -> Ending:  # fmt: skip
     """Evaluate designs until the extremes of the goals and the best weighted sums are known, or evaluations used up.
 
     Parameters
@@ -111,12 +112,14 @@ def search(
     use_all : bool
         Whether all evaluations are used; else the search ends when several starts have found the same optimum for each
         row.
+    near : ndarray, shape (points, dimensions)
+        Points of the unit cube that every start visits.
     """
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
     visits: list[Ints] = []
     explorer.reserve = min(budget // 4, CHECK_EVALUATIONS * slope * len(rows))
-    _starts(explorer, signs, rows, rng, visits, use_all)
+    _starts(explorer, signs, rows, rng, visits, use_all, near)
     explorer.reserve = 0
     try:
         checked = _confirmed(explorer, [_weighted(explorer.points, signs, row) for row in rows], rng)
@@ -124,7 +127,7 @@ def search(
         checked = False
     size = len(explorer.points.u)
     if use_all:
-        _starts(explorer, signs, rows, rng, visits, use_all)
+        _starts(explorer, signs, rows, rng, visits, use_all, near)
     points = explorer.points
     objectives = [_weighted(points, signs, row) for row in rows]
     checked &= all(_reached(points, objective, visits) for objective in objectives)
@@ -138,7 +141,7 @@ def search(
 
 def _starts(
     explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], rng: np.random.Generator,
-    visits: list[Ints], use_all: bool,
+    visits: list[Ints], use_all: bool, near: Floats | None,
 ) -> None:  # fmt: skip
     """Start until each row's optimum is confirmed, or with `use_all` until evaluations, or designs, are used up.
 
@@ -150,7 +153,7 @@ def _starts(
         explorer.forget()
         left = explorer.left
         try:
-            _start(explorer, signs, open_, own, first=not visits)
+            _start(explorer, signs, open_, own, near, first=not visits)
             visits.append(explorer.visited)
         except Spent:
             # The evaluations left are too few for a start: they are random points of the last one.
@@ -166,13 +169,14 @@ def _starts(
 
 def _start(
     explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], rng: np.random.Generator,
-    *, first: bool,
+    near: Floats | None, *, first: bool,
 ) -> None:  # fmt: skip
     """One start; the first one also searches the extremes of several goals."""
     n, allowed = explorer.dimensions, explorer.left - explorer.reserve
     if allowed < SMALLEST_POPULATION:
         raise Spent
-    begin = explorer(sample(n, rng, SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE))
+    sampled = sample(n, rng, SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE)
+    begin = explorer(sampled if near is None else np.concatenate([sampled, near]))
     if first and len(signs) > 1 and allowed > 4 * len(signs) * DESCENT_EVALUATIONS * (2 * n + 1):
         _extremes(explorer, signs, rng, allowed)
     for row in rows:

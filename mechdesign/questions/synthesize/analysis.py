@@ -16,7 +16,7 @@ from mechdesign.ground.results import Drawn, Result, Table
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.synthesize.columns import CENTRE_POINTS, SOLUTIONS
 from mechdesign.questions.synthesize.curves import centre_points
-from mechdesign.questions.synthesize.files import judged, study_data, study_text
+from mechdesign.questions.synthesize.files import judged, study_data, study_files
 from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
 from mechdesign.questions.synthesize.tasks import BodyTask, Task, task_of
 from mechdesign.questions.synthesize.words import linkage
@@ -74,12 +74,12 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
             for number, solution in enumerate(solutions, 1)]  # fmt: skip
     table = solutions_table(study, task, solutions, scores)
     errors = np.array([rounded(solution.error, task.size) for solution in solutions]) / task.error_factor
-    files = {}
+    files: dict[str, str] = {}
     for row, made in enumerate(data):
         name = f"solution_{row + 1}.yaml"
         heading = [f"Solution {row + 1} of {study.name}: {', '.join(linkage(table, row, float(errors[row])))}",
                    f"Its report: mechdesign run {name} --report"]  # fmt: skip
-        files[name] = study_text(made, heading)
+        files |= study_files(name, solutions[row].kind, made, heading)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(solutions)}
     output, _ = task.targets(solutions[0])
     drawn = DrawnSolutions(tuple(data), study.folder, output, task.points, task.directions, errors)
@@ -112,7 +112,7 @@ def _none(
     message = f"{words}; the nearest is in nearest.yaml: {missed}"
     data = study_data(study, task, solution, f"{study.name}, nearest")
     table = solutions_table(study, task, [solution], [np.nan])
-    files = {"nearest.yaml": study_text(data, [f"Nearest to {study.name}: {missed}"])}
+    files = study_files("nearest.yaml", solution.kind, data, [f"Nearest to {study.name}: {missed}"])
     tables = {table.name: table, **curve_tables(study, task)}
     return AssemblyError(message, Result("synthesize", tables, failed=message, files=files))
 
@@ -138,14 +138,11 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
     if judge is not None and judge.loads:
         columns += SOLUTIONS.columns(labels, peak_effort=made[3])
     columns += SOLUTIONS.columns({}, score=np.array(scores))
-    places = {
-        place: declared.quantity for one in solutions
-        for place, declared in one.kind.mechanism.description.places.items() if place not in task.apart
-    }  # fmt: skip
-    for place, quantity in places.items():
-        values = np.array([one.values[one.kind[place]] if place in one.kind.places else np.nan for one in solutions])
-        values = values / task.factor if quantity == "angle" else values
-        columns.append(SOLUTIONS["<dimension>"].column(values, labels[quantity], dimension=place))
+    kinds = {place: one.kind for one in solutions for place in one.kind.places if place not in task.apart}
+    written = [dict(zip(one.kind.places, one.kind.written(one.values, task.factor), strict=True)) for one in solutions]
+    for place, kind in kinds.items():
+        values = np.array([own.get(place, np.nan) for own in written])
+        columns.append(SOLUTIONS["<dimension>"].column(values, kind.unit_of(place, study.units), dimension=place))
     return SOLUTIONS.table(columns)
 
 

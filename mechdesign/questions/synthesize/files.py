@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -11,13 +10,14 @@ import numpy as np
 
 from mechdesign.ground.errors import printable
 from mechdesign.questions.look import ask
-from mechdesign.questions.synthesize.declared import DRIVE, POINT
+from mechdesign.questions.synthesize.kinds import Kind
+from mechdesign.questions.synthesize.own import OwnKind
 from mechdesign.questions.synthesize.solutions import Judged, Solution
 from mechdesign.questions.synthesize.tasks import Task
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
 from mechdesign.study.schema.variable import plainly
-from mechdesign.study.variants import in_one_line
+from mechdesign.study.variants import changed_data, in_one_line, rewritten
 
 # A requirement allows this part more than the largest error, and this part of the task's size.
 _SLACK, _ROUNDING = 1e-3, 1e-7
@@ -30,28 +30,31 @@ _WIDTH = 120
 def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[str, Any]:
     """The study of a solution as data: its mechanism, the task as targets of its path, its errors as a requirement."""
     factor, kind, judge = study.units.angle_factor, solution.kind, task.section.judge
-    mechanism: dict[str, Any] = copy.deepcopy(dict(kind.data))
-    places = kind.mechanism.description.places
-    for (place, declared), value in zip(places.items(), solution.values.tolist(), strict=True):
-        _put(mechanism, place, plainly(value / factor if declared.quantity == "angle" else value))
+    data = changed_data(kind.study, kind.shown(solution.values, factor))
+    mechanism, places = data["mechanism"], kind.mechanism.description.places
     first = solution.poses.take((0, 0))
-    mechanism["sketch"] = {point: _plain(complex(first.point(point))) for point in mechanism["sketch"]}
+    sketch = mechanism.get("sketch", {})
+    mechanism["sketch"] = {point: _plain(complex(np.asarray(first.point(point)))) for point in sketch}
     output, targets = task.targets(solution)
     angles, again = solution.angles, []
     if solution.full_turn and task.closed:
         # A closed path ends where it begins, a turn later.
         turn = 2 * np.pi if angles[-1] > angles[0] else -2 * np.pi
         angles, again = np.append(angles, angles[0] + turn), [0]
-    mechanism["targets"] = {name: _plain([*rows, *(rows[k] for k in again)]) for name, rows in targets.items()}
+    path = {kind.drive: _plain((angles / factor).tolist())}
+    kinematics: dict[str, Any] = {"path": path, "outputs": [*targets]}
+    result = f"{output}_error"
+    targets = {name: _plain([*rows, *(rows[k] for k in again)]) for name, rows in targets.items()}
+    if isinstance(kind, OwnKind) and task.free:
+        # The motion of the study passes them, at whatever time.
+        kinematics, result = kind.kinematics, f"targets.{output}.max_abs"
+        targets = {output: {"curve": _plain(task.points.tolist()), "closed": task.closed}}
+    mechanism["targets"] = {**mechanism.get("targets", {}), **targets}
     most = max(float(solution.errors.max()) * (1 + _SLACK), _ROUNDING * task.size) / task.error_factor
-    data: dict[str, Any] = {
-        "name": name,
-        "units": study.resolved["units"],
-        "seed": study.seed,
-        "mechanism": mechanism,
-        "kinematics": {"path": {DRIVE: _plain((angles / factor).tolist())}, "outputs": [*targets]},
-        "requirements": [{"result": f"kinematics.{output}_error", "at_most": float(f"{most:.4g}"), "abs": True}],
-    }
+    requirement = {"result": f"kinematics.{result}", "at_most": float(f"{most:.4g}"), "abs": True}
+    head = {"name": name, "units": study.resolved["units"], "seed": study.seed}
+    requirements = [*data.get("requirements", []), requirement]
+    data = head | data | head | {"kinematics": kinematics, "requirements": requirements}
     if judge is not None and judge.loads:
         data["dynamics"] = {"loads": study.resolved["synthesis"]["judge"]["loads"]}
     if judge is None or judge.within is None:
@@ -65,27 +68,15 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
         lengths = [place for place, declared in places.items()
                    if declared.quantity == "length" and place not in task.apart]  # fmt: skip
         tolerances = dict.fromkeys(lengths, float(judge.tolerance)) | tolerances
-    limit = {POINT: {"radius": float(judge.within)}} if output == POINT else {output: float(judge.within)}
+    limit = {output: {"radius": float(judge.within)} if output == kind.point else float(judge.within)}
+    path = {kind.drive: _plain(np.unique(around / factor).tolist())}
     data["reliability"] = {
-        "dimensions": tolerances, "path": {DRIVE: _plain(np.unique(around / factor).tolist())}, "outputs": [output],
-        "limits": limit, "methods": ["monte_carlo"], "samples": judge.samples, "sobol": 0,
+        "dimensions": tolerances, "path": path, "outputs": [output], "limits": limit, "methods": ["monte_carlo"],
+        "samples": judge.samples, "sobol": 0,
     }  # fmt: skip
     if judge.clearances:
         data["reliability"]["clearances"] = judged["clearances"]
     return data
-
-
-def _put(mechanism: dict[str, Any], place: str, value: float) -> None:
-    """Write a dimension into the data of a mechanism by the name of its place."""
-    owner, *rest = place.split(".")
-    entry = mechanism["links"].get(owner) or mechanism.get("joints", {}).get(owner)
-    if rest == ["length"] and isinstance(entry, list):
-        entry[2] = value
-    elif len(rest) == 1:
-        entry[rest[0]] = value
-    else:
-        points = entry.get("points", entry)
-        points[rest[0]]["xy".index(rest[1])] = value
 
 
 def _plain(value: Any) -> Any:
@@ -95,10 +86,16 @@ def _plain(value: Any) -> Any:
     return [*map(_plain, value)] if isinstance(value, list) else plainly(value)
 
 
-def study_text(data: Mapping[str, Any], heading: Sequence[str]) -> str:
-    """A study of a solution as the text of a file, under comments: what fits into a line stands in one."""
+def study_files(file: str, kind: Kind, data: dict[str, Any], heading: Sequence[str]) -> dict[str, str]:
+    """A study of a solution as the text of a file, under comments: what fits into a line stands in one.
+
+    Of a study's own mechanism the text is the study's, with the files that it reads.
+    """
+    if isinstance(kind, OwnKind):
+        text, beside = rewritten(kind.study, data, ". ".join(heading))
+        return {file: text, **beside}
     comments = [f"# {line}" for text in heading for line in textwrap.wrap(printable(text), _WIDTH - 2)]
-    return "\n".join([*comments, *_lines(data), ""])
+    return {file: "\n".join([*comments, *_lines(data), ""])}
 
 
 def _lines(data: Mapping[str, Any], indent: str = "") -> Iterator[str]:
@@ -136,6 +133,6 @@ def judged(study: Study, data: Mapping[str, Any]) -> Judged:
         answer = Judged(*(float(rows[name][0]) for name in ("reliability", "low", "high")))
     if made.dynamics is not None:
         table = ask(made, "dynamics").tables["extremes"]
-        rows = table.take(table.where(output=f"{DRIVE}_effort"))
+        rows = table.take(table.where(output=f"{made.mechanism.drives[0]}_effort"))
         answer = answer._replace(effort=float(max(np.abs([rows["min"][0], rows["max"][0]]))))
     return answer

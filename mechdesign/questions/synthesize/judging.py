@@ -114,8 +114,13 @@ def passed(
 ) -> Way:  # fmt: skip
     """The way of linkages through a task in an assembly; `branch` tells which need another one at some position."""
     unwound, disorder = in_order(angles)
+    if not kind.turns:
+        steps = np.sign(np.diff(angles, axis=1))
+        unwound, disorder = angles, np.abs(steps.sum(axis=1)) < steps.shape[1]
     begin, end = unwound.min(axis=1), unwound.max(axis=1)
-    whole_dead, whole_worst = along(kind, modes, values, begin, begin + _TURN)
+    whole_dead, whole_worst = np.ones(len(values), dtype=bool), np.zeros(len(values))
+    if kind.turns:
+        whole_dead, whole_worst = along(kind, modes, values, begin, begin + _TURN)
     rest = np.flatnonzero(whole_dead)
     dead, worst = whole_dead.copy(), whole_worst.copy()
     if not full_turn and len(rest):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
 from mechdesign.questions.reliability.schema.clearances import Clearance
@@ -88,7 +90,7 @@ class PathTask(fields.Model):
     timing: fields.Numbers | None = None
     """Crank angle at each point, from that at the first. Left out: free. Example: [0, 20, 40, 60]"""
     point: fields.PointName | None = None
-    """With ``of``, the point that passes them; left out: the only output of its kinematics. Example: P"""
+    """With ``of``, the point that passes them; left out: the only one among its kinematics' outputs. Example: P"""
 
 
 class Region(fields.Model):
@@ -165,7 +167,9 @@ class JudgeSection(fields.Model):
     clearances: dict[str, Clearance] = Field(default_factory=dict)
     """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: {radial: 0.02}}"""
     within: Annotated[float, fields.number(None, 0.0, exclusive=True)] | None = None
-    """Largest error of a made linkage at a point of the task. Example: 0.5 mm"""
+    """By how much a made linkage may deviate from the drawn one, at the positions and over a full turn; of a path the
+    distance of its point. How far the drawn one is from the task is its ``max_error``. Example: 0.5 mm
+    """
     loads: tuple[Load, ...] = ()
     """Forces and moments under which the peak effort of the drive is told, as ``dynamics.loads`` takes them. Example:
     [{at: P, force: [0, -20 N]}]
@@ -180,7 +184,7 @@ class JudgeSection(fields.Model):
         if self.within is not None and not deviates:
             yield "what deviates? give 'tolerance', 'dimensions' or 'clearances'"
         if self.within is None and (deviates or not self.loads):
-            yield "a yield needs 'within', the largest error of a made linkage, such as 0.5 mm"
+            yield "a yield needs 'within', by how much a made linkage may deviate, such as 0.5 mm"
 
 
 Rank = Annotated[str, fields.choice(_RANKS, "order of solutions")]
@@ -214,9 +218,11 @@ class SynthesisSection(fields.Model):
     )
     """Of a function, what its output is: the angle of a four-bar's rocker, or the place of a slider."""
     of: str | None = None
-    """In place of ``kinds`` a study whose mechanism of one drive is varied. Example: linkage.yaml"""
+    """In place of ``kinds`` a study whose mechanism of one drive is varied, in the assembly of its sketch. Example:
+    linkage.yaml
+    """
     ranges: dict[str, Range] = Field(default_factory=dict)
-    """With ``of``, the ranges of its parameters. Example: {a: [10, 40], b: [60, 120]}"""
+    """With ``of``, the ranges of its parameters, or of single dimensions. Example: {a: [10, 40], b: [60, 120]}"""
     frame: fields.PositiveLength | None = None
     """Of a function, the distance between the two pivots of a four-bar. Left out: 1. Example: 100"""
     zeros: Annotated[str, fields.choice(_ZEROS, "zeros of a function")] = "fixed"
@@ -234,7 +240,9 @@ class SynthesisSection(fields.Model):
     lengths: dict[str, Range] = Field(default_factory=dict)
     """Ranges of lengths by the names of the links, ``ground`` the frame's. Example: {crank: [20, 60]}"""
     limits: Limits = Limits()
-    """Bounds that hold without being written; both may be raised."""
+    """Bounds that hold without being written; both may be raised. With ``of`` its ranges are the bounds, and of these
+    only what is written holds.
+    """
     grashof: bool = False
     """Whether the shortest link of a four-bar must be able to turn fully."""
     full_turn: bool | None = None
@@ -270,6 +278,20 @@ class SynthesisSection(fields.Model):
         return starting(raw if isinstance(raw, Mapping) else {})
 
     @property
+    def bounds(self) -> Limits:
+        """The limits that hold."""
+        if self.of is None:
+            return self.limits
+        return Limits.model_construct(
+            **dict.fromkeys(("reach", "ratio"), np.inf) | self.limits.model_dump(exclude_unset=True)
+        )
+
+    def least_sine(self, factor: float) -> float:
+        """Sine of the transmission angle that is asked over a turn, `factor` radians being its unit; else 0."""
+        asked = self.transmission if self.needs_turn else None
+        return 0.0 if asked is None else math.sin(asked.at_least * factor)
+
+    @property
     def needs_turn(self) -> bool:
         """Whether the drive must turn fully."""
         closed = self.path is not None and self.path.closed
@@ -303,6 +325,11 @@ class SynthesisSection(fields.Model):
         for key, task in (("zeros", "function"), ("output_kind", "function"), ("slide", "body")):
             if key in self.model_fields_set and task != self.kind_of_task:
                 yield f"{key.removeprefix('output_')!r} is of a {task}"
+        if self.path is not None and self.path.closed and self.full_turn is False:
+            yield (
+                "between its toggles a drive passes the same way forth and back: a closed path needs one that turns "
+                "fully; leave out 'full_turn', or 'closed'"
+            )
         if self.of is not None and (self.kinds or not self.ranges):
             yield "'of' takes the 'ranges' of parameters, and no 'kinds'"
         if self.ranges and self.of is None:

@@ -101,11 +101,9 @@ class Solution:
     def variant(self) -> Variant:
         """Its mechanism."""
         description = self.kind.mechanism.description
-        places = {
-            name: replace(place, nominal=float(value))
-            for (name, place), value in zip(description.places.items(), self.values, strict=True)
-        }
-        return Variant(self.kind.mechanism, replace(description, places=places))
+        places = {name: replace(description.places[name], nominal=float(value))
+                  for name, value in self.kind.dimensions(self.values).items()}  # fmt: skip
+        return Variant(self.kind.mechanism, replace(description, places={**description.places, **places}))
 
     @property
     def grashof(self) -> str:
@@ -118,7 +116,7 @@ class Conditions:
 
     def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
         self.section, self.centre, self.size, self.factor = section, centre, size, factor
-        reach = section.limits.reach * size
+        reach = section.bounds.reach * size
         #: where the frame has room for pivots, and the body for pins
         self.sites = Site.of(section.pivots, centre, reach, factor), Site.of(section.pins, 0j, reach, factor)
         self.dropped: Counter[tuple[str, str]] = Counter()  #: by what was dropped, and why
@@ -184,7 +182,7 @@ class Conditions:
         frame, section = self.sites[0], self.section
         yield (
             "a pivot is too far away (limits.reach)",
-            (np.abs(pivots - self.centre).max(axis=1) <= section.limits.reach * self.size),
+            (np.abs(pivots - self.centre).max(axis=1) <= section.bounds.reach * self.size),
         )
         if section.pivots is not None and not few:
             yield "a pivot is out of place (pivots)", _in_place(frame, pivots)
@@ -201,14 +199,14 @@ class Conditions:
 
     def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
         section, links = self.section, kind.links(values)
-        yield from self._of_pivots(np.stack([values[:, x] + 1j * values[:, y] for x, y in kind.pivots], axis=1))
+        yield from self._of_pivots(kind.frame(values))
         if section.pins is not None:
             x, y = (np.stack([values[:, kind[f"{BODY}.{pin}.{way}"]] for pin in "AB"], axis=1) for way in "xy")
             yield from self._of_pins(x + 1j * y)
         lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
         with np.errstate(all="ignore"):
             ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
-        yield "lengths are too unequal (limits.ratio)", ratio <= section.limits.ratio
+        yield "lengths are too unequal (limits.ratio)", ratio <= section.bounds.ratio
         for name, (low, high) in section.lengths.items():
             if name in links:
                 good = (links[name] >= low) & (links[name] <= high)

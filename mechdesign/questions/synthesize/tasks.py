@@ -9,21 +9,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
+from mechdesign.questions.synthesize.bounds import KindBounds, RangeBounds
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
-from mechdesign.questions.synthesize.judging import in_order, passed, sines
+from mechdesign.questions.synthesize.judging import in_order, passed
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
-from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.own import OwnKind, own_kind
+from mechdesign.questions.synthesize.schema import SynthesisSection
 from mechdesign.questions.synthesize.sites import Site
 from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
 from mechdesign.study import Study
 from mechdesign.study.text.csv_files import read_table
 
-# Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
-_AROUND, _AT_ONCE = 32, 1000
 # Greatest ratio of lengths of samples between given pivots.
 _SAMPLED = 30.0
 # Of more points than this fewer linkages are polished, down to so few; of more points than the last only
@@ -51,6 +51,11 @@ class _Task:
     def closed(self) -> bool:
         """Whether its positions end where they begin."""
         return self.section.path is not None and self.section.path.closed
+
+    @property
+    def free(self) -> bool:
+        """Whether its positions are passed at whatever time."""
+        return self.section.path is not None and self.section.path.timing is None
 
     @property
     def directions(self) -> Complexes:
@@ -146,7 +151,7 @@ class FunctionTask(_Task):
         back = np.exp(-1j * self.inputs)
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
-        reach = self.section.limits.reach * self.size
+        reach = self.section.bounds.reach * self.size
         free, axis = Site(0j, reach), Site(0j, reach, ends=((-np.inf, np.inf), (0.0, 0.0)))
         fixed = self.section.zeros == "fixed"
         found, words = body.choices(seen, axis if fixed else free, axis if fixed and not self.slides else free, random)
@@ -182,7 +187,7 @@ class FunctionTask(_Task):
         """The linkages with these couplers; the crank stands at the input plus the angle of its pin."""
         kind = kind_of("function", self.section.output_kind)
         values = np.tile(kind.nominal, (len(links), 1))
-        numbers = {
+        numbers: dict[str, Any] = {
             "ground.O.x": 0.0,
             "ground.O.y": 0.0,
             "crank.length": np.abs(links.pivot),
@@ -215,6 +220,7 @@ class PathTask(_Task):
 
     path: paths.Points
     given: int  # points that the task has, of which the path may have every second, third and so on
+    kinds: Sequence[Kind]
 
     @property
     def centre(self) -> complex:
@@ -233,34 +239,42 @@ class PathTask(_Task):
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and where it should be at each position."""
-        return POINT, {POINT: self.path.points.tolist()}
+        return solution.kind.point, {solution.kind.point: self.path.points.tolist()}
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
-        section, count = self.section, self.section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         if len(self.path.points) < self.given:
             conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
-        for name in section.kinds or (FOUR_BAR,):
-            kind = kind_of("path", name)
-            bound, exact = Bound(kind, self), []
+        for kind in self.kinds:
+            exact = []
             for modes in kind.modes:
-                ratio = min(section.limits.ratio, _SAMPLED) if bound.in_place else section.limits.ratio
-                samples = paths.samples(kind, random, count, ratio, full_turn=section.needs_turn)
-                if bound.in_place:
-                    samples = bound.placed(samples)
-                most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
-                fits = paths.fits(kind, modes, self.path, samples, bound, most)
+                fits = self._fits(kind, modes, random)
                 exact.append(_exact(fits, self.size))
                 if not len(fits.costs):
                     continue
                 rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
                 values, angles = fits.values[rows], fits.angles[rows]
                 gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
-                yield Pool(passed(kind, modes, values, angles, full_turn=section.needs_turn), gaps)
+                yield Pool(passed(kind, modes, values, angles, full_turn=self.section.needs_turn), gaps)
             if len(self.path.points) <= paths.MOST_EXACT:
                 whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
                 conditions.told.append(f"{whole} exact, the last new one at start {last} of {starts}" if whole else
                                        f"none exact of {starts} starts")  # fmt: skip
+
+    def _fits(self, kind: Kind, modes: tuple[int, ...], random: np.random.Generator) -> paths.Fits:
+        """Linkages of a kind in an assembly, from samples of it."""
+        section = self.section
+        if isinstance(kind, OwnKind):
+            bound: KindBounds = RangeBounds(kind, turning=section.needs_turn, least=section.least_sine(self.factor))
+        else:
+            bound = KindBounds(kind, section, self.centre, self.size, self.factor)
+        ratio = min(section.bounds.ratio, _SAMPLED) if bound.in_place else section.bounds.ratio
+        count = section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
+        samples = kind.samples(random, count, ratio, full_turn=section.needs_turn)
+        if bound.in_place:
+            samples = bound.placed(samples)
+        most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
+        return paths.fits(kind, modes, self.path, samples, bound, most)
 
 
 Task = BodyTask | FunctionTask | PathTask
@@ -276,86 +290,6 @@ def _exact(fits: paths.Fits, size: float) -> tuple[int, int, int]:
             kept.append(values)
             last = int(fits.starts[row]) + 1
     return len(kept), last, int(fits.starts.max(initial=-1)) + 1
-
-
-class Bound:
-    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can."""
-
-    def __init__(self, kind: Kind, task: PathTask) -> None:
-        self.kind, self.task = kind, task
-        section = task.section
-        self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
-        self.ends = {
-            kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
-        }
-        self.ground = section.lengths.get("ground", (0.0, np.inf))
-        pivots = section.pivots
-        self.given = None if pivots is None or isinstance(pivots, Region) else np.array([complex(*p) for p in pivots])
-        self.box = pivots if isinstance(pivots, Region) and pivots.through is None else None
-        self.fixed = np.zeros(len(kind.places), dtype=bool)
-        self.in_place = self.given is not None and len(self.given) >= len(kind.pivots)
-        if self.in_place:
-            self.fixed[[column for pair in kind.pivots for column in pair]] = True
-
-    def placed(self, values: Floats) -> Floats:
-        """Linkages turned, scaled and shifted to the first two of the given pivots."""
-        assert self.given is not None
-        first, second = (values[:, self.kind[f"ground.{name}.x"]] + 1j * values[:, self.kind[f"ground.{name}.y"]]
-                         for name in "OD")  # fmt: skip
-        turned = (self.given[1] - self.given[0]) / (second - first)
-        return self(self.kind.moved(values, turned, self.given[0] - turned * first))
-
-    def __call__(self, values: Floats) -> Floats:
-        values, limits = values.copy(), self.task.section.limits
-        for x, y in self.kind.pivots:
-            place = values[:, x] + 1j * values[:, y]
-            if self.fixed.any():
-                assert self.given is not None
-                # In the order of the points: D before O in the columns, O first as given.
-                place = np.full(len(values), self.given[self._order(x)])
-            away = place - self.task.centre
-            far = np.maximum(np.abs(away) / (limits.reach * self.task.size), 1.0)
-            place = self.task.centre + away / far
-            if self.box is not None:
-                place = np.clip(place.real, *_ends(self.box.x)) + 1j * np.clip(place.imag, *_ends(self.box.y))
-            values[:, x], values[:, y] = place.real, place.imag
-        # The shortest gives way to the ratio; a negative length is one to the other side.
-        own = np.abs(values[:, self.links])
-        values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
-        for column, (low, high) in self.ends.items():
-            values[:, column] = np.clip(values[:, column], low, high)
-        if not self.in_place and self.links:
-            # The frame keeps the ratio by its second pivot.
-            (x, y), (u, v) = ((self.kind[f"ground.{name}.x"], self.kind[f"ground.{name}.y"]) for name in "OD")
-            own, frame = values[:, self.links], values[:, u] - values[:, x] + 1j * (values[:, v] - values[:, y])
-            length = np.maximum(np.abs(frame), np.finfo(float).tiny)
-            low, high = self.ground
-            least = np.maximum(own.max(axis=1) / limits.ratio, low)
-            moved = frame * np.clip(length, least, np.minimum(own.min(axis=1) * limits.ratio, high)) / length
-            values[:, u], values[:, v] = values[:, x] + moved.real, values[:, y] + moved.imag
-        return values
-
-    def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
-        """Which linkages have the transmission angle that is asked for over a turn of the crank."""
-        least = self.task.section.transmission
-        if least is None or not self.task.section.needs_turn:
-            return np.ones(len(values), dtype=bool)
-        good = np.zeros(len(values), dtype=bool)
-        turn = 2 * np.pi * np.arange(_AROUND)[None] / _AROUND
-        for first in range(0, len(values), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            poses = self.kind.solve(values[some], turn, modes)
-            good[some] = sines(self.kind, poses).min(axis=1) >= np.sin(float(least.at_least) * self.task.factor)
-        return good
-
-    def _order(self, column: int) -> int:
-        names = sorted(self.kind.places[x].split(".")[1] for x, _ in self.kind.pivots)
-        names.sort(key="ODF".index)
-        return names.index(self.kind.places[column].split(".")[1])
-
-
-def _ends(ends: Any) -> tuple[float, float]:
-    return ends if isinstance(ends, tuple) else (-np.inf, np.inf) if ends is None else (ends, ends)
 
 
 def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
@@ -391,9 +325,6 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
         inputs = factor * np.array(section.function.input, dtype=float)
         return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
     assert section.path is not None
-    if section.of is not None:
-        message = "linkages of a study's own mechanism are not looked for; give 'kinds', or ask optimize"
-        raise StudyError([study.problem(message, "synthesis", "of")])
     points = section.path.points
     table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
     if table.shape[1] != 2 or len(table) < 2:
@@ -410,4 +341,7 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
     if not path.size > 0:
         raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
-    return PathTask(section, factor, path, given)
+    kinds = (
+        [own_kind(study, section)] if section.of else [kind_of("path", name) for name in section.kinds or (FOUR_BAR,)]
+    )
+    return PathTask(section, factor, path, given, kinds)

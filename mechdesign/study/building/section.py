@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BeforeValidator, Field
 
@@ -36,7 +36,10 @@ _BRANCHES = {
     "side": "in every pose each joint lies on the side on which the sketch has it",
     "follow": "a sweep goes on smoothly through change points, where the sides meet",
 }
-TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
+TARGET_FORMS = (
+    "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y], or {curve: [[x, y], "
+    "...], closed: true}"
+)
 
 
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
@@ -56,14 +59,31 @@ def _named_limits(raw: Any) -> Any:
 # Most links of a mechanism; to solve it takes time in proportion to their square.
 MAX_LINKS = 1000
 
-WrittenTarget = Expression | tuple[tuple[float, ...], ...] | str
-"""A target as it was written: an expression (a number is one without names), rows, or the name of a file."""
+
+class WrittenCurve(NamedTuple):
+    """Points that the path of a point shall pass at whatever time, or the name of a file; and whether it is closed."""
+
+    points: tuple[tuple[float, ...], ...] | str
+    closed: bool
+
+
+WrittenTarget = Expression | tuple[tuple[float, ...], ...] | str | WrittenCurve
+"""A target as it was written: an expression (a number is one without names), rows, the name of a file, or a curve."""
 
 
 def _target(raw: Any, context: Context) -> WrittenTarget:
     file = file_of(raw)
     if file is not None and (raw is file or len(raw) == 1):
         return file
+    if isinstance(raw, dict) and "curve" in raw and not raw.keys() - {"curve", "closed"}:
+        points, closed = file_of(raw["curve"]) or raw["curve"], raw.get("closed", False)
+        if not isinstance(closed, bool):
+            raise failure(f"closed: expected true or false, not {shown(closed)}")
+        if not isinstance(points, str):
+            if not isinstance(points, list) or not all(isinstance(row, list) for row in points):
+                raise failure(f"curve: expected {{file: path.csv}} or a list of [x, y], not {shown(points)}")
+            points = read_rows(points, context, 2, "every row is [x, y]", "curve: an empty list: no target")
+        return WrittenCurve(points, closed)
     if raw is None or isinstance(raw, dict):
         raise failure(f"expected {TARGET_FORMS}, not {shown(raw)}")
     if isinstance(raw, list):
@@ -137,8 +157,9 @@ class MechanismSection(fields.Model):
     """
     targets: dict[fields.CoordinateName, TargetValue] = Field(default_factory=dict)
     """What coordinates, measures or points should be; kinematics then reports their errors. An expression; a file;
-    numbers, one a pose; rows [drive, value]; of a point rows [x, y] or [drive, x, y]. Example: {rocker.angle: 67 +
-    0.6*(crank - 40)} Example: {C: {file: path.csv}}
+    numbers, one a pose; rows [drive, value]; of a point rows [x, y] or [drive, x, y], or a curve that it shall pass
+    at whatever time. Example: {rocker.angle: 67 + 0.6*(crank - 40)} Example: {C: {file: path.csv}} Example: {P:
+    {curve: [[55, 60], [45, 75], [25, 75]], closed: true}}
     """
 
     # The properties below hold even if other parts of the section are wrong.

@@ -13,7 +13,7 @@ from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import Mechanism
 from mechdesign.motion.rows import Poses
-from mechdesign.study.building.section import WrittenTarget
+from mechdesign.study.building.section import WrittenCurve, WrittenTarget
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
@@ -28,7 +28,8 @@ class Target:
     """What an output should be: a function of coordinates, or a table.
 
     A table has as many columns as coordinates: one row a pose, or of a point a path without timing, a polyline. With
-    one more the first is the drive's value, rising, between which the others are interpolated linearly.
+    one more the first is the drive's value, rising, between which the others are interpolated linearly. A curve is the
+    other way round: a table of points, from which the motion of a point is judged, not the point from its path.
     """
 
     owner: str  # a coordinate or a measure, or a point whose path it is
@@ -36,6 +37,7 @@ class Target:
     expression: Expression | None = None  # over coordinates and parameters, in the study's units
     table: Floats | None = None  # in the study's units, shape (rows, columns)
     rows: Sequence[Sequence[float]] = ()  # the numbers of the table, if some follow parameters
+    closed: bool | None = None  # of points that the whole path of a point shall pass at any time: whether it is closed
 
     @property
     def timed(self) -> bool:
@@ -62,7 +64,14 @@ def check(checker: Checker, written: Mapping[str, WrittenTarget]) -> dict[str, T
             checker.report(path, f"{name} has a target already, by {owners[name]!r}", at_key=True)
         owners.update(dict.fromkeys(coordinates, owner))
         quantity = "length" if point else checker.mechanism.coordinates[owner]
-        if not isinstance(value, Expression):
+        if isinstance(value, WrittenCurve):
+            table = _table(checker, owner, value.points, path, 2, "length") if point else None
+            if not point or (table is not None and table.shape[1] != 2):
+                checker.report(path, "a curve is of a point, a row [x, y] each")
+            elif table is not None:
+                moved = value.points if any(own_numbers(value.points)) and not isinstance(value.points, str) else ()
+                targets[owner] = Target(owner, coordinates, table=table, rows=moved, closed=value.closed)
+        elif not isinstance(value, Expression):
             table = _table(checker, owner, value, path, len(coordinates), quantity)
             if table is not None:
                 moved = () if isinstance(value, str) or not any(own_numbers(value)) else value
@@ -127,6 +136,11 @@ def check_poses(targets: Mapping[str, Target], mechanism: Mechanism, poses: Pose
     """Check that targets and the poses of kinematics fit each other."""
     for owner, target in targets.items():
         if target.table is None:
+            continue
+        if target.closed is not None:
+            if not poses.followed:
+                sweep = f"sweep: {{{mechanism.drives[0]}: {{from: 0, to: 360}}}}"
+                reporter.report((*ROOT, owner), f"a curve is passed by a motion; give kinematics one, such as {sweep}")
             continue
         rows = len(target.table)
         drive = timing(mechanism.drives, poses)

@@ -90,8 +90,11 @@ def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[Ke
     owners = [("mechanism", "targets"), *((command, key) for command in commands for key in ("path", "motion"))]
     for section, key in owners:
         for name, raw in ((data.get(section) or {}).get(key) or {}).items():
+            keys: KeyPath = (section, key, name)
+            if key == "targets" and isinstance(raw, Mapping) and "curve" in raw:
+                keys, raw = (*keys, "curve"), raw["curve"]
             if (file := file_of(raw)) is not None:
-                yield (section, key, name, "file") if isinstance(raw, Mapping) else (section, key, name), file
+                yield (*keys, "file") if isinstance(raw, Mapping) else keys, file
     for name, raw in ((data.get("mechanism") or {}).get("couplings") or {}).items():
         if isinstance(raw, Mapping) and (file := file_of(raw.get("table"))) is not None:
             yield ("mechanism", "couplings", name, "table"), file

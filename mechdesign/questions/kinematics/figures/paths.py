@@ -76,14 +76,17 @@ def paths_panel(sweep: Sweep, more: Sequence[PanelMark] = (), before: Before | N
     The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some. A study before it
     lies under it in grey dashes.
     """
-    goals = [
-        target.table[:, -2] + 1j * target.table[:, -1]
-        for target in sweep.study.targets.values()
-        if target.table is not None and len(target.coordinates) == 2
-    ]
+    targets = (*sweep.study.targets.values(), *sweep.study.curves.values())
     dotted = {"marker": "o", "color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (1, 2.5)), "markersize": 3,
               "zorder": 3.7}  # fmt: skip
-    marks: list[PanelMark] = [Trace(path.real, path.imag, look=dotted) for path in goals]
+    marks: list[PanelMark] = []
+    goals = []
+    for target in targets:
+        if target.table is not None and len(target.coordinates) == 2:
+            goals.append(target.table[:, -2] + 1j * target.table[:, -1])
+            # Between the points of a curve nothing is asked.
+            look = dotted if target.closed is None else dotted | {"linestyle": "none", "markersize": 4.5}
+            marks.append(Trace(goals[-1].real, goals[-1].imag, look=look))
     count = len(sweep.mechanism.description.links) - 1
     _, ghosts = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
