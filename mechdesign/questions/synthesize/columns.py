@@ -29,7 +29,7 @@ KEY_NUMBERS = (
     KeyNumber(SOLUTIONS, "peak_effort", "its peak effort", "first"),
 )  # fmt: skip
 # Columns that come first on a terminal.
-FIRST = ("solution", "kind", "error", "transmission_angle", "yield", "yield_low", "yield_high", "peak_effort", "defects",
-         "class", "size")  # fmt: skip
+FIRST = ("solution", "kind", "error", "transmission_angle", "yield", "yield_low", "yield_high", "peak_effort",
+         "defects", "class", "size")  # fmt: skip
 # Studies that it writes.
 STUDIES = "solution_*.yaml nearest.yaml"
