@@ -520,7 +520,8 @@ def test_linkages_of_a_synthesis_move_side_by_side_and_a_click_enlarges_one(open
     page, table = opened("five_positions", plays=True), answers["five_positions"][1].tables["solutions"]
     tiles, picture = page.locator(".moving-grid button"), page.locator(".moving-beside svg")
     expect(tiles).to_have_count(len(table))
-    assert "error 0 mm" in tiles.first.inner_text() and "branch" in tiles.nth(3).inner_text()
+    assert "error 0 mm" in tiles.first.inner_text()
+    assert "branch" in tiles.nth(3).inner_text()
 
     def pin(drawing):
         transform = drawing.locator("[data-at=A]:has(circle)").first.get_attribute("transform")

@@ -61,7 +61,9 @@ def test_a_file_of_a_solution_says_what_it_is_and_has_short_lists_in_lines(close
     lines = closed.files["solution_1.yaml"].splitlines()
     assert lines[0].startswith("# Solution 1 of study: four-bar (")
     comments = " ".join(line.removeprefix("# ") for line in lines if line.startswith("#"))
-    assert "error 0 mm, transmission angle" in comments and "peak effort" in comments and "no defect" in comments
+    assert "error 0 mm, transmission angle" in comments
+    assert "peak effort" in comments
+    assert "no defect" in comments
     assert "mechdesign run solution_1.yaml --report" in comments
     assert f"  targets: {{P: {[*POINTS, POINTS[0]]}}}" in lines
     assert max(map(len, lines)) <= 120
@@ -105,7 +107,8 @@ def test_the_report_of_a_task_has_no_mechanism_of_its_own(tmp_path: Path) -> Non
     ask("run", "-", "--report", "--no-plots", "--out", tmp_path, study=FIVE)
     page = (tmp_path / "report.html").read_text()
     assert "a body through 5 positions exactly" in page
-    assert "Driven by" not in page and 'id="mechanism"' not in page
+    assert "Driven by" not in page
+    assert 'id="mechanism"' not in page
     manifest = json.loads((tmp_path / "synthesize" / "manifest.json").read_text())
     assert "mechanism" not in manifest["study"]["resolved"]
 
