@@ -113,6 +113,25 @@ def test_the_report_of_a_task_has_no_mechanism_of_its_own(tmp_path: Path) -> Non
     assert "mechanism" not in manifest["study"]["resolved"]
 
 
+@pytest.mark.slow
+def test_a_sweep_over_a_number_of_the_task_finds_what_each_task_has() -> None:
+    text = f"""{FIVE}
+matrix: {{vary: {{synthesis.body.4.y: [-2, 0]}}, results: [synthesize.solutions.transmission_angle.max]}}
+"""
+    cases = mechdesign.sweep(mechdesign.load(text=text)).main["synthesize.solutions.transmission_angle.max"]
+    alone = [mechdesign.synthesize(mechdesign.load(text=FIVE.replace("y: -2", f"y: {y}"))).main for y in (-2, 0)]
+    assert cases == pytest.approx([table["transmission_angle"].max() for table in alone], rel=1e-9)
+    assert cases[0] - cases[1] > 0.5
+
+
+def test_a_task_may_follow_parameters() -> None:
+    text = "mechanism: {parameters: {h: 21}}" + FIVE.replace("y: 21", "y: h")
+    study = mechdesign.load(text=text, overrides=["mechanism.parameters.h=20"])
+    assert study.is_task
+    alone = mechdesign.synthesize(mechdesign.load(text=FIVE.replace("y: 21", "y: 20")))
+    assert mechdesign.synthesize(study).main["crank.length"] == pytest.approx(alone.main["crank.length"], rel=1e-9)
+
+
 def test_check_tells_the_task_and_a_question_about_a_mechanism_is_refused() -> None:
     lines = checked(FIVE)
     assert lines[1] == "task: a body through 5 positions exactly: x 0 to 89 mm, y -2 to 21 mm, angle 0 to 75 deg"
