@@ -87,8 +87,8 @@ class Designs:
             return Amount(float(amount.expression.evaluate(parameters)), amount.text, amount.expression)
 
         sections: dict[str, Any] = {
-            name: section.with_numbers(number)
-            for name in COMMANDS if isinstance(section := study.sections.get(name), Model)
+            command.key: section.with_numbers(number)
+            for command in COMMANDS.values() if isinstance(section := study.sections.get(command.key), Model)
         }  # fmt: skip
         return replace(
             study.with_sections(**sections),

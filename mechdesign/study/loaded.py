@@ -126,7 +126,7 @@ class Study:
     @property
     def is_task(self) -> bool:
         """Whether it has a task and no mechanism: what it computes with is the kind with which a synthesis begins."""
-        return "mechanism" not in self.resolved
+        return not (self.resolved.get("mechanism") or {}).keys() - {"parameters"}
 
     def need_mechanism(self, who: str) -> None:
         """Refuse what asks about a mechanism where the study has none.

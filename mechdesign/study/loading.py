@@ -199,9 +199,9 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 
 
 def _begun(data: dict[str, Any], reporter: Reporter) -> dict[str, Any]:
-    """Give a study that has a task and no mechanism the one with which a synthesis begins."""
-    task = SECTIONS["synthesis"]
-    if data.get(task.key) is None or data.get("mechanism") is not None:
+    """Give a study that has a task and no mechanism but parameters the one with which a synthesis begins."""
+    task, written = SECTIONS["synthesis"], data.get("mechanism") or {}
+    if data.get(task.key) is None or not isinstance(written, dict) or written.keys() - {"parameters"}:
         return data
     for key in _ASKED:
         if key != task.key and key in data:
@@ -209,7 +209,7 @@ def _begun(data: dict[str, Any], reporter: Reporter) -> dict[str, Any]:
                 f"asks about a mechanism, and this study has only a task; the studies that {task.name} writes have one"
             )
             reporter.report((key,), words, at_key=True)
-    return data | {"mechanism": plain(task.model.starting(data[task.key]))}
+    return data | {"mechanism": {**plain(task.model.starting(data[task.key])), **written}}
 
 
 def context_of(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:

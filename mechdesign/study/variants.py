@@ -68,7 +68,7 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
     document = Document.of(data)
     override(document, texts)
     if parameters:
-        data["mechanism"].setdefault("parameters", {}).update(parameters)
+        data.setdefault("mechanism", {}).setdefault("parameters", {}).update(parameters)
     original = study.mechanism if same_sketch(data, study.resolved) else None
     return load_document(document, study.source, (*study.overrides, *texts), original=original)
 

@@ -27,6 +27,7 @@ from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.stiffness.analysis import stiffness
+from mechdesign.questions.synthesize.analysis import synthesize
 from mechdesign.questions.workspace.analysis import workspace
 
 try:
@@ -52,7 +53,7 @@ def answers():
         ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
         ("gallery/straight_line_front", optimize, "optimize.evaluations=200"),
         ("gallery/offset_slider_crank", sweep, *FEW_CASES), ("best_case", sweep, LONGEST, "requirements=[]"),
-        ("gallery/twin_cylinder", dynamics, "dynamics.sweep.crank.step=30"),
+        ("gallery/twin_cylinder", dynamics, "dynamics.sweep.crank.step=30"), ("gallery/five_positions", synthesize),
     ):  # fmt: skip
         study = load(CONFIGS / f"{STUDIES.get(name, name)}.yaml", overrides)
         found[Path(name).name] = study, command(study)
@@ -513,6 +514,41 @@ def test_a_click_on_a_front_shows_that_linkage_moving(opened, answers):
     page.get_by_role("button", name="Play").click()
     expect(slider).not_to_have_value(slider.input_value())
     page.get_by_role("button", name="Pause").click()
+
+
+def test_linkages_of_a_synthesis_move_side_by_side_and_a_click_enlarges_one(opened, answers):
+    page, table = opened("five_positions", plays=True), answers["five_positions"][1].tables["solutions"]
+    tiles, picture = page.locator(".moving-grid button"), page.locator(".moving-beside svg")
+    expect(tiles).to_have_count(len(table))
+    assert "error 0 mm" in tiles.first.inner_text()
+    assert "branch" in tiles.nth(3).inner_text()
+
+    def pin(drawing):
+        transform = drawing.locator("[data-at=A]:has(circle)").first.get_attribute("transform")
+        return complex(*map(float, re.match(r"translate\((\S+) (\S+)\)", transform).groups()))
+
+    before = [pin(tiles.nth(k)) for k in range(len(table))]
+    page.wait_for_timeout(400)
+    assert all(abs(pin(tiles.nth(k)) - before[k]) > PIXELS for k in range(2))
+    page.get_by_role("button", name="Pause").click()
+    data = json.loads(page.locator(".moving script").text_content())["choices"]
+
+    def look(k):
+        assert words(page).startswith(f"solution {k + 1}, four-bar")
+        assert tiles.nth(k).get_attribute("aria-pressed") == "true"
+        drawing = page.locator(".moving-drawing")
+        assert drawing.get_attribute("viewBox") == data[k]["view"]
+        pivot = complex(*(table[f"ground.O.{axis}"][k] for axis in "xy")) - complex(*data[k]["corner"])
+        crank = abs(pin(drawing) / data[k]["scale"] - pivot.conjugate())
+        assert crank == pytest.approx(table["crank.length"][k], abs=2 * PIXELS / data[k]["scale"])
+
+    look(0)
+    tiles.nth(2).click()
+    look(2)
+    (x, y), box = json.loads(page.locator(".moving script").text_content())["front"][0], picture.bounding_box()
+    scale = box["width"] / float(picture.get_attribute("viewBox").split()[2])
+    picture.click(position={"x": scale * x[1], "y": scale * y[1]})
+    look(1)
 
 
 def test_of_several_pictures_the_chosen_one_is_on_the_screen_and_all_are_on_paper(opened):

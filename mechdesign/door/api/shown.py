@@ -221,8 +221,9 @@ class Answer(Result):
             return Gallery()
         with style.context():
             drawn = figures(self.study, self, name=name)
-            if name in (None, MECHANISM):
-                drawn.add(MECHANISM, mechanism_picture, self.whose(self.study), self.seen)
+            whose = self.whose(self.study)
+            if name in (None, MECHANISM) and not whose.is_task:
+                drawn.add(MECHANISM, mechanism_picture, whose, self.seen)
         if why := lost_letters(str(self.study.resolved)):
             warnings.warn(why, stacklevel=2)
         return drawn

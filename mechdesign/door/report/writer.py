@@ -232,8 +232,10 @@ def pictures(
         drawings: dict[str, Drawing] = {
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
-        mechanism = f"{MECHANISM}.{formats[0]}"
-        drawings[mechanism] = partial(files, MECHANISM, lambda: draw(mechanism_picture(result.whose(study), result)))
+        whose = result.whose(study)
+        if not whose.is_task:
+            mechanism = partial(files, MECHANISM, lambda: draw(mechanism_picture(whose, result)))
+            drawings[f"{MECHANISM}.{formats[0]}"] = mechanism
         if output.animate:
             from mechdesign.questions.kinematics.drawn import DrawnMotion
             from mechdesign.questions.kinematics.figures.animation import animation

@@ -19,7 +19,7 @@ SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("size", "greatest extent of pivots and pins along x or y at the positions", "length"),
     ("yield", "share of made linkages that deviate from the drawn one by no more than the limit, at every position"),
     ("yield_low", "lower end of its interval"), ("yield_high", "upper end of its interval"),
-    ("peak_effort", "greatest effort of the drive on its way through the task under the loads of `judge`", "torque"),
+    ("peak_effort", "greatest effort of the drive on its way through the task under the loads of `judge`", "moment"),
     ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),
     ColumnKind("<dimension>", "dimension of the linkage by its name in its study", "as the dimension"))  # fmt: skip
 CENTRE_POINTS = TableKind.of("centre_points", "links that pass four positions, along the curve of their pivots as far "
@@ -34,5 +34,8 @@ KEY_NUMBERS = (
     KeyNumber(SOLUTIONS, "yield", "its yield", "first", bounds=("yield_low", "yield_high")),
     KeyNumber(SOLUTIONS, "peak_effort", "its peak effort", "first"),
 )  # fmt: skip
+# Columns that come first on a terminal.
+FIRST = ("solution", "kind", "error", "transmission_angle", "yield", "yield_low", "yield_high", "peak_effort",
+         "defects", "class", "size")  # fmt: skip
 # Studies that it writes.
 STUDIES = "solution_*.yaml nearest.yaml"

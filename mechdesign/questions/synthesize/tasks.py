@@ -13,7 +13,7 @@ from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.bounds import KindBounds, RangeBounds
-from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT
+from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT, in_words
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
 from mechdesign.questions.synthesize.judging import in_order, passed
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
@@ -258,8 +258,9 @@ class PathTask(_Task):
                 yield Pool(passed(kind, modes, values, angles, full_turn=self.section.needs_turn), gaps)
             if len(self.path.points) <= paths.MOST_EXACT:
                 whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
-                conditions.told.append(f"{whole} exact, the last new one at start {last} of {starts}" if whole else
-                                       f"none exact of {starts} starts")  # fmt: skip
+                words = f"{whole} exact, the last new one at start {last} of {starts}" if whole else \
+                    f"none exact of {starts} starts"  # fmt: skip
+                conditions.told.append(f"{in_words(kind.name)}: {words}")
 
     def _fits(self, kind: Kind, modes: tuple[int, ...], random: np.random.Generator) -> paths.Fits:
         """Linkages of a kind in an assembly, from samples of it."""

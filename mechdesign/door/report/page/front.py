@@ -22,7 +22,7 @@ from mechdesign.drawing.sweep import Sweep
 from mechdesign.family.stacked import grouped
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import MechdesignError
-from mechdesign.ground.numerics.arrays import Ints, evenly
+from mechdesign.ground.numerics.arrays import Complexes, Ints, evenly
 from mechdesign.ground.results import Table
 from mechdesign.motion.corners import curve_of
 from mechdesign.motion.finer import near_chords, ways_of
@@ -65,10 +65,10 @@ def front(drawn: DesignSet, table: Table, name: str) -> MovingPicture | None:
     if not sweeps:
         return None
     sheet = Canvas.around(np.concatenate([sweep.extent for sweep in sweeps.values()]))
-    fitting = _fitting(sheet, [(row, sweeps[row]) for row in order.tolist() if row in sweeps])
+    fits = fitting([(row, sheet, sweeps[row]) for row in order.tolist() if row in sweeps])
     # Along the first goal, as the front runs.
-    rows = np.array(sorted(fitting, key=lambda row: (table[drawn.goals[0].name][row], row)))
-    choices = [fitting[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
+    rows = np.array(sorted(fits, key=lambda row: (table[drawn.goals[0].name][row], row)))
+    choices = [fits[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
     knee = next((k for k, choice in enumerate(choices) if choice["mark"] == "knee"), 0)
     numbers, entries, fields = _numbers(drawn, table, rows, knee)
     figure = draw(front_picture(drawn, table))
@@ -79,16 +79,19 @@ def front(drawn: DesignSet, table: Table, name: str) -> MovingPicture | None:
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
     pace = f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
     data = {"poses": len(rows), "first": knee, "choices": choices, "given": fields, "keys": [fields],
-            "numbers": numbers.tracks, "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
+            "numbers": numbers.tracks, "front": points(figure, [
+                np.asarray(table[drawn.goals[a].name], dtype=float)[rows]
+                + 1j * np.asarray(table[drawn.goals[b].name], dtype=float)[rows] for a, b in pairs(drawn)
+            ]), "pace": pace}  # fmt: skip
     drawing = _drawing(sheet, sweeps[int(rows[knee])])
     return MovingPicture(drawing, beside, data, choices[knee]["title"], ["value"], entries, {}, ["pareto"])
 
 
-def _fitting(sheet: Canvas, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:
+def fitting(sweeps: Sequence[tuple[int, Canvas, Sweep]]) -> dict[int, dict[str, Any]]:
     """The first designs, by their rows, as the script draws them: as many as fit into the budget, and always one."""
     choices: dict[int, dict[str, Any]] = {}
     size, alike = 0, None
-    for row, sweep in sweeps:
+    for row, sheet, sweep in sweeps:
         choice, alike = _choice(sheet, sweep, alike)
         size += len(json_text(choice))
         if choices and size > BUDGET:
@@ -107,7 +110,7 @@ def _named(drawn: DesignSet, table: Table, row: int, mark: str) -> dict[str, Any
 def _drawing(sheet: Canvas, sweep: Sweep) -> str:
     """The drawing in which the script changes the design; the names of the points stay."""
     root = sheet.root("the mechanism of a design of the front")
-    _draw(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
+    chosen(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
     few = sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()
     scenes = sweep.scene.some(few)
     sketcher = Sketcher(root, sheet, scenes[0])
@@ -143,14 +146,14 @@ def _sweeps(drawn: DesignSet, table: Table, rows: Ints) -> Iterator[tuple[int, S
             own = np.array(members)
             designs = study_designs.Designs(study, {name: values[own] for name, values in numbers.items()})
             for some, made, poses in grouped(designs, "kinematics", np.arange(len(own)), _left_out):
-                yield from zip(own[some].tolist(), _moved(made, poses), strict=False)
+                yield from zip(own[some].tolist(), moved(made, poses), strict=False)
 
 
 def _left_out(rows: Ints, error: MechdesignError) -> None:
     """A design whose numbers make no study is not drawn."""
 
 
-def _moved(study: Study, poses: Poses) -> list[Sweep]:
+def moved(study: Study, poses: Poses) -> list[Sweep]:
     """Designs of one mechanism in their poses; along a motion these are near enough to draw its paths."""
     if not poses.followed:
         return []
@@ -172,7 +175,7 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
 def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[dict[str, Any], ShownNumbers]:
     """A design as the script draws it, and the numbers that say its poses; those of all have as many decimals."""
     layer = Element("g")
-    _draw(layer, sheet, sweep)
+    chosen(layer, sheet, sweep)
     study, poses = sweep.study, sweep.poses
     columns = [Column(name, np.asarray(values), study.units.label(study.mechanism.quantity(name)))
                for name, values in poses.values.items()]  # fmt: skip
@@ -186,7 +189,7 @@ def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[di
     } | places(sheet, sweep.configuration, sweep.mechanism.description.links), numbers  # fmt: skip
 
 
-def _draw(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
+def chosen(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     """A design in its first valid pose, and the paths of its points."""
     scene = sweep.first
     assert scene is not None
@@ -212,12 +215,11 @@ def _numbers(
     return numbers, entries, fields
 
 
-def _points(figure: Figure, drawn: DesignSet, table: Table, rows: Ints) -> list[list[list[float]]]:
-    """Where some designs of a front stand in each panel of its picture, x and y, in points from its upper left."""
+def points(figure: Figure, panels: Sequence[Complexes]) -> list[list[list[float]]]:
+    """Where designs, x + i y, stand in each panel of a picture, x and y, in points from its upper left."""
     wide, tall = (72 * inches for inches in figure.get_size_inches())
-    points = []
-    for axes, pair in zip(figure.axes, pairs(drawn), strict=True):
-        at = np.stack([np.asarray(table[drawn.goals[k].name], dtype=float)[rows] for k in pair], axis=1)
-        share = axes.transData.transform(at) / figure.bbox.size
-        points.append([np.round(wide * share[:, 0], 1).tolist(), np.round(tall * (1 - share[:, 1]), 1).tolist()])
-    return points
+    placed = []
+    for axes, at in zip(figure.axes, panels, strict=True):
+        share = axes.transData.transform(np.stack([at.real, at.imag], axis=1)) / figure.bbox.size
+        placed.append([np.round(wide * share[:, 0], 1).tolist(), np.round(tall * (1 - share[:, 1]), 1).tolist()])
+    return placed

@@ -122,6 +122,8 @@ def _best_case(drawn: DrawnCases, table: Table) -> tuple[str, Study, Result] | N
     if (best := best_of(table)) is None:
         return None
     study = drawn.case(best.case)
+    if study.is_task:
+        return None
     for ask in (kinematics, *([workspace] if study.workspace is not None else [])):
         # A study of poses without a motion, or of several drives, does not say how it moves.
         with suppress(MechdesignError):

@@ -12,6 +12,7 @@ from mechdesign.door.report.page.cases import gates, telling_rows
 from mechdesign.door.report.page.front import front
 from mechdesign.door.report.page.headlines import headlines
 from mechdesign.door.report.page.moving import moving
+from mechdesign.door.report.page.solutions import solutions
 from mechdesign.door.report.page.tracks import MovingPicture
 from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.door.report.tables import json_text, plain
@@ -22,6 +23,7 @@ from mechdesign.ground.errors import explain
 from mechdesign.ground.results import Result, Table
 from mechdesign.ground.table_text import readable
 from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.study import Study
 
 # Of tables with more rows than this only the first rows are shown.
@@ -85,6 +87,9 @@ def _moving(study: Study, result: Result, before: Before | None, marked: Sequenc
         # In the width of half a page the texts of the picture are large enough.
         with style.context("paper"):
             part = front(result.drawn.designs, result.tables["pareto"], f"{result.command}-front")
+    if isinstance(result.drawn, DrawnSolutions):
+        with style.context("paper"):
+            return solutions(study, result, f"{result.command}-trade")
     return part or moving(study, result, before, marked)
 
 

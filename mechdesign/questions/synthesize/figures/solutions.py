@@ -66,8 +66,7 @@ def _course(study: Study, point: str) -> tuple[Still, Complexes]:
     return first, path
 
 
-@picture(View, "trade", order=20)
-def trade_picture(view: View) -> Picture | None:
+def trade(view: View) -> Picture | None:
     """Error against the smallest transmission angle; the front is those that none surpasses in both."""
     table, errors = view.result.tables["solutions"], DrawnSolutions.of(view.result).errors
     angles, faulty = np.asarray(table["transmission_angle"]), np.asarray(table["defects"]) != ""
@@ -90,3 +89,6 @@ def trade_picture(view: View) -> Picture | None:
     across = Axis("smallest transmission angle, more is better", table.column("transmission_angle").unit)
     up = Axis("error, less is better", table.column("error").unit, ends=(0.0, None))
     return Picture("What error costs in transmission", [Panel(marks, across, up)])
+
+
+trade_picture = picture(View, "trade", order=20)(trade)

@@ -605,17 +605,32 @@
       html("option", {value: k, textContent: [number, mark].filter(Boolean).join(", ")})));
     for (const [x, y] of data.front) x.forEach((place, k) => data.choices[k].mark ||
       make("circle", {cx: place, cy: y[k], r: 2.6, fill: "#0072B2", stroke: "white", "stroke-width": 0.6}, picture));
+    // All side by side; a click on one shows it in the large drawing.
+    const grid = document.querySelector(`[data-grid="${figure.id}"]`);
+    const tiles = (grid ? data.choices : []).map((data, number) => {
+      const button = html("button", {type: "button"}), drawing = make("svg", {viewBox: data.view, fill: "none", "aria-hidden": "true",
+        "stroke-linecap": "round", "stroke-linejoin": "round"}, button);
+      drawing.innerHTML = data.drawing;
+      button.append(...data.words.map(words => html("span", {textContent: words})));
+      button.addEventListener("click", () => { choose(number); figure.scrollIntoView({block: "nearest"}); });
+      grid.append(button);
+      return {button, data, moved: linkage(drawing, data), times: decode(data.times, data.poses, TIMES)};
+    });
+    if (grid) grid.hidden = false;
     const rings = data.front.map(() => make("circle", {r: 8, fill: "none", stroke: "#222222", "stroke-width": 2,
       class: "moving-chosen"}, picture));
-    let k = -1, chosen, moved, times, tracks, share = 0, forward = 1;
+    let k = -1, chosen, moved, own, tracks, share = 0, forward = 1;
 
     // Shows a design where its motion is as far on as that of the one before.
     function choose(next) {
       k = next;
       chosen = data.choices[k];
       layer.innerHTML = chosen.drawing;
+      // Linkages of a synthesis have windows of their own.
+      if (chosen.view) drawing.setAttribute("viewBox", chosen.view);
+      tiles.forEach(({button}, other) => button.setAttribute("aria-pressed", other === k));
       moved = linkage(drawing, chosen);
-      times = decode(chosen.times, chosen.poses, TIMES);
+      own = decode(chosen.times, chosen.poses, TIMES);
       tracks = chosen.numbers.map(([decimals, steps]) => [decimals, decode(steps, chosen.poses, 10 ** decimals)]);
       layer.querySelectorAll(".moving-trace").forEach(trace => trace.classList.toggle("moving-off", !paths.checked));
       rings.forEach((ring, panel) => {
@@ -628,13 +643,13 @@
       show(place());
     }
 
-    const place = () => {
-      let low = 0, high = chosen.poses - 1;
+    const place = (at = share, {poses} = chosen, times = own) => {
+      let low = 0, high = poses - 1;
       while (high - low > 1) {
         const middle = (low + high) >> 1;
-        if (times[middle] <= share) low = middle; else high = middle;
+        if (times[middle] <= at) low = middle; else high = middle;
       }
-      return low + (share - times[low]) / (times[high] - times[low] || 1);
+      return low + (at - times[low]) / (times[high] - times[low] || 1);
     };
 
     function show(pose) {
@@ -644,22 +659,25 @@
       words.textContent = `${chosen.title}: ${at.join(", ")}${broken ? `: ${broken[2]}` : ""}`;
       slider.value = pose;
       slider.setAttribute("aria-valuetext", at.join(", "));
+      // What does not end where it begins goes back.
+      for (const {data, moved, times} of tiles)
+        moved.show(place(chosen.returns && !data.returns ? 1 - Math.abs(1 - 2 * share) : share, data, times));
     }
 
     slider.addEventListener("input", () => {
       player.stop();
       const at = Number(slider.value), low = Math.floor(at);
-      share = times[low] + (at - low) * ((times[low + 1] ?? times[low]) - times[low]);
+      share = own[low] + (at - low) * ((own[low + 1] ?? own[low]) - own[low]);
       show(at);
     });
     select.addEventListener("change", () => choose(Number(select.value)));
     paths.addEventListener("change", () => choose(k));
 
-    picture.classList.add("moving-map");
-    picture.setAttribute("tabindex", "0");
-    picture.setAttribute("role", "application");
-    picture.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys choose a design`);
-    follow(picture, false, (x, y) => {
+    picture?.classList.add("moving-map");
+    picture?.setAttribute("tabindex", "0");
+    picture?.setAttribute("role", "application");
+    picture?.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys choose a design`);
+    if (picture) follow(picture, false, (x, y) => {
       let best = 0, least = Infinity;
       for (const [xs, ys] of data.front) xs.forEach((place, index) => {
         const far = Math.hypot(place - x, ys[index] - y);
@@ -668,7 +686,7 @@
       if (best !== k) choose(best);
     });
     const keys = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1};
-    picture.addEventListener("keydown", event => {
+    picture?.addEventListener("keydown", event => {
       const next = event.key === "Home" ? data.first : k + keys[event.key];
       if (!(next >= 0 && next < data.choices.length)) return;
       words.setAttribute("aria-live", "polite");
@@ -684,7 +702,7 @@
       })));
       link.addEventListener("click", () => choose(far.indexOf(Math.min(...far))));
     }
-    controls.append(slider, player.button, html("label", {}, "Design", select), html("label", {}, paths, "Paths"),
+    controls.append(slider, player.button, html("label", {}, grid ? "Linkage" : "Design", select), html("label", {}, paths, "Paths"),
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
     choose(data.first);

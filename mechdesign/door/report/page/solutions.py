@@ -1,0 +1,90 @@
+"""The linkages of a synthesis moving side by side in a page; a click on one, or on what it trades, enlarges it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+
+from mechdesign.door.report.page.front import Entry, chosen, fitting, moved, points
+from mechdesign.door.report.page.linkage import Canvas, Sketcher, add
+from mechdesign.door.report.page.tracks import MovingPicture, ShownNumbers, meanings
+from mechdesign.door.report.page.vector import described, inline
+from mechdesign.drawing import style
+from mechdesign.drawing.layout import draw
+from mechdesign.drawing.pictures import View
+from mechdesign.ground.numerics.arrays import evenly
+from mechdesign.ground.results import Result, Table
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.synthesize.analysis import DrawnSolutions
+from mechdesign.questions.synthesize.figures.solutions import trade
+from mechdesign.questions.synthesize.words import linkage
+from mechdesign.study import Study
+
+# Length of the line that shows the angle of a position, in units of a drawing, and poses in which names keep off links.
+_AXIS, _NAMED_POSES = 24.0, 4
+
+
+def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
+    """The best linkages of a synthesis, each moving through the task; use inside `style.context`.
+
+    None where none of them moves. `name` begins the ids inside the picture of what they trade.
+    """
+    drawn, table = DrawnSolutions.of(result), result.tables["solutions"]
+    courses = ((row, moved(one, study_poses(one, "kinematics"))) for row, one in enumerate(drawn.studies))
+    sweeps = [(row, sweep) for row, course in courses for sweep in course if len(sweep.valid) > 1]
+    if not sweeps:
+        return None
+    placed = [(row, Canvas.around(np.concatenate([sweep.extent, drawn.places])), sweep) for row, sweep in sweeps]
+    choices: list[dict[str, Any]] = []
+    fits = fitting(placed)
+    for row, sheet, sweep in placed[: len(fits)]:
+        layer = Element("g")
+        _mark(layer, sheet, drawn)
+        sketcher = Sketcher(layer, sheet, sweep.scene.some(sweep.valid[:1].tolist())[0])
+        sketcher.names(sweep.scene.some(sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()), links=False)
+        sketcher.ruler(study.units.label("length"))
+        kind, *words = linkage(table, row, float(drawn.errors[row]))
+        choices.append(fits[row] | {
+            "drawing": fits[row]["drawing"] + "".join(tostring(part, encoding="unicode") for part in layer),
+            "view": f"0 0 {sheet.width:g} {sheet.height:.1f}", "title": f"solution {row + 1}, {kind}",
+            "number": row + 1, "mark": kind, "words": [f"{row + 1}: {kind}", *words],
+        })  # fmt: skip
+    rows = np.array([row for row, _, _ in placed[: len(choices)]])
+    numbers, entries, fields = _numbers(table, rows, study.size)
+    figure = trade(View(study, result))
+    data = {"poses": len(rows), "first": 0, "choices": choices, "given": fields, "keys": [fields],
+            "numbers": numbers.tracks, "grid": True, "front": [],
+            "pace": f"{len(rows)} of {len(table)} linkages are in this page: a click on one enlarges it."}  # fmt: skip
+    beside = ""
+    if figure is not None:
+        page = draw(figure)
+        beside = inline(page, name, described(page))
+        data["front"] = points(page, [table["transmission_angle"][rows] + 1j * drawn.errors[rows]])
+    _, sheet, sweep = placed[0]
+    root = sheet.root("a linkage that does the task")
+    chosen(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
+    return MovingPicture(tostring(root, encoding="unicode"), beside, data, choices[0]["title"], ["value"], entries,
+                         meanings(table), ["solutions", *(["trade"] if beside else [])])  # fmt: skip
+
+
+def _mark(layer: Element, sheet: Canvas, drawn: DrawnSolutions) -> None:
+    """The task: the places of its positions, and lines along the body there."""
+    for k, place in enumerate(drawn.places.tolist()):
+        at = sheet.at(place)
+        if len(drawn.directions):
+            end = at + _AXIS * complex(drawn.directions[k]).conjugate()
+            add(layer, "line", x1=at.real, y1=at.imag, x2=end.real, y2=end.imag, stroke=style.VERMILION, stroke_width=2)
+        add(layer, "circle", cx=at.real, cy=at.imag, r=4, fill=style.VERMILION)
+
+
+def _numbers(table: Table, rows: Any, size: tuple[float, str]) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
+    """The numbers of the linkages of a page: their tracks, a row each, and how the script names them."""
+    columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in table.columns
+               if column.numeric and column.name not in ("solution", "full_turn")]  # fmt: skip
+    numbers = ShownNumbers(Table(table.name, tuple(columns)), rows, 0, size)
+    entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
+    fields = [[name, numbers.units[name], which, power] for name, (which, _, power) in numbers.scaled.items()]
+    return numbers, entries, fields

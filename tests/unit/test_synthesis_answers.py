@@ -1,0 +1,158 @@
+"""What a synthesis shows: solutions as studies that move, pictures, words, and a task in place of a mechanism."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.command_line import ask, checked
+from helpers.syntheses import four_bar
+from matplotlib.text import Text
+
+import mechdesign
+
+FIVE = """
+synthesis:
+  body: [{x: 0, y: 0, angle: 0}, {x: 19, y: 13, angle: 20}, {x: 46, y: 21, angle: 45}, {x: 67, y: 18, angle: 65},
+         {x: 89, y: -2, angle: 75}]
+"""
+POINTS = [[55, 60], [45, 75], [25, 75], [10, 55], [15, 35], [40, 40]]
+CLOSED = f"synthesis: {{path: {{points: {POINTS}, closed: true}}, evaluations: 100, solutions: 3"
+
+
+@pytest.fixture(scope="module")
+def five() -> Any:
+    return mechdesign.synthesize(mechdesign.load(text=FIVE))
+
+
+@pytest.fixture(scope="module")
+def closed() -> Any:
+    """With a load of 20 N down at P."""
+    text = f"{CLOSED}, judge: {{best: 3, loads: [{{at: P, force: [0, -20 N]}}]}}}}"
+    return mechdesign.synthesize(mechdesign.load(text=text), seed=1)
+
+
+def p_of(row: dict[str, Any], theta: Any, side: float) -> Any:
+    """The point P of a four-bar in closed form; angles in degrees, O in the origin and the frame along x."""
+    o, d = (row[f"ground.{name}.x"] + 1j * row[f"ground.{name}.y"] for name in "OD")
+    turn = (d - o) / abs(d - o)
+    angles = np.asarray(theta) - np.degrees(np.angle(turn))
+    sizes = [[row[name]] for name in ("crank.length", "coupler.length", "rocker.length", "coupler.P.x", "coupler.P.y")]
+    return o + turn * four_bar(*sizes, angles, abs(d - o), side)[0][0]
+
+
+@pytest.mark.slow
+def test_a_solution_goes_through_its_points_and_a_closed_path_comes_back_a_turn_later(closed: Any) -> None:
+    row = next(iter(closed.main))
+    study = mechdesign.load(text=closed.files["solution_1.yaml"])
+    motion = mechdesign.kinematics(study).main
+    assert abs(motion["theta"][-1] - motion["theta"][0]) == pytest.approx(360)
+    ways = [p_of(row, motion["theta"], side) for side in (1, -1)]
+    wished = np.array([complex(*point) for point in [*POINTS, POINTS[0]]])
+    assert min(abs(way - wished).max() for way in ways) < 1e-6
+    assert len(study.targets["P"].table) == 7
+
+
+@pytest.mark.slow
+def test_a_file_of_a_solution_says_what_it_is_and_has_short_lists_in_lines(closed: Any) -> None:
+    lines = closed.files["solution_1.yaml"].splitlines()
+    assert lines[0].startswith("# Solution 1 of study: four-bar (")
+    comments = " ".join(line.removeprefix("# ") for line in lines if line.startswith("#"))
+    assert "error 0 mm, transmission angle" in comments
+    assert "peak effort" in comments
+    assert "no defect" in comments
+    assert "mechdesign run solution_1.yaml --report" in comments
+    assert f"  targets: {{P: {[*POINTS, POINTS[0]]}}}" in lines
+    assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.slow
+def test_the_peak_effort_of_a_linkage_is_that_of_virtual_work(closed: Any) -> None:
+    """The drive's power is that of the load: M = 20 N times the rise of P by the crank's angle."""
+    row = next(iter(closed.main))
+    theta = np.linspace(0, 360, 3601)
+    rises = [np.gradient(p_of(row, theta, side).imag, np.radians(theta))[1:-1] for side in (1, -1)]
+    assert any(20 * abs(rise).max() == pytest.approx(row["peak_effort"], rel=1e-4) for rise in rises)
+
+
+@pytest.mark.slow
+def test_all_linkages_are_shown_with_kind_error_transmission_angle_and_defects(five: Any) -> None:
+    figure = five.figure("solutions")
+    titles = [axes.get_title(loc="left") or axes.get_title() for axes in figure.axes]
+    titles += [text.get_text() for text in figure.findobj(Text)]  # type: ignore[arg-type]
+    shown = [title for title in dict.fromkeys(titles) if "transmission" in title]
+    assert len(figure.axes) == len(five.main) == len(shown) == 6
+    assert all("four-bar, error 0 mm" in title.replace("\n", " ") for title in shown)
+    assert sum("no defect" in title for title in shown) == 2
+    assert sum("branch" in title for title in shown) == 4
+
+
+@pytest.mark.slow
+def test_what_a_synthesis_says_stands_in_terminal_manifest_report_and_notebook(five: Any, tmp_path: Path) -> None:
+    words = ("best: four-bar", "4 real dyads of at most 4", "2 without a defect", "seed 7")
+    done = ask("synthesize", "-", "--seed", 7, "--report", "--no-plots", "--out", tmp_path, study=FIVE)
+    assert done.exit_code == 0, done.stderr
+    answer = mechdesign.synthesize(mechdesign.load(text=FIVE), seed=7)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    page = (tmp_path / "report.html").read_text()
+    for text in (done.stderr, "\n".join(manifest["notes"]), page, answer._repr_html_(), repr(answer)):
+        assert all(word in text for word in words)
+
+
+@pytest.mark.slow
+def test_the_report_of_a_task_has_no_mechanism_of_its_own(tmp_path: Path) -> None:
+    ask("run", "-", "--report", "--no-plots", "--out", tmp_path, study=FIVE)
+    page = (tmp_path / "report.html").read_text()
+    assert "a body through 5 positions exactly" in page
+    assert "Driven by" not in page
+    assert 'id="mechanism"' not in page
+    manifest = json.loads((tmp_path / "synthesize" / "manifest.json").read_text())
+    assert "mechanism" not in manifest["study"]["resolved"]
+
+
+@pytest.mark.slow
+def test_a_sweep_over_a_number_of_the_task_finds_what_each_task_has() -> None:
+    text = f"""{FIVE}
+matrix: {{vary: {{synthesis.body.4.y: [-2, 0]}}, results: [synthesize.solutions.transmission_angle.max]}}
+"""
+    cases = mechdesign.sweep(mechdesign.load(text=text)).main["synthesize.solutions.transmission_angle.max"]
+    alone = [mechdesign.synthesize(mechdesign.load(text=FIVE.replace("y: -2", f"y: {y}"))).main for y in (-2, 0)]
+    assert cases == pytest.approx([table["transmission_angle"].max() for table in alone], rel=1e-9)
+    assert cases[0] - cases[1] > 0.5
+
+
+def test_a_task_may_follow_parameters() -> None:
+    text = "mechanism: {parameters: {h: 21}}" + FIVE.replace("y: 21", "y: h")
+    study = mechdesign.load(text=text, overrides=["mechanism.parameters.h=20"])
+    assert study.is_task
+    alone = mechdesign.synthesize(mechdesign.load(text=FIVE.replace("y: 21", "y: 20")))
+    assert mechdesign.synthesize(study).main["crank.length"] == pytest.approx(alone.main["crank.length"], rel=1e-9)
+
+
+def test_check_tells_the_task_and_a_question_about_a_mechanism_is_refused() -> None:
+    lines = checked(FIVE)
+    assert lines[1] == "task: a body through 5 positions exactly: x 0 to 89 mm, y -2 to 21 mm, angle 0 to 75 deg"
+    assert not [line for line in lines if line.startswith(("links", "joint", "mobility"))]
+    study = mechdesign.load(text=FIVE)
+    assert "a task, no mechanism" in repr(study)
+    with pytest.raises(mechdesign.StudyError, match="this study has only a task"):
+        mechdesign.kinematics(study)
+    with pytest.raises(mechdesign.StudyError, match="kinematics: asks about a mechanism"):
+        mechdesign.load(text=FIVE + "kinematics: {outputs: [P]}")
+    assert ask("export", "-", "--to", "mechanism.dxf", "--out", "nowhere.dxf", study=FIVE).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("judge", "words"),
+    [
+        ("{within: 1}", "what deviates"),
+        ("{tolerance: 0.1}", "a yield needs 'within'"),
+        ("{loads: [{at: Q, force: [0, 1]}]}", "there is no point 'Q'"),
+    ],
+)
+def test_what_cannot_be_judged_is_said_before_anything_is_looked_for(judge: str, words: str) -> None:
+    with pytest.raises(mechdesign.StudyError, match=words):
+        mechdesign.load(text=f"{FIVE}  judge: {judge}")
