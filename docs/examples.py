@@ -52,7 +52,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
 _PYTHON = threading.Lock()
 _PICTURE = re.compile(r"(\w+)\.png")
 # How far a command is that takes long: on a busy machine another one does.
-_COURSE = re.compile(r": \d+ of \d+ \w+ after \d+ s\b")
+_COURSE = re.compile(r": \d+ of \d+ [\w ]+ after \d+ s\b")
 _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 

@@ -79,6 +79,7 @@ class KeyNumber:
     interval: str = "from {low} to {high}"
     several: str = ""  #: what the rows are, where the smallest of several stands beside the largest
     nearest: bool = False  #: of several such columns that with the most extreme number alone
+    at: str = ""  #: the column of the value of what is swept where it occurs
 
 
 class Strands(NamedTuple):

@@ -148,5 +148,6 @@ def _largest(columns: Sequence[Column]) -> tuple[dict[str, float], dict[str, flo
             if unit:
                 largest[unit] = max(largest.get(unit, 0.0), float(part.max(initial=0.0)))
             elif column.kind is None or not column.kind.tail:
-                pure[column.name] = float(part.max(initial=0.0))
+                # Ratios are made of what is of one size: an efficiency of 1e-15 is none.
+                pure[column.name] = float(part.max(initial=1.0))
     return largest, pure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -710,3 +711,57 @@ def test_without_script_and_in_print_it_is_a_still_drawing(opened):
     page.emulate_media(media="print")
     assert page.locator(".moving-controls").is_hidden()
     assert page.locator(".moving [data-at=B]:has(circle)").is_visible()
+
+
+def test_no_key_number_is_broken_between_two_lines(opened):
+    for width in (1400, 390):
+        page = opened("straight_line_front", width)
+        lines = page.evaluate("""() => [...document.querySelectorAll(".numbers .note")].flatMap(note => {
+            const walk = document.createTreeWalker(note, NodeFilter.SHOW_TEXT), lines = [];
+            for (let text; (text = walk.nextNode());) for (const value of text.data.matchAll(/=\\u00a0[^,;]+/g)) {
+                const range = document.createRange();
+                range.setStart(text, value.index); range.setEnd(text, value.index + value[0].trimEnd().length);
+                lines.push(new Set([...range.getClientRects()].map(box => Math.round(box.top))).size);
+            }
+            return lines;
+        })""")
+        assert len(lines) > 5
+        assert set(lines) == {1}
+
+
+def test_on_paper_letters_can_be_read(opened):
+    page = opened("four_bar", 703)  # pixels between the margins of A4
+    page.emulate_media(media="print")
+    points = page.evaluate("""() => [...document.querySelectorAll(".pictures svg")].filter(svg => svg.clientWidth)
+        .map(svg => 7.5 * svg.clientWidth / svg.viewBox.baseVal.width)""")
+    assert len(points) == 3
+    assert min(points) > 4.4
+
+
+def test_on_paper_nothing_of_the_mechanism_lies_over_another(browser, answers, tmp_path):
+    study, result = answers["offset_slider_crank"]
+    with style.context():
+        drawing = picture(figure_of(*answers["slider_crank"], "paths"), "mechanism", "mechanism")
+    part, _ = section(study, result, {}, drawing, (), plots=True)
+    (tmp_path / "page.html").write_bytes(
+        report(study, [AnsweredQuestion(result.command, "done", 0, section=part)], below=False)
+    )
+    page = browser.new_page(viewport={"width": 703, "height": 900})
+    page.goto((tmp_path / "page.html").as_uri())
+    page.emulate_media(media="print")
+    parts = page.locator("#mechanism .lists > *, #mechanism .picture, #mechanism table")
+    boxes = [part.bounding_box() for part in parts.all()]
+    assert len(boxes) > 3
+    (figure, *rest) = boxes
+    assert all(box["x"] + box["width"] <= figure["x"] for box in rest)
+    lists = page.locator("#mechanism .lists > *").all()
+    for upper, lower in itertools.pairwise(each.bounding_box() for each in lists):
+        assert upper["y"] + upper["height"] <= lower["y"] + 1
+    page.close()
+
+
+def test_on_a_phone_limit_and_what_is_reached_share_a_line(opened):
+    row = opened("slider_crank", 390).locator(".required tbody tr").first
+    limit, reached = (row.locator(f"[data-head={head}]").bounding_box() for head in ("limit", "reached"))
+    assert limit["y"] == reached["y"]
+    assert limit["x"] + limit["width"] < reached["x"]

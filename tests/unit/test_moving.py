@@ -15,7 +15,10 @@ import mechdesign
 from mechdesign import load
 from mechdesign.door.report.page.frames import frames
 from mechdesign.door.report.page.moving import moving
-from mechdesign.door.report.page.tracks import PLACES, ROWS, TURNS, joined
+from mechdesign.door.report.page.tracks import PLACES, ROWS, TURNS, ShownNumbers, joined
+from mechdesign.ground.columns import Column
+from mechdesign.ground.results import Table
+from mechdesign.ground.table_text import readable
 from mechdesign.questions.workspace.analysis import workspace
 
 
@@ -337,3 +340,19 @@ kinematics: {{motion: {{theta: [{cycle}]}}, outputs: [B]}}
         assert "in the study's motion" in page.data["pace"]
         # A motion too short to be watched is slowed down, and the page says so.
         assert page.data["seconds"] == seconds
+
+
+def test_numbers_at_a_pose_are_written_as_key_numbers_are() -> None:
+    # Unlike a part in ten thousand of a 1/mm^2, one in a thousand million has a power of ten; what is rounding is 0.
+    table = Table("local", [
+        Column("resistivity", np.array([1.449e-4, 2e-4]), "1/mm^2"), Column("tiny", np.array([1.449e-9, 2e-9]), "1/mm"),
+        Column("efficiency", np.array([6.7e-15, 2.5e-14]), ""),
+    ])  # fmt: skip
+    numbers = ShownNumbers(table, np.arange(2), 0, (0.0, ""))
+    cells = [numbers.cell(column) for column in table.columns]
+    assert [(cell.text, cell.unit) for cell in cells[:2]] == [
+        ("0.0001449", "1/mm\N{SUPERSCRIPT TWO}"),
+        ("1.449", "\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE} 1/mm"),
+    ]
+    assert (float(cells[2].text), cells[2].unit) == (0.0, "")
+    assert [column.cells for column in readable(table.columns, table.columns)][2] == ["0", "0"]

@@ -176,9 +176,10 @@ mechanism:
 def test_the_first_key_numbers_are_peaks_of_effort_the_flywheel_and_what_was_asked() -> None:
     study = asked("kinematics: {outputs: [B.x], loads: [{at: B, force: [-100, 0]}], rates: {theta: 60 rpm}}")
     told = headlines(mechdesign.kinematics(study))
-    assert [number.label for number in told[:3]] == [
+    assert [number.label for number in told[:4]] == [
         "largest static effort of theta",
         "range of B.x",
+        "smallest transmission angle, O A B guide",
         "largest velocity of B.x",
     ]
     assert told[0].note.replace("\N{NO-BREAK SPACE}", " ").startswith("at theta = ")
@@ -187,6 +188,27 @@ def test_the_first_key_numbers_are_peaks_of_effort_the_flywheel_and_what_was_ask
     told = headlines(mechdesign.dynamics(study))
     assert told[0].label == "moment of inertia that the flywheel adds on theta"
     assert told[1].label == "peak effort of theta with weights and inertia"
+
+
+def test_the_smallest_transmission_angle_is_a_key_number_with_its_pose() -> None:
+    study = mechdesign.load(
+        text="""
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {outputs: [rocker.angle]}
+"""
+    )
+    told = {number.label: number for number in headlines(mechdesign.kinematics(study))}
+    number = told["smallest transmission angle, O A B D"]
+    # Law of cosines where the crank lies on the frame, with 70 between A and D.
+    assert (number.value, number.unit) == (
+        f"{np.degrees(np.arccos((90**2 + 60**2 - 70**2) / (2 * 90 * 60))):.2f}",
+        "deg",
+    )
+    assert dict(number.pose) == {"theta": 0.0}
+    assert number.at.replace("\N{NO-BREAK SPACE}", " ") == "at theta = 0 deg"
 
 
 def test_headlines_know_a_column_by_its_kind_whatever_its_name_and_its_meaning() -> None:

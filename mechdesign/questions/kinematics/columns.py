@@ -87,6 +87,7 @@ KEY_NUMBERS = (
     KeyNumber(MOTION, "<drive>_effort", "largest static effort of {name}", "size"),
     KeyNumber(MOTION, "<coupling>_pressure_angle", "largest {meaning}", "size"),
     KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
+    KeyNumber(LOOPS, "transmission_min", "smallest transmission angle, {joints}", "smallest", at="transmission_min_at"),
     KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
     KeyNumber(MOTION, "<coupling>_curvature_radius", "smallest {meaning}", "least"),
     KeyNumber(MOTION, "conditioning", "smallest {name} (0 singular, 1 best)", "smallest"),

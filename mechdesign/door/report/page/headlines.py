@@ -43,7 +43,7 @@ _ABSOLUTE, _LOWEST = ("size", "least"), ("smallest", "least")
 _MINUS = "\N{MINUS SIGN}"
 _TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
-_SHORT = 20  # letters of a name beside which its value has always room
+_SHORT = 20  # letters for which a line has always room
 
 
 @dataclass(frozen=True)
@@ -145,10 +145,11 @@ def _in_words(columns: Iterable[Column], row: int) -> str:
 
 
 def _together(words: str) -> str:
-    """``name = 35 mm`` in one line, or where the name is long at least the value with its unit."""
+    """``name = 35 mm`` in one line, or where that is long at least the value with its unit."""
     name, equals, value = words.strip().partition(" = ")
     value = f"={_TOGETHER}{value.replace(' ', _TOGETHER)}" if equals else ""
-    return f"{name} {value}".rstrip() if len(name) > _SHORT else f"{name} {value}".rstrip().replace(" ", _TOGETHER)
+    together = f"{name} {value}".rstrip()
+    return together if len(together) > _SHORT else together.replace(" ", _TOGETHER)
 
 
 def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:
@@ -210,9 +211,9 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
         else:
             notes = [rule.interval.format(low=told(low), high=told(high))] if low < high else []
             alike = [other for other in finite.tolist() if groups[other] == groups[row]]
-            constant = bool(unchanging(values[alike].min(), values[alike].max()))
-            own = row, values[row], _Pose() if rule.row in ("first", "each") or constant else _pose(table, row)
-            _, value, pose = between or own
+            constant = rule.row in ("first", "each") or bool(unchanging(values[alike].min(), values[alike].max()))
+            own = _swept(result, table.column(rule.at), row) if rule.at else _Pose() if constant else _pose(table, row)
+            _, value, pose = between or (row, values[row], own)
             at = f"at {pose.words}" if pose.words else ""
             notes += [at] * bool(at)
             if rule.several and len(finite) > 1:
@@ -249,6 +250,14 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
         for name in ([*pose] if poses.swept is None else [poses.swept])
     ]
     return row, value, _Pose(_in_words(coordinates, 0), pose, at)
+
+
+def _swept(result: Result, at: Column, row: int) -> _Pose:
+    """The pose by the value of what is swept in a column; nothing where that is no coordinate, or along a path."""
+    swept, value = Column(at.meaning.partition(" at ")[0], at.values, at.unit), float(at.values[row])
+    if swept.name not in result.main or not np.isfinite(value):
+        return _Pose()
+    return _Pose(_in_words([swept], row), {swept.name: value})
 
 
 def _pose(table: Table, row: int) -> _Pose:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mechdesign.door.report.page.linkage import Canvas
 from mechdesign.ground.columns import Column
-from mechdesign.ground.numerals import reading
+from mechdesign.ground.numerals import printed, reading
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.ground.table_text import Rounding
@@ -30,6 +30,7 @@ _BASE = 32
 _NOTHING = "."
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
+_SMALL, _LARGE = 1e-4, 1e7
 _COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
 
 
@@ -114,7 +115,9 @@ class ShownNumbers:
             # A column that is constant up to rounding gets as many digits as the columns that vary.
             size = largest if largest > still else 1.0
         power, unit = reading(size, column.unit)
-        unit = f"\N{MULTIPLICATION SIGN}{unit}" if unit.startswith("10") else unit
+        if unit.startswith("10"):
+            # As key numbers: a power of ten where the number is very small or large alone.
+            power, unit = (0, printed(column.unit)) if _SMALL <= size < _LARGE else (power, f"\N{MIDDLE DOT}{unit}")
         return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power, unit
 
     def cell(self, column: Column) -> Cell:

@@ -52,7 +52,7 @@
   }
 
   // A number in words that are not broken into lines.
-  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replaceAll(" ", "\u00a0");
+  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replace(" \u00b7", "\u00b7").replaceAll(" ", "\u00a0");
 
   // A place of the pointer in the units of a drawing.
   function within(drawing, event) {
@@ -288,7 +288,7 @@
     for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, k) => {
       const number = cell.querySelector("[data-number]"), name = row.cells[0].firstChild.textContent;
       if (!number) return;
-      const unit = cell.textContent.slice(number.textContent.length).trim();
+      const unit = cell.textContent.slice(number.textContent.length).trim().replace(/^\u00b7/, "");
       const title = k > 1 ? `${heads[k]} of ${name}` : name;
       tracks.push({values: readout.tracks[number.dataset.number][1], title, label: unit ? `${title} [${unit}]` : title});
     });
