@@ -296,10 +296,9 @@ def main() -> None:
     for problem in problems():
         if problem.name in sys.argv[1:] or len(sys.argv) == 1 or problem.name not in solved:
             solved[problem.name] = {name: problem.solve(limits).data() for name, limits in LIMITS.items()}
-    head = (
-        "# What `python docs/path_problems.py` has found, written as the printed linkages in path_problems.yaml are.\n"
-    )
-    FOUND.write_text(head + yaml.safe_dump(solved, sort_keys=False, width=120), encoding="utf-8")
+    head = "# What `python docs/path_problems.py` has found, written as path_problems.yaml has the printed linkages.\n"
+    text = yaml.safe_dump(solved, sort_keys=False, width=120, default_flow_style=None)
+    FOUND.write_text(head + text, encoding="utf-8")
     print(overview())
 
 
