@@ -12,7 +12,6 @@ from typing import Any
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
-import yaml
 
 import mechdesign
 from mechdesign.door.report.page.moving import moving
@@ -65,16 +64,8 @@ def thumbnail(path: Path) -> str | None:
 
 
 def best(task: Study) -> Study:
-    """The best linkage for a task along its way through the task, or a full turn."""
-    answer = mechdesign.synthesize(task)
-    data = yaml.safe_load(answer.files["solution_1.yaml"])
-    (drive,) = data["mechanism"]["drives"]
-    angles = [pose[drive] for pose in data["kinematics"]["poses"]]
-    end = min(angles) + 360 if answer.main["full_turn"][0] else max(angles)
-    sweep = {drive: {"from": min(angles), "to": end, "number": 121}}
-    data["kinematics"] = {"sweep": sweep, "outputs": data["kinematics"]["outputs"]}
-    del data["mechanism"]["targets"], data["requirements"]
-    return mechdesign.load(text=yaml.safe_dump(data))
+    """The best linkage for a task."""
+    return mechdesign.load(text=mechdesign.synthesize(task).files["solution_1.yaml"])
 
 
 class Tracks:
