@@ -188,7 +188,7 @@ def _yaml(page: Page, body: str, where: int) -> None:
             page.study = (page.study if caption["more"] else "") + text
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(page.study, encoding="utf-8")
-            if file.suffix == ".yaml" and "mechanism:" in page.study:
+            if file.suffix == ".yaml" and re.search(r"(?m)^(mechanism|synthesis):", page.study):
                 mechdesign.load(file)
         else:
             study = merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text))

@@ -9,6 +9,7 @@ import examples
 import gallery
 import lists
 import papers
+import path_problems
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.typing import ExtensionMetadata
@@ -16,7 +17,7 @@ from steps import step
 
 ROOT = Path(__file__).parent
 # What makes pages: functions that give their texts by their paths.
-MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages)
+MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages, path_problems.pages)
 # Reports that pages show, by their names in the folder `_static`: what an example has written.
 REPORTS = {"first_four_bar.html": "tutorials/first_four_bar/results/study/kinematics/report.html"}
 

@@ -64,7 +64,7 @@ def thumbnail(path: Path) -> str | None:
 
 
 def best(task: Study) -> Study:
-    """The best linkage for a task on its way through it."""
+    """The best linkage for a task."""
     return mechdesign.load(text=mechdesign.synthesize(task).files["solution_1.yaml"])
 
 
