@@ -54,5 +54,6 @@ def test_lines_stand_for_any_and_numbers_agree_to_six_digits(told: str, shown: s
 
 
 def test_how_far_a_slow_command_was_is_no_part_of_what_a_page_shows(tmp_path: Path) -> None:
-    command = "echo '3000 designs to compute'; echo 'reach: optimize: 4 of 4 neighbours of the optimum after 10 s; Ctrl-C ends it' >&2"
+    done = "reach: optimize: 4 of 4 neighbours of the optimum after 10 s; Ctrl-C ends it"
+    command = f"echo '3000 designs to compute'; echo '{done}' >&2"
     assert examples.terminal(command, tmp_path, tmp_path, ()) == "3000 designs to compute\n"
