@@ -31,8 +31,8 @@ def solutions_picture(view: View) -> Picture:
     """The best linkages, each at the first position of the task, with the path of its point and the task."""
     drawn, table = DrawnSolutions.of(view.result), view.result.tables["solutions"]
     panels, angle = [], table.column("transmission_angle").unit
-    for row, study in enumerate(drawn.studies[:_SHOWN]):
-        (still, path), places = _course(study, drawn.output), drawn.places
+    for row in range(min(len(table), _SHOWN)):
+        (still, path), places = _course(drawn.linkage(row), drawn.output), drawn.places
         marks: list[PanelMark] = [Posed(still, names=False, drives=False)]
         shows = np.concatenate([path[np.isfinite(path)], places, still.places])
         marks += [Trace(path.real, path.imag, label=f"path of {drawn.output}",
