@@ -105,8 +105,9 @@ def _answer(
 def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
     """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
-    told = [f"{counted(count, 'linkage')}, of which {len(solutions)} keep the conditions, {whole} without a defect"]
-    lost = [f"{number} {what} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number]
+    told = [f"{len(solutions)} of {counted(count, 'linkage')} within the conditions, {whole} without a defect"]
+    lost = [f"{counted(number, what.removesuffix('s'))} as {reason}"
+            for (what, reason), number in conditions.dropped.most_common() if number]  # fmt: skip
     return [*told, *([f"dropped: {'; '.join(lost)}"] if lost else []), f"seed {seed}"]
 
 
