@@ -88,12 +88,11 @@ def _answer(
     for number, solution in enumerate(solutions, 1):
         name = "nearest" if missed else f"solution {number}"
         file = f"{name.replace(' ', '_')}.yaml"
-        heading = [
-            f"{name.capitalize()} of {study.name}: {words[number - 1]}",
-            f"Its report: mechdesign run {file} --report",
-        ]
+        title = "Nearest to" if missed else f"Solution {number} of"
+        heading = [f"{title} {study.name}: {words[number - 1]}", *([f"It misses: {missed}"] if missed else []),
+                   f"Its report: mechdesign run {file} --report"]  # fmt: skip
         data.append(study_data(study, task, solution, f"{study.name}, {name}"))
-        files |= study_files(file, solution.kind, data[-1], [*heading, *([f"It misses: {missed}"] if missed else [])])
+        files |= study_files(file, solution.kind, data[-1], heading)
     drawn = DrawnSolutions(
         tuple(data), study.folder, task.targets(solutions[0])[0], task.points, task.directions, errors
     )

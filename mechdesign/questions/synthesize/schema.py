@@ -346,6 +346,7 @@ class SynthesisSection(fields.Model):
 
     def checked(self, checker: Checker) -> Self:
         """Check the loads, on the kind of linkage with which a search begins where that stands for the mechanism."""
-        if self.judge is not None and checker.reporter.document.raw(("mechanism", "links")) is None:
+        stands = self.of is None and checker.reporter.document.raw(("mechanism", "links")) is None
+        if self.judge is not None and stands:
             check_loads(checker, self.judge.loads, ("synthesis", "judge", "loads"), moving=False, timed=False)
         return self

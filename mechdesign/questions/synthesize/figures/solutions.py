@@ -43,8 +43,8 @@ def solutions_picture(view: View) -> Picture:
                         look={"color": style.BLUE, "linewidth": 1.2, "zorder": 5.5})] * bool(len(path))  # fmt: skip
         if len(drawn.directions):
             ends = places + _AXIS * max(np.ptp(shows.real), np.ptp(shows.imag)) * drawn.directions
-            lines = np.stack([places, ends, np.full(len(places), np.nan)], axis=1).ravel()
-            marks.append(Trace(lines.real, lines.imag, look={"color": style.VERMILION, "linewidth": 1.4, "zorder": 6}))
+            axes = np.stack([places, ends, np.full(len(places), np.nan)], axis=1).ravel()
+            marks.append(Trace(axes.real, axes.imag, look={"color": style.VERMILION, "linewidth": 1.4, "zorder": 6}))
         if len(places):
             marks.append(Dots(places.real, places.imag, label="the task",
                               look={"color": style.VERMILION, "markersize": size, "zorder": 6}))  # fmt: skip
