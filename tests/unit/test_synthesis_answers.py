@@ -83,9 +83,9 @@ def test_all_linkages_are_shown_with_kind_error_transmission_angle_and_defects(f
     figure = five.figure("solutions")
     titles = [axes.get_title(loc="left") or axes.get_title() for axes in figure.axes]
     titles += [text.get_text() for text in figure.findobj(Text)]  # type: ignore[arg-type]
-    shown = [title for title in dict.fromkeys(titles) if "transmission" in title]
+    shown = [title for title in dict.fromkeys(titles) if "\N{GREEK SMALL LETTER MU} " in title and "error" in title]
     assert len(figure.axes) == len(five.main) == len(shown) == 6
-    assert all("four-bar, error 0 mm" in title.replace("\n", " ") for title in shown)
+    assert all("four-bar error 0 mm" in title.replace("\n", " ") for title in shown)
     assert sum("no defect" in title for title in shown) == 2
     assert sum("branch" in title for title in shown) == 4
 
@@ -156,3 +156,14 @@ def test_check_tells_the_task_and_a_question_about_a_mechanism_is_refused() -> N
 def test_what_cannot_be_judged_is_said_before_anything_is_looked_for(judge: str, words: str) -> None:
     with pytest.raises(mechdesign.StudyError, match=words):
         mechdesign.load(text=f"{FIVE}  judge: {judge}")
+
+
+def test_where_nothing_passes_the_nearest_is_a_study_and_the_exit_code_3(tmp_path: Path) -> None:
+    study = f"{FIVE}  kinds: four_bar\n  keep_out: {{x: [-999, 999], y: [-999, 999]}}\n"
+    done = ask("synthesize", "-", "--no-plots", "--out", tmp_path, study=study)
+    assert done.exit_code == 3
+    first, second, *_ = done.stderr.splitlines()
+    assert first.endswith("no linkage does it; the nearest is in nearest.yaml: a pivot lies where none may (keep_out)")
+    assert second.startswith("nearest: four-bar (triple-rocker), error 0 mm")
+    near = mechdesign.load(tmp_path / "nearest.yaml")
+    assert mechdesign.kinematics(near).tables["targets"]["max_abs"].max() < 1e-6

@@ -300,20 +300,22 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     study : Study
         With a section ``synthesis``; it needs no mechanism.
     seed, jobs, progress : optional
-        See `mechdesign`; random are the samples of a path, and free choices of a body.
+        See `mechdesign`; random are the samples of a path, and free choices of a body. One task takes one process.
 
     Returns
     -------
     Answer
-        Table ``solutions``, a row a linkage, best first, with errors, defects, transmission angles and dimensions in
-        the study's units; `files` has the study of each, and `notes` say how complete the list is.
+        Table ``solutions``, a row a linkage, best first, with errors, defects, transmission angles, where they are
+        judged yields and peak efforts, and dimensions by their names in the linkage's study, nan where it has none;
+        all in the study's units. `files` has that study of each, whose path goes through the task; `notes` say which
+        is best, how complete the list is, what was dropped and why, and the seed.
 
     Raises
     ------
     StudyError
-        If there is no task, or it contradicts itself.
+        If there is no task, or it contradicts itself, or its ``judge`` names what a linkage does not have.
     AssemblyError
-        If no linkage keeps the conditions.
+        If no linkage keeps the conditions; its ``result`` has the nearest, in the table and as ``nearest.yaml``.
 
     Examples
     --------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,15 +35,14 @@ class DrawnSolutions(Drawn):
     directions: Complexes  # of the body there; empty of a point
     errors: Floats  # in the study's unit, 0 where they are rounding
 
-    @cached_property
-    def studies(self) -> list[Study]:
-        """Those of the solutions."""
-        return [load_data(data, (), None, self.folder) for data in self.data]
+    def linkage(self, row: int) -> Study:
+        """The study of a solution."""
+        return load_data(self.data[row], (), None, self.folder)
 
     @property
     def study(self) -> Study:
         """That of the best."""
-        return self.studies[0]
+        return self.linkage(0)
 
 
 @one_thread()
@@ -63,36 +61,52 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
         solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
         told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
         if section.judge is not None:
-            solutions = [replace(solution, made=judged(study, study_data(study, task, solution, study.name)))
-                         for solution in solutions[: section.judge.best]]  # fmt: skip
+            best = solutions[: section.judge.best]
+            progress.start(len(best), "linkages judged")
+            solutions = []
+            for one in best:
+                solutions.append(replace(one, made=judged(study, study_data(study, task, one, study.name))))
+                progress.update(1)
             told.append(f"the best {len(solutions)} are judged")
         solutions, scores = ranked(solutions, section.rank, task.size)
     if not solutions:
         raise _none(study, task, pools, conditions, told)
-    solutions, scores = solutions[: section.solutions], scores[: section.solutions]
-    data = [study_data(study, task, solution, f"{study.name}, solution {number}")
-            for number, solution in enumerate(solutions, 1)]  # fmt: skip
-    table = solutions_table(study, task, solutions, scores)
+    result = _answer(study, task, solutions[: section.solutions], scores, told)
+    counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(result.main)}
+    return replace(result, counts=counts)
+
+
+def _answer(
+    study: Study, task: Task, solutions: Sequence[Solution], scores: Sequence[float], told: Sequence[str],
+    missed: str = "",
+) -> Result:  # fmt: skip
+    """The answer that some solutions are, best first; or the one that comes nearest, with what it has `missed`."""
+    table = solutions_table(study, task, solutions, scores[: len(solutions)])
     errors = np.array([rounded(solution.error, task.size) for solution in solutions]) / task.error_factor
-    files: dict[str, str] = {}
-    for row, made in enumerate(data):
-        name = f"solution_{row + 1}.yaml"
-        heading = [f"Solution {row + 1} of {study.name}: {', '.join(linkage(table, row, float(errors[row])))}",
-                   f"Its report: mechdesign run {name} --report"]  # fmt: skip
-        files |= study_files(name, solutions[row].kind, made, heading)
-    counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(solutions)}
-    output, _ = task.targets(solutions[0])
-    drawn = DrawnSolutions(tuple(data), study.folder, output, task.points, task.directions, errors)
-    told = [f"best: {', '.join(linkage(table, 0, float(errors[0])))}", *told]
+    words = [", ".join(linkage(table, row, float(error))) for row, error in enumerate(errors)]
+    data, files = [], dict[str, str]()
+    for number, solution in enumerate(solutions, 1):
+        name = "nearest" if missed else f"solution {number}"
+        file = f"{name.replace(' ', '_')}.yaml"
+        title = "Nearest to" if missed else f"Solution {number} of"
+        heading = [f"{title} {study.name}: {words[number - 1]}", *([f"It misses: {missed}"] if missed else []),
+                   f"Its report: mechdesign run {file} --report"]  # fmt: skip
+        data.append(study_data(study, task, solution, f"{study.name}, {name}"))
+        files |= study_files(file, solution.kind, data[-1], heading)
+    drawn = DrawnSolutions(
+        tuple(data), study.folder, task.targets(solutions[0])[0], task.points, task.directions, errors
+    )
+    notes = [f"{'nearest' if missed else 'best'}: {words[0]}", *told]
     tables = {table.name: table, **curve_tables(study, task)}
-    return Result("synthesize", tables, counts=counts, files=files, drawn=drawn, notes=told)
+    return Result("synthesize", tables, files=files, drawn=drawn, notes=notes)
 
 
 def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
     """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
-    told = [f"{counted(count, 'linkage')}, of which {len(solutions)} keep the conditions, {whole} without a defect"]
-    lost = [f"{number} {what} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number]
+    told = [f"{len(solutions)} of {counted(count, 'linkage')} within the conditions, {whole} without a defect"]
+    lost = [f"{counted(number, what.removesuffix('s'))} as {reason}"
+            for (what, reason), number in conditions.dropped.most_common() if number]  # fmt: skip
     return [*told, *([f"dropped: {'; '.join(lost)}"] if lost else []), f"seed {seed}"]
 
 
@@ -100,21 +114,17 @@ def _none(
     study: Study, task: Task, pools: Sequence[Pool], conditions: Conditions, told: Sequence[str]
 ) -> AssemblyError:
     """Why there is no solution, with the linkage that comes nearest where there is one."""
-    words = "no linkage does it: " + "; ".join(told)
     every = [(reasons, pool.solution(row)) for pool in pools for row, reasons in enumerate(conditions.missed(pool))]
     if not every:
-        return AssemblyError(words)
+        return AssemblyError("\n".join(("no linkage does it", *told)))
     # It misses the fewest conditions; of several it has the smallest error, then the best transmission.
     reasons, solution = min(
         every, key=lambda one: (len(one[0]), rounded(one[1].error, task.size), -one[1].transmission)
     )
     missed = "; ".join(reasons)
-    message = f"{words}; the nearest is in nearest.yaml: {missed}"
-    data = study_data(study, task, solution, f"{study.name}, nearest")
-    table = solutions_table(study, task, [solution], [np.nan])
-    files = study_files("nearest.yaml", solution.kind, data, [f"Nearest to {study.name}: {missed}"])
-    tables = {table.name: table, **curve_tables(study, task)}
-    return AssemblyError(message, Result("synthesize", tables, failed=message, files=files))
+    result = _answer(study, task, [solution], [np.nan], told, missed)
+    message = "\n".join((f"no linkage does it; the nearest is in nearest.yaml: {missed}", *result.notes))
+    return AssemblyError(message, replace(result, failed=message))
 
 
 def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], scores: Sequence[float]) -> Table:

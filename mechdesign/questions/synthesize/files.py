@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.ground.errors import printable
+from mechdesign.ground.errors import StudyError, printable
 from mechdesign.questions.look import ask
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.own import OwnKind
@@ -126,7 +126,13 @@ def judged(study: Study, data: Mapping[str, Any]) -> Judged:
     StudyError
         Where the task's `judge` names what the linkage does not have.
     """
-    made, answer = load_data(data, (), None, study.folder), Judged()
+    try:
+        made, answer = load_data(data, (), None, study.folder), Judged()
+    except StudyError as error:
+        places = [("synthesis", "judge", *problem.key.split(".")[1:]) for problem in error.problems]
+        raise StudyError([
+            study.problem(problem.message, *place) for problem, place in zip(error.problems, places, strict=True)
+        ]) from None  # fmt: skip
     if made.reliability is not None:
         table = ask(made, "reliability").tables["reliability"]
         rows = table.take(table["scope"] == "cycle")

@@ -345,7 +345,8 @@ class SynthesisSection(fields.Model):
         return self.given("body", "function", "path")[0]
 
     def checked(self, checker: Checker) -> Self:
-        """Check the loads, on the kind of linkage with which a search begins."""
-        if self.judge is not None:
+        """Check the loads, on the kind of linkage with which a search begins where that stands for the mechanism."""
+        stands = self.of is None and checker.reporter.document.raw(("mechanism", "links")) is None
+        if self.judge is not None and stands:
             check_loads(checker, self.judge.loads, ("synthesis", "judge", "loads"), moving=False, timed=False)
         return self

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from mechdesign.door.report.page.front import Entry, chosen, fitting, moved, points
+from mechdesign.door.report.page.front import MOST_DESIGNS, Entry, chosen, fitting, moved, points
 from mechdesign.door.report.page.linkage import Canvas, Sketcher, add
 from mechdesign.door.report.page.tracks import MovingPicture, ShownNumbers, meanings
 from mechdesign.door.report.page.vector import described, inline
@@ -33,7 +33,8 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
     None where none of them moves. `name` begins the ids inside the picture of what they trade.
     """
     drawn, table = DrawnSolutions.of(result), result.tables["solutions"]
-    courses = ((row, moved(one, study_poses(one, "kinematics"))) for row, one in enumerate(drawn.studies))
+    studies = [drawn.linkage(row) for row in range(min(len(table), MOST_DESIGNS))]
+    courses = ((row, moved(one, study_poses(one, "kinematics"))) for row, one in enumerate(studies))
     sweeps = [(row, sweep) for row, course in courses for sweep in course if len(sweep.valid) > 1]
     if not sweeps:
         return None

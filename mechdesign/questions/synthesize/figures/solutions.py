@@ -14,16 +14,19 @@ from mechdesign.drawing.pictures import View, picture
 from mechdesign.drawing.scene import Still, sketched
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.errors import MechdesignError, counted
-from mechdesign.ground.numerics.arrays import Complexes
+from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.poses import solve_shown
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.declared import in_words
 from mechdesign.study import Study
 
-# Linkages on the page and beside each other, and those of the front that have a number.
-_SHOWN, _ACROSS, _FEW = 20, 5, 20
+# Linkages on the page, and beside each other.
+_SHOWN, _ACROSS = 20, 5
 # Length of the line that shows the angle of a position, as a part of the extent of what is drawn.
 _AXIS = 0.08
+# Points of a task that are drawn large, and least distance of numbers on the front as a part of an axis.
+_APART, _CLEAR = 12, 0.05
+_MU = "\N{GREEK SMALL LETTER MU}"
 
 
 @picture(View, "solutions", order=10)
@@ -31,30 +34,34 @@ def solutions_picture(view: View) -> Picture:
     """The best linkages, each at the first position of the task, with the path of its point and the task."""
     drawn, table = DrawnSolutions.of(view.result), view.result.tables["solutions"]
     panels, angle = [], table.column("transmission_angle").unit
-    for row, study in enumerate(drawn.studies[:_SHOWN]):
-        (still, path), places = _course(study, drawn.output), drawn.places
+    size = 3.5 if len(drawn.places) <= _APART else 2.0
+    for row in range(min(len(table), _SHOWN)):
+        (still, path), places = _course(drawn.linkage(row), drawn.output), drawn.places
         marks: list[PanelMark] = [Posed(still, names=False, drives=False)]
         shows = np.concatenate([path[np.isfinite(path)], places, still.places])
         marks += [Trace(path.real, path.imag, label=f"path of {drawn.output}",
-                        look={"color": style.BLUE, "linewidth": 1.2})] * bool(len(path))  # fmt: skip
+                        look={"color": style.BLUE, "linewidth": 1.2, "zorder": 5.5})] * bool(len(path))  # fmt: skip
         if len(drawn.directions):
             ends = places + _AXIS * max(np.ptp(shows.real), np.ptp(shows.imag)) * drawn.directions
-            lines = np.stack([places, ends, np.full(len(places), np.nan)], axis=1).ravel()
-            marks.append(Trace(lines.real, lines.imag, look={"color": style.VERMILION, "linewidth": 1.4}))
+            axes = np.stack([places, ends, np.full(len(places), np.nan)], axis=1).ravel()
+            marks.append(Trace(axes.real, axes.imag, look={"color": style.VERMILION, "linewidth": 1.4, "zorder": 6}))
         if len(places):
             marks.append(Dots(places.real, places.imag, label="the task",
-                              look={"color": style.VERMILION, "markersize": 3.5}))  # fmt: skip
+                              look={"color": style.VERMILION, "markersize": size, "zorder": 6}))  # fmt: skip
         error = quantity(float(drawn.errors[row]), table.column("error").unit)
         kind, defects = (str(table[name][row]) for name in ("kind", "defects"))
-        words = [f"{row + 1}: {in_words(kind)}, error {error}",
-                 f"transmission {quantity(float(table['transmission_angle'][row]), angle)}",
+        words = [f"{row + 1}: {in_words(kind)}", f"error {error}",
+                 f"{_MU} {quantity(float(table['transmission_angle'][row]), angle)}",
                  f"yield {number(float(table['yield'][row]))}" if "yield" in table else "",
                  f"defect: {defects}" if defects else "no defect"]  # fmt: skip
-        panels.append(Panel(marks, title="\n".join(filter(None, words)), equal=1.0, shows=shows, bare=True))
+        lines = [*filter(None, words)]
+        if style.narrow():
+            lines = [", ".join(lines[k : k + 2]) for k in range(0, len(lines), 2)]
+        panels.append(Panel(marks, title="\n".join(lines), equal=1.0, shows=shows, bare=True))
     count = counted(len(table), "linkage")
     title = f"The best {len(panels)} of {count}" if len(panels) < len(table) else count
-    note = ("Each has a scale of its own",) * (len(panels) > 1)
-    return Picture(f"{title} at the first position", panels, note, across=_ACROSS)
+    note = f"{_MU} is the smallest transmission angle" + "; each linkage has its own scale" * (len(panels) > 1)
+    return Picture(f"{title} at the first position", panels, (note,), across=_ACROSS)
 
 
 def _course(study: Study, point: str) -> tuple[Still, Complexes]:
@@ -85,10 +92,20 @@ def trade(view: View) -> Picture | None:
     if faulty.any():
         hollow = {"color": style.VERMILION, "markersize": 5, "markerfacecolor": "white"}
         marks.append(Dots(angles[faulty], errors[faulty], label="with a defect", look=hollow))
-    marks += [Words(angles[k], errors[k], f"{k + 1}", (4.0, 3.0)) for k in order[:_FEW].tolist()]
+    marks += [Words(angles[k], errors[k], f"{k + 1}", (4.0, 3.0)) for k in _spread(order, angles, errors)]
     across = Axis("smallest transmission angle, more is better", table.column("transmission_angle").unit)
-    up = Axis("error, less is better", table.column("error").unit, ends=(0.0, None))
+    up = Axis("error, less is better", table.column("error").unit, ends=(None if errors.any() else 0.0, None))
     return Picture("What error costs in transmission", [Panel(marks, across, up)])
+
+
+def _spread(rows: Ints, x: Floats, y: Floats) -> list[int]:
+    """Rows from both ends whose places are far enough apart for their numbers."""
+    kept: list[int] = []
+    wide, tall = (float(np.ptp(values)) or 1.0 for values in (x, y))
+    for row in [*rows[-1:].tolist(), *rows[:-1].tolist()]:
+        if all(max(abs(x[row] - x[k]) / wide, abs(y[row] - y[k]) / tall) > _CLEAR for k in kept):
+            kept.append(row)
+    return kept
 
 
 trade_picture = picture(View, "trade", order=20)(trade)
