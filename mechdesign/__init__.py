@@ -18,8 +18,9 @@ Every question takes a `seed` of its random numbers in place of the study's own 
 compute on (None: one for each processor), on which no result depends; and a `progress` that is told how far the
 computation is. A `journal` keeps what is finished of a long one that is interrupted, and gives it when it begins anew.
 
-The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics. Here nothing is
-imported: a signal that comes before the command can hear it ends it with a traceback.
+Its names stand in `mechdesign.door.api.names`, which is imported when one of them is first used, so that ``mechdesign
+--help`` loads no numerics. Here nothing is imported: a signal that comes before the command can hear it ends it with a
+traceback.
 """
 
 from __future__ import annotations
@@ -28,51 +29,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from mechdesign.door.api.cases import evaluate as evaluate
-    from mechdesign.door.api.cases import sensitivities as sensitivities
-    from mechdesign.door.api.cases import sweep as sweep
-    from mechdesign.door.api.loading import load as load
-    from mechdesign.door.api.questions import dynamics as dynamics
-    from mechdesign.door.api.questions import kinematics as kinematics
-    from mechdesign.door.api.questions import optimize as optimize
-    from mechdesign.door.api.questions import reliability as reliability
-    from mechdesign.door.api.questions import stiffness as stiffness
-    from mechdesign.door.api.questions import synthesize as synthesize
-    from mechdesign.door.api.questions import workspace as workspace
-    from mechdesign.door.api.shown import Answer as Answer
-    from mechdesign.door.report.requirements import Verdict as Verdict
-    from mechdesign.door.report.requirements import requirements as requirements
-    from mechdesign.ground.cautions import Caution as Caution
-    from mechdesign.ground.columns import Column as Column
-    from mechdesign.ground.errors import AssemblyError as AssemblyError
-    from mechdesign.ground.errors import MechanismError as MechanismError
-    from mechdesign.ground.errors import MechdesignError as MechdesignError
-    from mechdesign.ground.errors import OutputError as OutputError
-    from mechdesign.ground.errors import StudyError as StudyError
-    from mechdesign.ground.results import Table as Table
-    from mechdesign.study import Study as Study
-    from mechdesign.study.importing.conversion import convert as convert
+    from mechdesign.door.api.names import *  # noqa: F403
 
     __version__: str
-
-_HOMES = {
-    name: f"mechdesign.{home}"
-    for home, names in (
-        ("door.api.cases", "sweep sensitivities evaluate"),
-        ("door.api.loading", "load"),
-        ("door.api.questions", "kinematics workspace optimize reliability stiffness dynamics synthesize"),
-        ("door.api.shown", "Answer"),
-        ("ground.cautions", "Caution"),
-        ("ground.columns", "Column"),
-        ("ground.errors", "AssemblyError MechanismError MechdesignError OutputError StudyError"),
-        ("study.importing.conversion", "convert"),
-        ("door.report.requirements", "Verdict requirements"),
-        ("ground.results", "Table"),
-        ("study", "Study"),
-    )
-    for name in names.split()
-}
-__all__ = sorted((*_HOMES, "__version__"))
 
 
 def __getattr__(name: str) -> Any:
@@ -80,18 +39,19 @@ def __getattr__(name: str) -> Any:
         from mechdesign.ground.versions import installed
 
         return installed("mechdesign")
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(_HOMES[name]), name)
+    if name == "__all__":
+        return __dir__()
     from mechdesign.commands import QUESTIONS
+    from mechdesign.door.api import names, questions
 
+    if hasattr(names, name):
+        return getattr(names, name)
     if name in QUESTIONS:
-        from mechdesign.door.api.questions import question
-
-        return question(name)
+        return questions.question(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    from mechdesign.door.api import names
+
+    return ["__version__", *sorted(name for name in vars(names) if not name.startswith("_"))]

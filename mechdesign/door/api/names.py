@@ -1,0 +1,26 @@
+"""The names that `import mechdesign` gives."""
+
+from mechdesign.door.api.cases import evaluate as evaluate
+from mechdesign.door.api.cases import sensitivities as sensitivities
+from mechdesign.door.api.cases import sweep as sweep
+from mechdesign.door.api.loading import load as load
+from mechdesign.door.api.questions import dynamics as dynamics
+from mechdesign.door.api.questions import kinematics as kinematics
+from mechdesign.door.api.questions import optimize as optimize
+from mechdesign.door.api.questions import reliability as reliability
+from mechdesign.door.api.questions import stiffness as stiffness
+from mechdesign.door.api.questions import synthesize as synthesize
+from mechdesign.door.api.questions import workspace as workspace
+from mechdesign.door.api.shown import Answer as Answer
+from mechdesign.door.report.requirements import Verdict as Verdict
+from mechdesign.door.report.requirements import requirements as requirements
+from mechdesign.ground.cautions import Caution as Caution
+from mechdesign.ground.columns import Column as Column
+from mechdesign.ground.errors import AssemblyError as AssemblyError
+from mechdesign.ground.errors import MechanismError as MechanismError
+from mechdesign.ground.errors import MechdesignError as MechdesignError
+from mechdesign.ground.errors import OutputError as OutputError
+from mechdesign.ground.errors import StudyError as StudyError
+from mechdesign.ground.results import Table as Table
+from mechdesign.study.importing.conversion import convert as convert
+from mechdesign.study.loaded import Study as Study
