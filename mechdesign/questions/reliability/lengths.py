@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
@@ -227,8 +228,6 @@ def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     that of a normal variable. By the trapezoidal rule, whose steps shrink towards the principal axes: across the longer
     one the part along a direction varies least.
     """
-    from scipy.special import erf
-
     squares, axes = np.linalg.eigh(covariance)
     steps = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
     angle, weight = steps - 0.25 * np.sin(4 * steps), (1.0 - np.cos(4 * steps)) * np.pi / (2 * _DIRECTIONS)
@@ -236,6 +235,6 @@ def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     sigma = np.sqrt(np.maximum(squares, 0.0) @ way**2)
     along = np.einsum("pij,pi->pj", axes, mean) @ way
     ratio = np.where(sigma > 0, along / (sigma * np.sqrt(2.0)), np.where(along == 0, 0.0, np.sign(along) * np.inf))
-    side = erf(ratio)
+    side = scipy.special.erf(ratio)
     length = (sigma * np.sqrt(2.0 / np.pi) * np.exp(-(ratio**2)) + along * side) @ weight
     return length, np.einsum("pij,pj->pi", axes, (side * weight) @ way.T)
