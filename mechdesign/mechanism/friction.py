@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
+from mechdesign.mechanism.algebra import Value, Vector, largest
 from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.elements.joints import Friction
@@ -166,7 +166,6 @@ class Rubs:
         """What the contacts bear without friction, and its slopes."""
         return self.borne(self.smooth), self._slopes(self.smooth)
 
-    @quiet
     def solve(self, rates: Rates, *, back: bool = False) -> Rubbed:
         """The equilibrium while the mechanism moves at some rates, or `back` against them; their signs count."""
         relative = -self.relative(rates) if back else self.relative(rates)
@@ -260,7 +259,6 @@ class Efficiency(NamedTuple):
     holds: Flags
 
 
-@quiet
 def efficiency(efforts: Sequence[Value], rates: Sequence[Value], lost: Floats) -> Efficiency:
     """Efficiency at poses, from efforts and rates of the drives and the (negative) power of friction."""
     powers = np.broadcast_arrays(lost, *(effort * rate for effort, rate in zip(efforts, rates, strict=True)))[1:]
