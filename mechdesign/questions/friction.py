@@ -62,7 +62,7 @@ class JointFriction:
 
     def __init__(self, mechanism: Mechanism, joints: Joints) -> None:
         self.mechanism, self.joints = mechanism, joints
-        self.contacts: list[Rubbing] = rubbings(joints, mechanism.description.friction)
+        self.contacts: list[Rubbing] = [*rubbings(joints, mechanism.description.friction)]
         #: Joints with friction, by which marks count.
         self.names = list(dict.fromkeys(contact.joint for contact in self.contacts))
         self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])

@@ -7,7 +7,7 @@ are integrals over the directions, and limits of it are circles about zero in th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -198,12 +198,11 @@ def model_of(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats)
     )
 
 
-def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats) -> list[tuple[int, Flags]]:
+def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats) -> Iterator[tuple[int, Flags]]:
     """Channels with a corner within `_NEAR` deviations, and at which poses, shape (poses,)."""
     if not question.bends:
-        return []
+        return
     mean, deviation = nominal + linear.shift(), linear.deviation()
-    near = []
     for output, places, bend in question.bends:
         together = np.ones(nominal.shape[1:], dtype=bool)
         for place in places:
@@ -211,8 +210,7 @@ def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Flo
             away = away - bend.period * np.round(away / bend.period) if bend.period else away
             # What is not a number is not smooth either.
             together &= ~(np.abs(away).min(axis=0) > _NEAR * deviation[place])
-        near.append((output, together))
-    return near
+        yield output, together
 
 
 def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
