@@ -11,9 +11,12 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import shutil
 import signal
 from collections.abc import Iterator
+from contextlib import nullcontext
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +47,7 @@ THRESHOLDS = (20_000, 20, 50)
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 # Tests that took a third of a second or more where they were measured, and are left to the night.
 NIGHTLY = Path(__file__).with_name("nightly.txt")
+ROOMS = re.compile(r"^\s*from (mechdesign\.|helpers\.(designs|limit_states|random_|regions))", re.MULTILINE)
 ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the pages"
 
 
@@ -59,11 +63,17 @@ def browser() -> Iterator[Browser]:
         opened.close()
 
 
-@pytest.fixture
-def silent() -> Iterator[None]:
-    """NumPy does not warn, as inside a question: for tests of functions that questions call."""
-    with np.errstate(all="ignore"):
+@pytest.fixture(autouse=True)
+def silent(request: pytest.FixtureRequest) -> Iterator[None]:
+    """NumPy does not warn where a file asks rooms of the package, which questions ask the same way."""
+    with np.errstate(all="ignore") if asks_rooms(request.path) else nullcontext():
         yield
+
+
+@cache
+def asks_rooms(path: Path) -> bool:
+    """Whether a file of tests imports rooms of the package, or helpers that do."""
+    return ROOMS.search(path.read_text(encoding="utf-8")) is not None
 
 
 def seconds_of(text: str) -> float:

@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any, overload
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from mechdesign.door.report.cases import changes_in_words
@@ -161,11 +162,9 @@ def _cube(method: str, dimensions: int, samples: int, seed: int) -> Floats:
     [McKay, Beckman & Conover, A comparison of three methods for selecting values of input variables, 1979; Sobol', On
     the distribution of points in a cube, 1967, scrambled as by Matousek, The L2-discrepancy for anchored boxes, 1998]
     """
-    from scipy.stats import qmc
-
     random = np.random.default_rng(seed)
     if method == "latin_hypercube":
-        return np.asarray(qmc.LatinHypercube(dimensions, rng=random).random(samples))
+        return np.asarray(scipy.stats.qmc.LatinHypercube(dimensions, rng=random).random(samples))
     # The sequence is even over powers of two: the next larger one is drawn, and its first points are used.
-    sobol = qmc.Sobol(dimensions, scramble=True, rng=random)
+    sobol = scipy.stats.qmc.Sobol(dimensions, scramble=True, rng=random)
     return np.asarray(sobol.random_base2((samples - 1).bit_length()))[:samples]

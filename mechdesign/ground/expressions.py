@@ -235,15 +235,14 @@ class Expression:
     ) -> Any:
         """Result of the program, with the meanings of constants, variables and calls that are passed."""
         stack: list[Any] = []
-        with np.errstate(all="ignore"):
-            for kind, item in self.program:
-                if isinstance(item, OfOneNumber):
-                    stack[-1:] = [call(item, stack[-1:])]
-                elif kind == "call":
-                    count = arity(str(item))
-                    stack[-count:] = [call(item, stack[-count:])]
-                else:
-                    stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
+        for kind, item in self.program:
+            if isinstance(item, OfOneNumber):
+                stack[-1:] = [call(item, stack[-1:])]
+            elif kind == "call":
+                count = arity(str(item))
+                stack[-count:] = [call(item, stack[-count:])]
+            else:
+                stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
         return stack[0]
 
     def _variable(self, env: Mapping[str, Any], name: str) -> Any:

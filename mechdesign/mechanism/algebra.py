@@ -20,9 +20,6 @@ Either = TypeVar("Either", Value, Vector)
 
 TURN = 2 * np.pi
 
-# Decorator: at a singularity or in a pose that fails the value is nan or infinite, without NumPy's warnings.
-quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
-
 
 def picked(value: Either, index: Ints | int | slice) -> Either:
     """Values of some poses of a flat batch; a value that is the same for all poses stays a number."""

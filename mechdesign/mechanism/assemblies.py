@@ -111,8 +111,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     good = every.valid
     for slide in plan.core.graph.telescopic:
         # A leg of length zero closes at any angle, and is no assembly.
-        with np.errstate(invalid="ignore"):
-            good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
+        good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
     solutions = [sketch] if drawn else []
     for lane in np.flatnonzero(good):
         one = every.take(int(lane))

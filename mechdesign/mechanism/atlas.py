@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.mechanism.algebra import Value, nearest, quiet
+from mechdesign.mechanism.algebra import Value, nearest
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
@@ -163,7 +163,6 @@ class Atlas:
         lost = np.isnan(fold_distance) if beyond else ~(fold_distance > 0)
         return self._configuration(state, places, lost.reshape(shape)), fold_distance.reshape(shape)
 
-    @quiet
     def _solved(
         self, z: Complexes, sizes: Sizes, table: Floats, ahead: Value, within: Complexes, beyond: bool = False
     ) -> tuple[State, Floats]:

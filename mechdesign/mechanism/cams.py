@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
-from mechdesign.mechanism.algebra import TURN, Value, Vector, cross, dot, norm2, quiet, rotation, wrap
+from mechdesign.mechanism.algebra import TURN, Value, Vector, cross, dot, norm2, rotation, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
@@ -190,7 +190,6 @@ class CamFollower:
         touch = self.touch(configuration, side)
         return np.asarray(self.local(configuration, touch.place + away * touch.normal))
 
-    @quiet
     def cut(self, side: str, away: float, deviation: float) -> Complexes:
         """The curve at a distance out of the cam along the normals of one of its sides, in the cam's frame.
 
@@ -212,7 +211,6 @@ class CamFollower:
         return bool(abs(outline[-1] - outline[0]) <= CLOSED * (np.ptp(outline.real) + np.ptp(outline.imag)))
 
     @cached_property
-    @quiet
     def corners(self) -> Floats:
         """Values of the coordinate that is followed at which the law has a corner and the profile jumps.
 
@@ -248,7 +246,6 @@ class CamFollower:
         place = self.local(configuration, touch.place)
         return np.stack(np.broadcast_arrays(place, normal)).astype(complex)
 
-    @quiet
     def undercuts(self, radius: Value, roller: Value) -> Flags:
         """Where a profile of some radius of curvature loses what the roller, or a flat face, has touched before."""
         return np.asarray((np.asarray(radius) <= 0) & (self.flat | np.asarray(radius > -roller)))
@@ -272,7 +269,6 @@ class CamFollower:
         return along
 
     @cached_property
-    @quiet
     def _out(self) -> float:
         """Sign by which the normal leads out of the cam: the origin of its frame lies inside of the outer profile."""
         return 1.0 if np.nansum(self._touch(self._whole, 1.0).swept) >= 0 else -1.0
@@ -281,7 +277,6 @@ class CamFollower:
         """Where the follower touches the cam; of a groove on its outer profile, if not on the other `side`."""
         return self._touch(configuration, -self._out if (side or self.sides[0]) == "inner" else self._out)
 
-    @quiet
     def _touch(self, configuration: Configuration, out: float) -> Touch:
         linear = Linearization(self.forward.structure, self._geometry, configuration)
         velocity = self.driven(linear)
@@ -346,12 +341,10 @@ class CamFollower:
         """Where the follower touches the cam."""
         return self.touch(configuration).place
 
-    @quiet
     def lever(self, configuration: Configuration) -> Value:
         """How fast the follower moves along the normal for each unit of its coordinate."""
         return self.touch(configuration).lever
 
-    @quiet
     def press(self, configuration: Configuration, effort: Value, pressed: Value | None = None) -> Pressed:
         """The contact force on the follower of an effort on its coordinate."""
         touch = self.touch(configuration)

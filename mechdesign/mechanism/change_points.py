@@ -13,7 +13,7 @@ import numpy as np
 from mechdesign.ground.errors import MechanismError
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.numerics.roots import dips
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
 
 # A closure, a difference of squared lengths, touches zero where it is below this part of its largest value.
@@ -105,7 +105,6 @@ class ChangePoints:
         own = [c for c, group in zip(self._all_closures(values, modes), closing, strict=True) if group == index]
         return np.stack([np.broadcast_to(c, values.shape) for c in own])
 
-    @quiet
     def _search(self, index: int, samples: Floats) -> Floats:
         table = self._closures(index, samples)
         low = (table[:, 1:-1] <= table[:, :-2]) & (table[:, 1:-1] < table[:, 2:])

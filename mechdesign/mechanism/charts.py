@@ -16,7 +16,7 @@ from scipy.linalg import qr
 from mechdesign.ground.errors import MechanismError
 from mechdesign.ground.notation import Step
 from mechdesign.ground.numerics.arrays import Floats, Ints
-from mechdesign.mechanism.algebra import TURN, Value, cross, quiet, rotation
+from mechdesign.mechanism.algebra import TURN, Value, cross, rotation
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled, angles_of, corners_of
 from mechdesign.mechanism.decomposition import compile_structure
@@ -115,7 +115,6 @@ class Chart:
         self.structure = compile_structure(mechanism.graph, given, couplings)
         self.plan = Plan(mechanism, self.structure, [0] * len(self.structure.groups), follows=False)
 
-    @quiet
     def solve(self, x: Floats, last: Configuration) -> Linearization:
         """Poses near to `x`, shape (m, poses), with its independent values, ready for derivatives by these.
 
@@ -147,7 +146,6 @@ class Chart:
         return Linearization(structure, positions.mechanism.geometry, configuration)
 
 
-@quiet
 def regularity(linear: Linearization) -> Floats:
     """How far a chart is from a pose where two assemblies meet, shape of the batch; 0 where it has no solution.
 

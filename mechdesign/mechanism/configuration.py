@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Ints
-from mechdesign.mechanism.algebra import Either, Value, Vector, angle_of, nearest, norm2, quiet
+from mechdesign.mechanism.algebra import Either, Value, Vector, angle_of, nearest, norm2
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
@@ -100,7 +100,6 @@ class Configuration:
         along: Vector = self.vectors.d[edge] * self.rotations[self.graph.edges[edge].frame]
         return along
 
-    @quiet
     def value(self, coordinate: Coordinate) -> Value:
         """Value of a coordinate; angles in radians, in the turn that `near` tells."""
         if coordinate.kind == "x":

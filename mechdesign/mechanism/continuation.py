@@ -118,15 +118,13 @@ def follow(
 
     def change(new: Floats, old: Floats) -> Floats:
         """Changes of the unknowns, angles the shorter way round; nan where a step failed."""
-        with np.errstate(invalid="ignore"):
-            return np.where(angles, wrap(new - old), new - old)
+        return np.where(angles, wrap(new - old), new - old)
 
     def planned(slope: Floats, table: Floats, turning: Floats) -> Floats:
         """Step over which the unknowns and what is counted change by less than they may."""
         speed = (np.abs(slope) / scale_of(structure, size, table)).max(axis=0, initial=0.0)
         speed = np.maximum(speed, (np.abs(turning) / units[:, None]).max(axis=0, initial=0.0) * MAX_CHANGE / MAX_TURNED)
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.minimum(1.0, PLANNED / speed))
+        return np.asarray(np.minimum(1.0, PLANNED / speed))
 
     table = table_of(start.unknowns, (count,)).copy()
     turns = np.array([np.broadcast_to(angle, (count,)) for angle in start.turns]).reshape(len(start.turns), count)
@@ -149,9 +147,8 @@ def follow(
         old = table[:, moving]
         new, state, turned = solve(moving, target, old + slope[:, moving] * taken)
         moved = change(new, old)
-        with np.errstate(invalid="ignore"):
-            good = (np.abs(moved) <= MAX_CHANGE * scale_of(structure, size, old)).all(axis=0)
-            good &= (np.abs(turned - turns[:, moving]) <= MAX_TURNED * units[:, None]).all(axis=0)
+        good = (np.abs(moved) <= MAX_CHANGE * scale_of(structure, size, old)).all(axis=0)
+        good &= (np.abs(turned - turns[:, moving]) <= MAX_TURNED * units[:, None]).all(axis=0)
         good &= state.solved(moving.shape, [sign[moving] for sign in signs])
         reached = moving[good]
         turning[:, reached] = (turned - turns[:, moving])[:, good] / taken[good]

@@ -5,7 +5,7 @@ Limits of motion that a study states are margins: positive inside, zero at the l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -47,7 +47,7 @@ class Bound:
 
     def margins(
         self, configuration: Configuration, places: Mapping[str, Value], *, smooth: bool = False
-    ) -> list[tuple[str, Value]]:  # fmt: skip
+    ) -> Iterator[tuple[str, Value]]:  # fmt: skip
         """Margins of this limit, each named; distances and legs as differences of squares, quadratic in positions.
 
         An angle between bounds is judged modulo a turn: it holds if (value - min) mod turn <= max - min. Where the
@@ -74,14 +74,13 @@ class Bound:
                 if not counted:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
-                return [(self.limit.name, margin)]
+                yield self.limit.name, margin
+                return
             value = configuration.value(self.coordinate)
-        margins = []
         if low is not None:
-            margins.append((f"{self.limit.name} min", value - low))
+            yield f"{self.limit.name} min", value - low
         if high is not None:
-            margins.append((f"{self.limit.name} max", high - value))
-        return margins
+            yield f"{self.limit.name} max", high - value
 
     def away(self, configuration: Configuration, places: Mapping[str, Value]) -> Value | None:
         """How far an angle between two bounds is from their middle (radians); None of other limits."""

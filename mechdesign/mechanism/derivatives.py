@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, dot, plus, quiet, times, vector
+from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, dot, plus, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
@@ -84,7 +84,6 @@ class Linearization(Loops):
         return self._columns[index]
 
     @cached_property
-    @quiet
     def conditionings(self) -> dict[int, Value]:
         """By index of the drives' groups, their distance from a singularity: from -1 to 1, zero at a singularity.
 
@@ -131,7 +130,6 @@ class Linearization(Loops):
             self._scales[index] = -1 / cross(a, b)
         return self._scales[index]
 
-    @quiet
     def _solve(
         self, given: Sequence[Value], rest: Sequence[Vector], rates: Rates | None = None, derived: Derived = first
     ) -> Rates:
@@ -197,7 +195,6 @@ class Linearization(Loops):
         count = len(self.structure.given)
         return [self.velocity([float(j == k) for j in range(count)]) for k in range(count)]
 
-    @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""
         rest: list[Vector] = []
@@ -213,7 +210,6 @@ class Linearization(Loops):
             accelerations, rest, derived=lambda pose, c, rates: second(pose, c, velocity, velocity, rates)
         )
 
-    @quiet
     def sensitivity(self, places: Sequence[str]) -> Rates:
         """Derivatives with respect to dimensions, the drives held; a leading axis runs over `places`.
 
@@ -228,7 +224,6 @@ class Linearization(Loops):
         }
         return self._solve(given, rest, Rates([], [], [], offsets, parameters))
 
-    @quiet
     def rate_sensitivity(
         self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates
     ) -> tuple[Rates, Rates]:
@@ -264,7 +259,6 @@ class Linearization(Loops):
             ),
         )  # fmt: skip
 
-    @quiet
     def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Vector]]:
         """Derivatives of `loop_columns` with respect to dimensions; `position` from `sensitivity`."""
         _, explicit, _ = self._explicit(places)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -47,21 +48,19 @@ class LinkWords(NamedTuple):
     telescopic: bool
 
 
-def groups_in_words(mechanism: Mechanism) -> list[str]:
+def groups_in_words(mechanism: Mechanism) -> Iterator[str]:
     """The links that the drives place directly, and the groups in the order of their solution."""
     description, graph, plan = mechanism.description, mechanism.graph, mechanism.forward
     placed = placed_before(graph, plan.structure)
     solved = [k for k, group in enumerate(plan.structure.groups) if group.solved]
     at_once = placed[solved[0]] if solved else placed[-1]
-    lines = []
     links = [body for body in graph.bodies if body in at_once and body != GROUND and not body.endswith(":rod")]
     if links:
-        lines.append(f"placed by the drives: {', '.join(links)}")
+        yield f"placed by the drives: {', '.join(links)}"
     if solved:
-        lines.append("solved in this order:")
+        yield "solved in this order:"
     for number, k in enumerate(solved, 1):
-        lines.append(f"  {number}. {group_in_words(description, graph, plan, k, placed[k])}")
-    return lines
+        yield f"  {number}. {group_in_words(description, graph, plan, k, placed[k])}"
 
 
 def sketch_doubts(mechanism: Mechanism) -> list[Caution]:
@@ -96,15 +95,13 @@ def describe(mechanism: Mechanism) -> str:
     return "\n".join([*lines, *(f"warning: {doubt}" for doubt in sketch_doubts(mechanism))])
 
 
-def links_in_words(description: Description) -> list[LinkWords]:
+def links_in_words(description: Description) -> Iterator[LinkWords]:
     """Every link with its points, and its length where it has two ends."""
-    words = []
     for name, link in description.links.items():
         points = (*link.points, *(end for end in link.ends or () if end not in link.points))
         length = link.points[link.ends[1]][0] if link.ends is not None and not link.telescopic else None
         number = description.places[length].nominal if isinstance(length, str) else length
-        words.append(LinkWords(name, points, number, link.telescopic))
-    return words
+        yield LinkWords(name, points, number, link.telescopic)
 
 
 def drives_in_words(description: Description) -> list[str]:

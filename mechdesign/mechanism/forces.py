@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, winding
 from mechdesign.mechanism.elements.links import Mass
@@ -117,7 +117,6 @@ class Forces:
             whole, moment = plus(whole, 1, force), moment + own + cross(nodes[self.bases[body]], force)
         return whole, moment
 
-    @quiet
     def power(self, velocity: Rates) -> Value:
         """What all forces together do per time."""
         total: Value = 0.0
@@ -149,7 +148,6 @@ class Energy:
         return Energy(self.kinetic + other.kinetic, self.potential + other.potential, self.lost + other.lost)
 
 
-@quiet
 def inertia(
     forces: Forces, geometry: Geometry, masses: Mapping[str, Mass], moving: Moving, gravity: complex, factor: float
 ) -> Energy:
@@ -227,7 +225,6 @@ def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
     return local_center(geometry, body, given, places) - base
 
 
-@quiet
 def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moving: Moving) -> Energy:
     """Add the forces of springs and dampers; those of no length pull in no direction.
 

@@ -6,7 +6,7 @@ normal forces. What the joints bear depends on friction in turn: see `mechdesign
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.mechanism.algebra import Value, Vector, largest, quiet
+from mechdesign.mechanism.algebra import Value, Vector, largest
 from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.elements.joints import Friction
@@ -55,7 +55,7 @@ class Rubbing(NamedTuple):
         return on - by
 
 
-def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]:
+def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> Iterator[Rubbing]:
     """The contacts with friction of a mechanism."""
     graph = joints.graph
     carriers = {
@@ -63,7 +63,6 @@ def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]
         if contact.by.startswith(PIN) and contact.joint == contact.by.removeprefix(PIN)
     }  # fmt: skip
     slides = {name: slide for slide, name in enumerate(graph.slides)}
-    contacts = []
     for k, contact in enumerate(joints.contacts):
         if contact.joint not in frictions:
             continue
@@ -71,10 +70,9 @@ def rubbings(joints: Joints, frictions: Mapping[str, Friction]) -> list[Rubbing]
         if slide is not None:
             guide, slider = graph.guides[slide]
             edge = graph.edge_of(slide)
-            contacts.append(Rubbing(contact.joint, k, slider, guide, slide, edge, frictions[contact.joint]))
+            yield Rubbing(contact.joint, k, slider, guide, slide, edge, frictions[contact.joint])
         elif contact.turns and (by := carriers.get(contact.by, contact.by)) != contact.on:
-            contacts.append(Rubbing(contact.joint, k, contact.on, by, None, -1, frictions[contact.joint]))
-    return contacts
+            yield Rubbing(contact.joint, k, contact.on, by, None, -1, frictions[contact.joint])
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +164,6 @@ class Rubs:
         """What the contacts bear without friction, and its slopes."""
         return self.borne(self.smooth), self._slopes(self.smooth)
 
-    @quiet
     def solve(self, rates: Rates, *, back: bool = False) -> Rubbed:
         """The equilibrium while the mechanism moves at some rates, or `back` against them; their signs count."""
         relative = -self.relative(rates) if back else self.relative(rates)
@@ -260,7 +257,6 @@ class Efficiency(NamedTuple):
     holds: Flags
 
 
-@quiet
 def efficiency(efforts: Sequence[Value], rates: Sequence[Value], lost: Floats) -> Efficiency:
     """Efficiency at poses, from efforts and rates of the drives and the (negative) power of friction."""
     powers = np.broadcast_arrays(lost, *(effort * rate for effort, rate in zip(efforts, rates, strict=True)))[1:]

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.outputs import first
@@ -34,7 +34,6 @@ class Jacobian:
     shape: tuple[int, ...]
 
     @staticmethod
-    @quiet
     def of(linear: Linearization, rows: Sequence[Coordinate], length: Value | None = None) -> Jacobian:
         """The Jacobian at configurations; with `length`, the arc of one radian, angles count as lengths."""
         drives = linear.structure.given
@@ -52,7 +51,6 @@ class Jacobian:
         return _matrix(self.entries, self.shape)
 
     @cached_property
-    @quiet
     def determinant(self) -> Value:
         """Determinant of a square Jacobian per radian; nan where an entry is nan."""
         return self._determinant(self.entries)
@@ -74,7 +72,6 @@ class Jacobian:
         return np.where(finite, determinant, np.nan)
 
     @cached_property
-    @quiet
     def inverse_condition(self) -> Value:
         """Smallest over largest singular value, 0 at a singularity; nan where an entry is."""
         if len(self.homogeneous) == 2:
@@ -88,7 +85,6 @@ class Jacobian:
         return np.where(largest > 0, least / largest, 0.0 * largest)
 
     @cached_property
-    @quiet
     def singular_values(self) -> tuple[Value, Value]:
         """Smallest and largest singular value; nan where an entry is."""
         if len(self.homogeneous) == 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -79,13 +79,11 @@ class Joints:
         counts = Counter(contact.joint for contact in self.contacts)
         return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
 
-    def _slides(self) -> list[Contact]:
-        contacts = []
+    def _slides(self) -> Iterator[Contact]:
         for k, edge in enumerate(self.graph.edges):
             if edge.slide is not None and (pair := self.graph.guides[edge.slide])[1]:
                 name, (guide, slider) = self.graph.slides[edge.slide], pair
-                contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), turns=False, slides=True))
-        return contacts
+                yield Contact(name, slider, guide, edge.head, ((k, -1),), turns=False, slides=True)
 
     def _members(self) -> dict[int, list[_Member]]:
         """By node, what meets there."""
@@ -112,12 +110,11 @@ class Joints:
             members[node] += listed
         return members
 
-    def _pins(self) -> list[Contact]:
-        contacts = []
+    def _pins(self) -> Iterator[Contact]:
         for node, members in self._members().items():
             point = self.graph.nodes[node]
             clamped, free = self._clamped(node, members)
-            contacts += clamped
+            yield from clamped
             if len(free) == 1:
                 self.sole[node] = free[0].name
             # The pin that a ground's origin would be bears nothing.
@@ -126,22 +123,18 @@ class Joints:
             ground = next((member for member in free if member.name == GROUND and not member.slot), None)
             if ground is not None:
                 # The pin is fixed in the ground, and so is what acts on it.
-                for member in free:
-                    if member is not ground:
-                        contacts.append(
-                            Contact(member.slot, GROUND, member.name, node, member.edges)
-                            if member.slot else _borne(point, member, GROUND, node)
-                        )  # fmt: skip
+                for member in (other for other in free if other is not ground):
+                    slotted = member.slot and Contact(member.slot, GROUND, member.name, node, member.edges)
+                    yield slotted or _borne(point, member, GROUND, node)
             elif len(free) == 2 and node not in self.loaded:
                 by, on = sorted(free, key=lambda member: not member.slot)
-                contacts.append(_borne(by.slot or point, on, by.name, node))
+                yield _borne(by.slot or point, on, by.name, node)
             else:
                 pin = f"{PIN}{point}"
-                contacts += [_borne(point, member, pin, node) for member in free if not member.slot]
-                contacts += [
+                yield from (_borne(point, member, pin, node) for member in free if not member.slot)
+                yield from (
                     Contact(member.slot, pin, member.name, node, member.edges) for member in free if member.slot
-                ]
-        return contacts
+                )
 
     def _clamped(self, node: int, members: Sequence[_Member]) -> tuple[list[Contact], list[_Member]]:
         """The clamps at a node, and its members: of links clamped together one, the ground or a first, with all edges.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.derivatives import Linearization, inner
 from mechdesign.mechanism.loops import Unknowns, rows_of
@@ -142,7 +142,6 @@ class Margins:
         return cross(np.asarray(one), np.asarray(two))
 
 
-@quiet
 def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floats]:
     """Margins of assembly with the drives held, and their derivatives by dimensions; a margin of 0 is a dead centre.
 
@@ -226,7 +225,6 @@ def turning_point(
     return end, plan.configuration(state, (), near.places, None), index
 
 
-@quiet
 def _fold(
     plan: Plan, given: Callable[[float], Sequence[float]], place: float, reach: float, near: Configuration,
     guess: Unknowns, index: int,

@@ -171,6 +171,7 @@ class Mechanism(Core):
         closing.check_regular(self, plan, configuration)
         return configuration
 
+    @np.errstate(all="ignore")
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:
         """One pose or a batch, in the study's units: ``mechanism.solve({"theta": 60})["C.x"]``.
 
@@ -229,10 +230,12 @@ class Pose:
         self.configuration = configuration
 
     @property
+    @np.errstate(all="ignore")
     def valid(self) -> Flags:
         """Whether each pose is assembled and within its limits."""
         return self.configuration.valid
 
+    @np.errstate(all="ignore")
     def __getitem__(self, name: str) -> Floats:
         coordinate = self.mechanism.coordinate(name)
         value = np.asarray(self.configuration.value(coordinate), dtype=float)

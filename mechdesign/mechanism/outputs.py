@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mechdesign.ground.functions import Dual
-from mechdesign.mechanism.algebra import Value, Vector, dot, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, dot, norm2
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 
@@ -40,7 +40,6 @@ class Rates:
     ends: Mapping[tuple[str, int], Vector] = field(default_factory=dict)
 
 
-@quiet
 def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) -> Value:
     """First derivative of a coordinate along `rates` (in time, by a drive or by a dimension); angles in radians."""
     kind = coordinate.kind
@@ -65,7 +64,6 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
                                     for g, part in zip(gradient, coordinate.parts, strict=True)))  # fmt: skip
 
 
-@quiet
 def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Pulls:
     """Forces and moments whose work on any `rates` is ``effort * first(coordinate, rates)``: the adjoint of `first`."""
     pulls = Pulls({}, {}, {})
@@ -101,7 +99,6 @@ def node_forces(configuration: Configuration, coordinate: Coordinate, effort: Va
     return [(coordinate.node, effort * ways[coordinate.kind])] if coordinate.kind in ways else []
 
 
-@quiet
 def second(configuration: Configuration, coordinate: Coordinate, one: Rates, other: Rates, both: Rates) -> Value:
     """Second derivative of a coordinate, along `one` and `other`; `both` has those of positions.
 
@@ -123,7 +120,6 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
     return first(configuration, coordinate, both)
 
 
-@quiet
 def acceleration_sensitivity(
     configuration: Configuration, coordinate: Coordinate, by_time: Sequence[Rates], by_z: Sequence[Rates]
 ) -> Value:  # fmt: skip

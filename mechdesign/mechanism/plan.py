@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.work.chunks import map_chunks, worker_count
 from mechdesign.ground.work.threads import keep_freed_memory
-from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, picked, quiet
+from mechdesign.mechanism.algebra import TURN, Value, angle_of, cross, norm2, picked
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start
@@ -90,7 +90,6 @@ class Plan:
         """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""
         return self.modes if self.change_points is None else self.change_points.modes(given[0])
 
-    @quiet
     def run(
         self,
         given: Sequence[Value],
@@ -310,20 +309,19 @@ class Plan:
     ) -> Configuration:
         """A state as a configuration, with the reason of each pose; angles that are `given` keep their turns."""
         graph = self.core.graph
-        with np.errstate(invalid="ignore"):
-            open_: Flags = np.zeros((), dtype=bool)
-            # A group that does not close leaves nan in its first unknown.
-            values = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
-            values += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
-            values += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
-            values += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
-            values += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
-            for value in values:
-                open_ = open_ | ~np.isfinite(np.real(value))
-            for slide in graph.telescopic:
-                open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
-            for k, _ in self.structure.spans:
-                open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
+        open_: Flags = np.zeros((), dtype=bool)
+        # A group that does not close leaves nan in its first unknown.
+        values = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
+        values += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
+        values += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
+        values += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
+        values += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
+        for value in values:
+            open_ = open_ | ~np.isfinite(np.real(value))
+        for slide in graph.telescopic:
+            open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
+        for k, _ in self.structure.spans:
+            open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
         reason = np.zeros(shape, dtype=np.int8)
         if np.any(open_):
             reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
@@ -377,9 +375,8 @@ class Plan:
     def judge(self, configuration: Configuration) -> None:
         """Set the reason of solved poses that are outside the study's limits."""
         reason, places = configuration.reason, {**self.core.nominal, **configuration.places}
-        with np.errstate(invalid="ignore"):
-            for bound in self.core.bounds:
-                slack = LIMIT_ROUNDING * bound.scale(self.core.size)
-                for _, margin in bound.margins(configuration, places):
-                    outside = np.broadcast_to(margin, configuration.shape) < -slack
-                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+        for bound in self.core.bounds:
+            slack = LIMIT_ROUNDING * bound.scale(self.core.size)
+            for _, margin in bound.margins(configuration, places):
+                outside = np.broadcast_to(margin, configuration.shape) < -slack
+                reason[outside & (reason == Reason.OK)] = Reason.LIMIT

@@ -18,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes
-from mechdesign.mechanism.algebra import Value, Vector, cross, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.elements.joints import Fixed
@@ -193,7 +193,6 @@ class Clearances:
         return self.configuration.nodes[self.mechanism.graph.node(point)]
 
 
-@quiet
 def gap(one: Sequence[Vector], other: Sequence[Vector]) -> Value:
     """Distance of the convex hulls of two sets of corners, arrays that broadcast; minus the depth where they overlap.
 

@@ -131,12 +131,11 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
         return total
 
     determinant = expand(range(MINORS_ORDER))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        scale = np.divide(1.0, determinant)
-        unknowns = [
-            scale * expand([MINORS_ORDER if column == j else column for column in range(MINORS_ORDER)])
-            for j in range(count)
-        ]
+    scale = np.divide(1.0, determinant)
+    unknowns = [
+        scale * expand([MINORS_ORDER if column == j else column for column in range(MINORS_ORDER)])
+        for j in range(count)
+    ]
     return unknowns, determinant
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus
 from mechdesign.mechanism.cams import Engagement
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
@@ -49,7 +49,6 @@ class Balance:
     pressed: Sequence[Value] = ()  # efforts of the couplings, by which the teeth press
 
 
-@quiet
 def balance(
     linear: Linearization, forces: Forces, engaged: Sequence[Engagement] = (), *,
     pressed: Sequence[Value] | None = None,
@@ -77,7 +76,6 @@ def balance(
     return replace(_balance(linear, forces.plus(acting)), pressing=pressing, pressed=held.couplings)
 
 
-@quiet
 def _balance(linear: Linearization, forces: Forces) -> Balance:
     structure, bodies = linear.structure, linear.graph.bodies
     nodes = list(forces.nodes)
@@ -178,7 +176,6 @@ class Reaction(NamedTuple):
     normal: Value
 
 
-@quiet
 def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
     """What each contact bears; nan for moments of chains of slides and clamps that equilibrium leaves open."""
     linear, outside = balance.linear, balance.forces.bodies

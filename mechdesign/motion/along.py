@@ -12,7 +12,7 @@ from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.numerics.rounding import STILL, cleared, larger, unchanging
 from mechdesign.ground.results import TableKind
 from mechdesign.ground.statistics import Part, Request
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.ends import Ends, MotionEnd
@@ -290,7 +290,6 @@ class PlainAlong(AlongMotion):
     def again(self, curve: Curve, requests: Collection[Request], also: Collection[str] = ()) -> PlainAlong:
         return PlainAlong(curve, self._values, requests, also, self._poled)
 
-    @quiet
     def _evaluated(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         there = self.curve.solve(line, s, judged=False)
         arrays = {**there.poses.named, **self._values(there), PACE: self.curve.poses.pace(line, s)}

@@ -8,7 +8,6 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.motion.along import AlongMotion
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.motion import SolvedPoses
@@ -85,7 +84,6 @@ def ways_of(curve: Curve, points: Sequence[str]) -> Callable[[Floats], Complexes
     return ways
 
 
-@quiet
 def paths_of(configuration: Configuration, points: Sequence[str]) -> Complexes:
     """Where points are in solved poses, shape (points, poses)."""
     places = [np.where(configuration.valid, configuration.point(point), np.nan) for point in points]

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value, largest, quiet
+from mechdesign.mechanism.algebra import Value, largest
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
@@ -62,12 +62,11 @@ class JointFriction:
 
     def __init__(self, mechanism: Mechanism, joints: Joints) -> None:
         self.mechanism, self.joints = mechanism, joints
-        self.contacts: list[Rubbing] = rubbings(joints, mechanism.description.friction)
+        self.contacts: list[Rubbing] = [*rubbings(joints, mechanism.description.friction)]
         #: Joints with friction, by which marks count.
         self.names = list(dict.fromkeys(contact.joint for contact in self.contacts))
         self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])
 
-    @quiet
     def solve(
         self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True,
         given: Floats | None = None,

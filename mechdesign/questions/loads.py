@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.ground.expressions import Corner, Expression, Number
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import norm2, quiet
+from mechdesign.mechanism.algebra import norm2
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
@@ -40,7 +40,6 @@ class Loading:
     def __init__(self, study: Study, loads: Sequence[Load], poses: PoseNumbers) -> None:
         self.study, self.loads, self.poses = study, loads, poses
 
-    @quiet
     def add(self, forces: Forces, moving: Moving) -> None:
         """Add the loads to forces."""
         configuration = forces.configuration

@@ -11,11 +11,6 @@ from pathlib import Path
 import pytest
 
 
-@pytest.fixture(autouse=True)
-def inside(silent: None) -> None:
-    """NumPy is silent, as inside a question: rooms of the package are measured."""
-
-
 @pytest.fixture(scope="session")
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Compile a program by name; skips where there is no gcc, or no folder of programs is named."""

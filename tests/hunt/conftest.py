@@ -21,11 +21,6 @@ from collections.abc import Callable, Iterator
 import pytest
 
 
-@pytest.fixture(autouse=True)
-def inside(silent: None) -> None:
-    """NumPy is silent, as inside a question: many searches ask rooms of the package."""
-
-
 @pytest.fixture
 def seeds(request: pytest.FixtureRequest) -> Callable[[int], Iterator[int]]:
     """Seeds 0, 1, 2 ...: the asked number of them, or as the options say."""

@@ -29,9 +29,6 @@ from mechdesign.questions.stiffness.force_method import load, twists_of
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 # What is rigid, but for rounding: whatever gives has a compliance of 1e-6 or more.
 NOTHING = 1e-15
 

@@ -17,9 +17,6 @@ from mechdesign.region.rays import BATCH, SINGLE
 from mechdesign.region.rules import Rule
 from mechdesign.study import Study
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 CONFIGS = Path(__file__).parents[2] / "configs"
 WEIGHTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1))
 # Rows in the order of WEIGHTS: variables, then GII, GRI, SUI, CPI as printed, but for the misprints named in the tests.

@@ -19,9 +19,6 @@ from mechdesign.questions.dynamics.figures.free_bodies import FreeBody, free_bod
 from mechdesign.questions.dynamics.figures.view import DynamicsView
 from mechdesign.questions.dynamics.free_bodies import Action, actions_on
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 SPRUNG = """
 units: {length: mm}
 mechanism:

@@ -14,9 +14,6 @@ from mechdesign.questions.reliability.methods.form import form
 from mechdesign.questions.reliability.methods.importance_sampling import importance_sampling
 from mechdesign.questions.reliability.schema.section import Precision
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
     "band_1": limit_states.band(1, 4.0),

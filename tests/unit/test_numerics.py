@@ -15,9 +15,6 @@ from mechdesign.ground.numerics.graphs import components
 from mechdesign.ground.numerics.roots import bracketed_roots
 from mechdesign.ground.numerics.sign_changes import Resolved
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 
 @pytest.mark.parametrize("seed", range(30))
 def test_components_of_random_graphs(seed):

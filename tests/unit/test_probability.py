@@ -15,9 +15,6 @@ from mechdesign.questions.reliability.first_order import correlation
 from mechdesign.questions.reliability.probability import estimated_failure, failure_probability
 from mechdesign.questions.reliability.question import Limit
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 
 def quadrant(h: float, k: float, rho: float) -> float:
     """P(X < h, Y < k) by Owen's T function (Owen 1956), for h and k other than zero."""

@@ -15,9 +15,6 @@ from mechdesign.questions.workspace.question import questions
 from mechdesign.region.panels import find_panels
 from mechdesign.region.rays import BATCH, SINGLE, Designs, Effort, trace
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 ARM = """
 units: {length: dimensionless}
 mechanism:

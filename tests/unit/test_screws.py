@@ -27,9 +27,6 @@ from mechdesign.questions.stiffness.screws import (
     slide_twist,
 )
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 LENGTH = 1.0
 
 

@@ -9,9 +9,6 @@ import pytest
 
 from mechdesign.ground.numerics.zero_curves import joined, zero_curves
 
-# NumPy is silent, as inside a question.
-pytestmark = pytest.mark.usefixtures("silent")
-
 # Lines of a grid, on none of which a known function has a root.
 LINES = np.linspace(-1.05, 1, 40)
 

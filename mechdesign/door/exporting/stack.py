@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -36,7 +36,7 @@ def layers_csv(view: PosedStudy) -> Content:
     The rod of a telescopic link lies in the layer of its body.
     """
     description, thickness = view.mechanism.description, view.millimetres * float(view.sizes.thickness)
-    stack = stacked(tuple(description.links), pins_of(description), meetings_of(view), view.plates.layers)
+    stack = stacked(tuple(description.links), pins_of(description), [*meetings_of(view)], view.plates.layers)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
@@ -110,7 +110,7 @@ class Layering:
         return (Caution("infeasible", f"{head}; here {several(self.meetings)}"),)
 
 
-def meetings_of(view: PosedStudy) -> list[Meeting]:
+def meetings_of(view: PosedStudy) -> Iterator[Meeting]:
     """What meets in the plane over the motion.
 
     Between two poses a distance changes by no more than the fastest corners move: what could meet there counts.
@@ -120,7 +120,6 @@ def meetings_of(view: PosedStudy) -> list[Meeting]:
     clearances = Clearances(view.mechanism, view.plates, view.track.configuration, corners)
     plates, pins = [plate_of(link) for link in description.links], pins_of(description)
     shared = {frozenset(pair): pin.name for pin in pins for pair in combinations(pin.links, 2)}
-    meetings = []
     for one, other in combinations([*plates, *pins], 2):
         common = [link for link in one.links if link in other.links]
         point = shared.get(frozenset((one.name, other.name)))
@@ -132,8 +131,7 @@ def meetings_of(view: PosedStudy) -> list[Meeting]:
         else:
             pose = _first(view, clearances, one, other, common[0] if common else None)
         if pose:
-            meetings.append(Meeting(one, other, pose))
-    return meetings
+            yield Meeting(one, other, pose)
 
 
 def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, link: str | None) -> str:

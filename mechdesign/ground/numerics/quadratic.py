@@ -20,7 +20,6 @@ RESIDUAL = 1e-9
 REGULAR = 1e-13
 
 
-@np.errstate(all="ignore")
 def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floats) -> tuple[Floats, Floats]:
     """Points where ``z bent z / 2 + slope z`` is least under ``rows z <= bounds``, and the multipliers of the rows.
 

@@ -17,7 +17,7 @@ from mechdesign.ground.expressions import Corner, Expression
 from mechdesign.ground.notation import Step
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.numerics.sign_changes import Resolved
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.rules import TIME
 from mechdesign.questions.dynamics.instants import Instants
@@ -41,7 +41,6 @@ class ActingExpression(NamedTuple):
     coordinate: Coordinate | None = None
     coupling: bool = False
 
-    @quiet
     def value(self, part: Expression, instants: Instants) -> Floats:
         """Value of a part of the expression along the motion."""
         if self.coordinate is None:

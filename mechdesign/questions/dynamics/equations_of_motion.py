@@ -21,7 +21,6 @@ from mechdesign.ground.notation import Step
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.ground.numerics.linear import solved
 from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.charts import Chart, Charts, Positions, Sides, regularity
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
@@ -170,7 +169,6 @@ class EquationsOfMotion:
             )
         return pose, linear, np.array(speeds)
 
-    @quiet
     def slopes(self, linear: Linearization) -> Floats:
         """Derivatives of all positions by the given coordinates at a single pose, shape (m, mobility)."""
         return np.array([[np.ravel(first(linear.configuration, c, rates))[0] for rates in linear.by_drives]
@@ -199,7 +197,6 @@ class EquationsOfMotion:
         return [np.sum(np.where(weights == 0, 0.0, part.reshape(*part.shape[:-1], *shape)) * weights, axis=-1)
                 for part in rates]  # fmt: skip
 
-    @quiet
     def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[RatesInTime, Floats]:
         """Rates where the equations have full rank, and how regular they are."""
         chart, last, _, _, window = self.branch

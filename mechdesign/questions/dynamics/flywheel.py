@@ -12,7 +12,7 @@ from mechdesign.ground.cautions import Caution
 from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import Table
 from mechdesign.ground.statistics import Request, no_value_along
-from mechdesign.mechanism.algebra import Vector, quiet
+from mechdesign.mechanism.algebra import Vector
 from mechdesign.motion.motion import radians
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
@@ -27,7 +27,6 @@ from mechdesign.questions.kinematics.moved import MovedQuestion
 SAME, ROUNDING = 1e-6, 1e-12
 
 
-@quiet
 def flywheel_table(motion: PoseValues, along: KinematicAlong | None, wheel: Flywheel) -> tuple[Table, list[Caution]]:
     """The table, and a warning where the motion is no cycle or is only taken as one; nan where it is none."""
     question, study, numbers = motion.question, motion.question.study, np.full(5, np.nan)

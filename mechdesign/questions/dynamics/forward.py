@@ -14,7 +14,7 @@ from mechdesign.ground.numerics.arrays import Floats, evenly
 from mechdesign.ground.numerics.sign_changes import Resolved
 from mechdesign.ground.progress import Progress
 from mechdesign.ground.results import Result, Scope, Table
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.motion import SolvedPoses, in_study_units
 from mechdesign.motion.passage import MAX_SHOWN_POSES
@@ -170,7 +170,6 @@ def _forces(integration: Integration, course: IntegratedPoses) -> tuple[PoseValu
     return motion, Shown(study, poses, rows[some], course.configuration.take(rows[some]))
 
 
-@quiet
 def _forward_table(motion: PoseValues, course: IntegratedPoses, outputs: list[Coordinate]) -> Table:
     study, poses, label = motion.question.study, motion.question.poses, motion.question.study.units.label
     columns: list[Column] = [TIMED.column(course.times, label("time"))]

@@ -11,7 +11,7 @@ from mechdesign.ground.cautions import Caution
 from mechdesign.ground.columns import Column
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Table
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Moving
@@ -49,7 +49,6 @@ def further_tables(motion: PoseValues, along: KinematicAlong | None) -> tuple[di
     return tables, warnings
 
 
-@quiet
 def _modes_table(motion: PoseValues) -> Table:
     """A row each pose and mode."""
     question, study = question_of(motion), motion.question.study

@@ -16,7 +16,7 @@ from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Strands
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.elements.declared import Term
@@ -141,7 +141,6 @@ class ForceQuestion:
         """Whether a column, or one of those that begin with it, is computed."""
         return self.subset is None or any(own == name or own.startswith(f"{name}.") for own in self.subset)
 
-    @quiet
     def columns(
         self, poses: PoseNumbers, linear: Linearization, moving: Moving
     ) -> Mapping[str, Value]:  # fmt: skip

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.numerics.rounding import STILL, cleared, larger, unchanging
 from mechdesign.ground.results import Table
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.motion.along import of_swept
 from mechdesign.motion.question import PoseValues
 from mechdesign.questions.columns import VALID
@@ -65,7 +64,6 @@ def joint_table(motion: PoseValues) -> Table:
     return replace(bears, strands=question.strands)
 
 
-@quiet
 def extremes_table(motion: PoseValues, along: KinematicAlong | None, names: Collection[str]) -> Table:
     """``extremes.csv``: smallest and largest values, peaks and means of some columns over the motion.
 

@@ -126,7 +126,7 @@ def _beyond(coordinate: Coordinate, value: Value, instants: Instants) -> Value:
 
 def _margin(bound: Bound, places: Mapping[str, Value], k: int, instants: Instants) -> Value:
     """Margin of a limit by its number."""
-    return bound.margins(instants.configuration, places, smooth=True)[k][1]
+    return [margin for _, margin in bound.margins(instants.configuration, places, smooth=True)][k]
 
 
 def _slack(contact: int, instants: Instants) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import POSES_ONLY
 from mechdesign.ground.statistics import Request
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.four_bars import FourBar
@@ -152,7 +152,6 @@ class KinematicAlong(AlongMotion):
         self._chains[name] = groups
         return name
 
-    @quiet
     def _evaluated(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         there = self.curve.solve(line, s, judged=False, turning=self._turning)
         configuration, whole = there.configuration, self.question.poses

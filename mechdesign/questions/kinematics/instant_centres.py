@@ -16,7 +16,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Vector, quiet
+from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.outputs import Rates
 
@@ -52,7 +52,6 @@ class Centre:
         """Name of how fast one turns against the other: where it is 0, the centre is at infinity."""
         return f"{self.name}.turn"
 
-    @quiet
     def at(
         self, mechanism: Mechanism, configuration: Configuration, velocity: Rates
     ) -> tuple[Complexes, Ints, Floats]:  # fmt: skip

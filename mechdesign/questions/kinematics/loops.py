@@ -10,7 +10,6 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, firsts
 from mechdesign.ground.results import Table
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.motion.along import of_swept
 from mechdesign.motion.functions import Zeros
@@ -88,7 +87,6 @@ def loops_table(
     return LOOPS.table(columns, **over(along, ()))
 
 
-@quiet
 def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over the poses, and its row; shape (loops, designs)."""
     poses = motion.poses

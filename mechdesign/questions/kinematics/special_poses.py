@@ -11,7 +11,6 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Ints, distinct
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import PoseValues
@@ -198,7 +197,6 @@ def _points(motion: PoseValues) -> Sequence[str]:
     return points
 
 
-@quiet
 def _moving(
     question: KinematicQuestion, solved: SolvedPoses, words: Sequence[tuple[float, float, str, str]]
 ) -> list[SpecialPose]:  # fmt: skip

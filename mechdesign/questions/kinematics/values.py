@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Flags
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.elements.couplings import play
@@ -118,7 +118,6 @@ def statics(
     return columns
 
 
-@quiet
 def _rests(linear: Linearization, output: Coordinate, mechanism: Mechanism) -> Value:
     """Where a coupling holds its follower at rest while what it follows moves, so that an output rests with it."""
     configuration, (velocity,), (drive,) = linear.configuration, linear.by_drives, linear.structure.given
@@ -150,7 +149,6 @@ def pole_of(question: KinematicQuestion, arrays: Mapping[str, Value], linear: Li
     return cam.touch(linear.configuration).pitch
 
 
-@quiet
 def _rates_of_advantage(
     question: KinematicQuestion, linear: Linearization, output: str, input_name: str
 ) -> tuple[Value, Value]:
@@ -161,7 +159,6 @@ def _rates_of_advantage(
     return rows[0][k], rows[1][k]
 
 
-@quiet
 def _advantage(question: KinematicQuestion, linear: Linearization, output: str, input_name: str) -> Value:
     """Force of an output over that at its input: by virtual work the input's rate over the output's."""
     mechanism = question.study.mechanism

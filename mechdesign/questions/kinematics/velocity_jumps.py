@@ -9,7 +9,6 @@ import numpy as np
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import counted
 from mechdesign.ground.numerics.arrays import Floats, distinct
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.questions.kinematics.moved import MovedQuestion
 from mechdesign.questions.kinematics.rates import moving_at
 
@@ -17,7 +16,6 @@ from mechdesign.questions.kinematics.rates import moving_at
 JUMPED, BESIDE = 1e-5, 1e-8
 
 
-@quiet
 def velocity_jumps(question: MovedQuestion, bodies: Collection[str], design: int = 0) -> Floats:
     """Places of a design's motion, in rows, at which velocities of some bodies jump; its first and last do not count.
 

@@ -10,6 +10,7 @@ from math import comb
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.numerics import fronts
@@ -143,8 +144,6 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
 
     Designs of a front mostly lie on a smooth surface, so that midway between two of them is nearly another one.
     """
-    from scipy.spatial import cKDTree
-
     distance = WIDEST_GAP
     while distance >= FINEST_GAPS.get(len(signs), FINEST_GAP):
         points = explorer.points
@@ -154,7 +153,7 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
         share = normalised(points.values[rows] * signs)
         # One design in each cell of this width, and those in the cells beside it.
         cells = np.unique(np.floor(share / distance), axis=0, return_index=True)[1]
-        pairs = cells[cKDTree(share[cells]).query_pairs(BESIDE_CELL * distance, output_type="ndarray")]
+        pairs = cells[scipy.spatial.cKDTree(share[cells]).query_pairs(BESIDE_CELL * distance, output_type="ndarray")]
         pairs = pairs[np.linalg.norm(share[pairs[:, 0]] - share[pairs[:, 1]], axis=1) > distance / 2]
         middles = points.u[rows[pairs]].mean(axis=1)
         with suppress(Spent):
@@ -233,13 +232,11 @@ def normalised(values: Floats) -> Floats:
 
 def distinct(values: Floats) -> Ints:
     """Rows of a front without designs that count as one; the ends of the front stay."""
-    from scipy.spatial import cKDTree
-
     share = normalised(values)
     order = np.array([*dict.fromkeys((*ends(share), *range(len(share))))])
     kept = np.ones(len(share), dtype=bool)
     distance = DESIGN_DISTANCE if values.shape[1] == 2 else SURFACE_DISTANCE
-    pairs = np.sort(cKDTree(share[order]).query_pairs(distance, p=np.inf, output_type="ndarray"), axis=1)
+    pairs = np.sort(scipy.spatial.cKDTree(share[order]).query_pairs(distance, p=np.inf, output_type="ndarray"), axis=1)
     for one, other in pairs[np.lexsort(pairs.T[::-1])].tolist():
         kept[other] &= not kept[one]
     return np.sort(order[kept])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.descent import descend
@@ -301,10 +302,8 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, most
     It evaluates at most `most` points. [Storn & Price, Differential evolution, 1997;
     scipy.optimize.differential_evolution.]
     """
-    from scipy.optimize import differential_evolution
-
     # SciPy's stubs do not know `vectorized`.
-    begin_evolution: Any = differential_evolution
+    begin_evolution: Any = scipy.optimize.differential_evolution
 
     size = max(SMALLEST_POPULATION, POPULATION * explorer.dimensions)
     if most < size:

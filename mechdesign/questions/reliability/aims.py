@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.expressions import Number
 from mechdesign.ground.numerals import numeral
@@ -58,15 +59,11 @@ class Reliable:
 
     def level(self, measure: Number) -> Floats:
         """Logarithm of the distance, in standard deviations, of symmetric limits broken with this probability."""
-        from scipy.special import ndtri
-
-        return np.log(np.maximum(-ndtri(0.5 * np.maximum(measure, _LEAST_FAILURE)), _LEAST_DISTANCE))
+        return np.log(np.maximum(-scipy.special.ndtri(0.5 * np.maximum(measure, _LEAST_FAILURE)), _LEAST_DISTANCE))
 
     def measure(self, level: Number) -> Floats:
         """The inverse of `level`."""
-        from scipy.special import ndtr
-
-        return np.asarray(2.0 * ndtr(-np.exp(level)))
+        return np.asarray(2.0 * scipy.special.ndtr(-np.exp(level)))
 
     def shown(self, measure: Floats) -> Floats:
         """The measure as tables have it: the reliability."""

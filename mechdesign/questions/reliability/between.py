@@ -6,6 +6,7 @@ All methods judge the poses alone, and a cycle is one made mechanism at all of t
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.numerals import numeral
@@ -79,13 +80,11 @@ def between_poses(task: Task, places: Task) -> list[Caution]:
 
 def _worst(task: Task) -> Floats:
     """Probability of failure by the limit, or the margin of assembly, that is broken most often, shape (poses,)."""
-    from scipy.special import ndtr
-
     from mechdesign.questions.reliability.probability import failure_probability
 
     question, linear = task.question.at(task.nominal), task.linear
     mean, covariance = linear.whole.shift().T, linear.whole.covariance()
-    failure = ndtr(-task.closing.distance()).max(axis=0, initial=0.0)
+    failure = scipy.special.ndtr(-task.closing.distance()).max(axis=0, initial=0.0)
     for rows in linear.alike():
         for limit in question.limits:
             own = failure_probability(covariance[rows], linear.limits([limit], rows), mean[rows])

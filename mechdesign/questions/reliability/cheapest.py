@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.aims import Aim
@@ -169,8 +170,6 @@ class ToleranceModel:
 
 def cheapest(model: ToleranceModel, targets: Floats) -> Floats:
     """Factors of the cheapest tolerances that reach the levels `targets`, shape (limits, poses); else the tightest."""
-    from scipy.optimize import minimize
-
     count = len(model.free)
     lowest, highest = np.log(model.tightest), np.log(model.widest)
     every = range(len(model.task.settings))
@@ -194,7 +193,7 @@ def cheapest(model: ToleranceModel, targets: Floats) -> Floats:
     active = [int(np.argmin(margins(alike, every).min(axis=0)))]
     for _ in range(_MAX_ROUNDS):
         constraint = {"type": "ineq", "fun": flat, "jac": slopes, "args": (tuple(active),)}
-        optimum: Any = minimize(
+        optimum: Any = scipy.optimize.minimize(
             lambda x: model.cost(x)[0] / unit, alike, jac=lambda x: model.cost(x)[1] / unit, method="SLSQP",
             bounds=list(zip(lowest.tolist(), highest.tolist(), strict=True)), constraints=constraint,
             options={"maxiter": 300, "ftol": 1e-12},
@@ -213,8 +212,6 @@ def _shifted(
     margins: Callable[..., Floats], x: Floats, lowest: Floats, highest: Floats, every: Sequence[int]
 ) -> Floats:
     """Logarithms x of the tolerances plus the largest common shift at which all poses reach their levels."""
-    from scipy.optimize import brentq
-
     reach = float((highest - lowest).max())
     active: list[int] = []
     shifted = x
@@ -229,5 +226,5 @@ def _shifted(
             return float(margins(np.clip(x + shift, lowest, highest), tuple(active)).min())
 
         # The root's tolerance lies on the tighter side.
-        shift = brentq(least, -reach, reach, xtol=1e-10) - 2e-10
+        shift = scipy.optimize.brentq(least, -reach, reach, xtol=1e-10) - 2e-10
         shifted = np.clip(x + shift, lowest, highest)

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.expressions import Number
@@ -124,8 +125,6 @@ def _hermite(law: Marginal, powers: int) -> Floats:
 
 def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
     """Correlation of the normal variables behind two laws whose deviations have this coefficient."""
-    from scipy.optimize import brentq
-
     size = float(np.sqrt(one.moments[1] * other.moments[1]))
     if size == 0 or (isinstance(one, Normal) and isinstance(other, Normal)):
         return coefficient
@@ -136,4 +135,4 @@ def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
             f"reliability.correlation: two dimensions of these distributions cannot have {coefficient:g}, only "
             f"{low:.4g} to {high:.4g}"
         )
-    return float(brentq(lambda rho: moments.at(rho) / size - coefficient, -most, most, xtol=1e-12))
+    return float(scipy.optimize.brentq(lambda rho: moments.at(rho) / size - coefficient, -most, most, xtol=1e-12))

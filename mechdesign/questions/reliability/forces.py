@@ -16,7 +16,7 @@ import numpy as np
 from mechdesign.ground.expressions import Expression, Number
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.algebra import Value, Vector
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.forces import Forces, Moving
@@ -155,7 +155,6 @@ class ForceModel(PoseNumbers):
         parts = (part for bend in load_bends(self.question.study) for part in bend.arguments)
         return {argument_name(part): part for part in parts if isinstance(part, Expression)}
 
-    @quiet
     def slopes(
         self, names: Sequence[str], mechanism: Mechanism, configuration: Configuration, position: Rates,
         by: Sequence[str], rates: DriveRates,

@@ -16,6 +16,7 @@ from itertools import chain
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.expressions import Number
 from mechdesign.ground.numerics.arrays import Floats, Ints
@@ -27,16 +28,12 @@ SIGMAS = 3.0
 
 def normal_cdf(u: Floats | float) -> Floats:
     """Probability that a standard normal variable is below `u`."""
-    from scipy.special import ndtr
-
-    return np.asarray(ndtr(u))
+    return np.asarray(scipy.special.ndtr(u))
 
 
 def normal_quantile(share: Floats | float) -> Floats:
     """Quantile of the standard normal law, at least one-dimensional."""
-    from scipy.special import ndtri
-
-    return np.atleast_1d(ndtri(share))
+    return np.atleast_1d(scipy.special.ndtri(share))
 
 
 def normal_within(radius: float, rng: np.random.Generator, out: Floats) -> None:
@@ -179,11 +176,9 @@ class TruncatedNormal(Marginal):
         out += self.mean
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtri
-
         # By the lower tail, where small probabilities keep their digits.
         tail = normal_cdf(-SIGMAS)
-        below = ndtri(tail + normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
+        below = scipy.special.ndtri(tail + normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
         return np.asarray(self.mean + self.sigma * np.copysign(below, u))
 
 
@@ -282,10 +277,8 @@ class Beta(Marginal):
         out[:] = self.low + (self.high - self.low) * rng.beta(*self.shape, len(out))
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import betaincinv
-
         (a, b), width, tail = self.shape, self.high - self.low, normal_cdf(-np.abs(u))
-        inward = width * np.where(u < 0, betaincinv(a, b, tail), betaincinv(b, a, tail))
+        inward = width * np.where(u < 0, scipy.special.betaincinv(a, b, tail), scipy.special.betaincinv(b, a, tail))
         return self.from_ends(u, inward)
 
 

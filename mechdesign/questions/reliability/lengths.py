@@ -7,12 +7,13 @@ are integrals over the directions, and limits of it are circles about zero in th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
@@ -197,12 +198,11 @@ def model_of(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats)
     )
 
 
-def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats) -> list[tuple[int, Flags]]:
+def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Floats) -> Iterator[tuple[int, Flags]]:
     """Channels with a corner within `_NEAR` deviations, and at which poses, shape (poses,)."""
     if not question.bends:
-        return []
+        return
     mean, deviation = nominal + linear.shift(), linear.deviation()
-    near = []
     for output, places, bend in question.bends:
         together = np.ones(nominal.shape[1:], dtype=bool)
         for place in places:
@@ -210,8 +210,7 @@ def near_corners(question: ReliabilityQuestion, linear: FirstOrder, nominal: Flo
             away = away - bend.period * np.round(away / bend.period) if bend.period else away
             # What is not a number is not smooth either.
             together &= ~(np.abs(away).min(axis=0) > _NEAR * deviation[place])
-        near.append((output, together))
-    return near
+        yield output, together
 
 
 def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
@@ -227,8 +226,6 @@ def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     that of a normal variable. By the trapezoidal rule, whose steps shrink towards the principal axes: across the longer
     one the part along a direction varies least.
     """
-    from scipy.special import erf
-
     squares, axes = np.linalg.eigh(covariance)
     steps = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
     angle, weight = steps - 0.25 * np.sin(4 * steps), (1.0 - np.cos(4 * steps)) * np.pi / (2 * _DIRECTIONS)
@@ -236,6 +233,6 @@ def length_moments(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     sigma = np.sqrt(np.maximum(squares, 0.0) @ way**2)
     along = np.einsum("pij,pi->pj", axes, mean) @ way
     ratio = np.where(sigma > 0, along / (sigma * np.sqrt(2.0)), np.where(along == 0, 0.0, np.sign(along) * np.inf))
-    side = erf(ratio)
+    side = scipy.special.erf(ratio)
     length = (sigma * np.sqrt(2.0 / np.pi) * np.exp(-(ratio**2)) + along * side) @ weight
     return length, np.einsum("pij,pj->pi", axes, (side * weight) @ way.T)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,9 +40,8 @@ def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution
     ]  # fmt: skip
 
 
-def _outside(task: Task) -> list[Caution]:
+def _outside(task: Task) -> Iterator[Caution]:
     """Warnings of nominal values outside their own limits, each at its farthest pose."""
-    cautions = []
     for limit, band in zip(task.question.limits, task.question.at(task.nominal).limits, strict=True):
         beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
         poses = np.flatnonzero(beyond > 0)
@@ -55,31 +54,28 @@ def _outside(task: Task) -> list[Caution]:
         if not np.isfinite(low) or not np.isfinite(high):
             between = f"at least {numeral(low)}" if np.isfinite(low) else f"at most {numeral(high)}"
         several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
-        cautions.append(Caution(
+        yield Caution(
             "suspect",
             f"{task.question.channels[band.output].name}: the nominal value {numeral(value)} at {task.where(pose)}"
             f"{several} lies outside its limits, {between}{f' {unit}' if unit else ''}",
             pose=task.where(pose),
-        ))  # fmt: skip
-    return cautions
+        )  # fmt: skip
 
 
-def _cornered(task: Task) -> list[Caution]:
+def _cornered(task: Task) -> Iterator[Caution]:
     """Warnings of outputs with a corner among their errors, which have no first order there."""
-    cautions = []
     for output in dict.fromkeys(output for output, *_ in task.question.bends):
         poses = np.flatnonzero(np.isnan(task.linear.whole.components[output]).any(axis=0) & task.assembled)
         if len(poses):
             where = task.where(int(poses[0]))
             several = f" (the first of {len(poses)} poses)" if len(poses) > 1 else ""
-            cautions.append(Caution(
+            yield Caution(
                 "undefined",
                 f"{task.question.channels[output].name} bends, jumps or ends within its errors at {where}{several}: "
                 "it has no derivative there by which analytic, second_order and the contributions could judge it; ask "
                 "for monte_carlo",
                 pose=where,
-            ))  # fmt: skip
-    return cautions
+            )  # fmt: skip
 
 
 def _curved(results: Sequence[MethodResult], task: Task) -> list[Caution]:
@@ -130,7 +126,7 @@ def _flat(task: Task, second: MethodResult) -> tuple[int, int, float, float] | N
     return int(output), int(pose), float(deviation[output, pose]), float(true[output, pose])
 
 
-def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+def disagreements(results: Sequence[MethodResult], task: Task) -> Iterator[Caution]:
     """Warnings of pairs of methods whose intervals are more than `FACTOR` apart, each at its worst pose."""
     apart: dict[tuple[str, str], list[tuple[float, int, Estimate, Estimate]]] = {}
     for pose in range(task.poses.count):
@@ -145,20 +141,18 @@ def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
             times = disagree(one, other)
             if times > FACTOR:
                 apart.setdefault(pair, []).append((times, pose, one, other))
-    warnings = []
     for (name, second), cases in apart.items():
         factor, pose, one, other = max(cases, key=lambda case: case[0])
         times_apart = f"{factor:.3g} times" if factor < 1e6 else "many orders of magnitude"
         several = task.poses.count > 1
         others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
-        warnings.append(Caution(
+        yield Caution(
             "disagree",
             f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is "
             f"{numeral(one.failure, 3)} by the one and {numeral(other.failure, 3)} by the other, "
             f"{times_apart} apart{others}",
             "reliability", pose=task.where(pose),
-        ))  # fmt: skip
-    return warnings
+        )  # fmt: skip
 
 
 def _unseen(results: Sequence[MethodResult], task: Task) -> list[Caution]:
@@ -246,20 +240,18 @@ def _not_assembled(results: Sequence[MethodResult], task: Task) -> list[Caution]
     )]  # fmt: skip
 
 
-def _unassembled(results: Sequence[MethodResult]) -> list[Caution]:
+def _unassembled(results: Sequence[MethodResult]) -> Iterator[Caution]:
     """Warnings of importance samples, drawn about the limits, that cannot be assembled."""
-    warnings = []
     for result in results:
         used = [(METHODS[result.used.get(pose, result.method)], e) for pose, e in result.estimates.items()]
         drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
-            warnings.append(Caution(
+            yield Caution(
                 "unassembled",
                 f"{result.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they "
                 "count as failures",
-            ))  # fmt: skip
-    return warnings
+            )  # fmt: skip
 
 
 def _of_cycles(results: Sequence[MethodResult], task: Task) -> list[Caution]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -304,22 +304,20 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
     return split_order(name, exists)
 
 
-def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Caution]:
+def ambiguous_points(study: Study, question: ReliabilityQuestion) -> Iterator[Caution]:
     """A warning for each output whose pin has a clearance, where the study does not say which link's point it is."""
     section: dict[str, Any] = study.resolved["reliability"]
     names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
-    warnings = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         plain = ("", study.mechanism.graph.node(point))
         about = [c.name for c in question.channels if c.order == 0 and c.coordinate and plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
-            warnings.append(Caution(
+            yield Caution(
                 "assumed",
                 f"{', '.join(about)}: {point} has a clearance and is that of {' and '.join(rest)}, not of {link}, "
                 f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'",
-            ))  # fmt: skip
-    return warnings
+            )  # fmt: skip
 
 
 def _named(name: str, point: str) -> bool:

@@ -11,7 +11,7 @@ model and the linear one is sampled. Independent replicates give Student's inter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -194,25 +194,23 @@ def uncorrelated(sources: Sources) -> set[str]:
     return {s.name for s, single in zip(sources.scalars, alone, strict=True) if single} | {p.name for p in sources.pins}
 
 
-def doubts(task: Task, indices: Mapping[int, SobolIndices]) -> list[Caution]:
+def doubts(task: Task, indices: Mapping[int, SobolIndices]) -> Iterator[Caution]:
     """Warnings of sources without indices, and of points that are left out."""
     if not indices:
-        return []
-    notes = []
+        return
     alone = uncorrelated(task.sources)
     bound = [s.name for s in task.sources.scalars if s.name not in alone]
     if bound:
         words = f"Sobol' indices are of what varies by itself: {', '.join(bound)} are correlated and have none"
-        notes.append(Caution("incomplete", words, "contributions"))
+        yield Caution("incomplete", words, "contributions")
     pose, worst = max(indices.items(), key=lambda item: item[1].invalid)
     if worst.invalid:
-        notes.append(Caution(
+        yield Caution(
             "unassembled",
             f"Sobol' indices: {worst.invalid} of {worst.samples} points are left out at {task.where(pose)}, since a "
             "mechanism there cannot be assembled",
             "contributions", pose=task.where(pose),
-        ))  # fmt: skip
-    return notes
+        )  # fmt: skip
 
 
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from mechdesign.ground.columns import Column
@@ -148,10 +149,7 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
 
 
 def _sigma_level(failure: Floats) -> Floats:
-    # SciPy takes a quarter of a second to import, and a study without limits does not need it.
-    from scipy.special import ndtri
-
-    return np.asarray(-ndtri(failure))
+    return np.asarray(-scipy.special.ndtri(failure))
 
 
 def capability(task: Task, results: Sequence[MethodResult]) -> Table:

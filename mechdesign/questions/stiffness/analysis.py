@@ -19,7 +19,6 @@ from mechdesign.ground.results import Drawn, Result, Table
 from mechdesign.ground.statistics import Request
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.motion.along import BELOW, PlainAlong
 from mechdesign.motion.answer import alone
@@ -195,7 +194,6 @@ class Stiffness(MotionQuestion):
         along.of_poses = OF_POSES
         return along
 
-    @quiet
     def _columns(self, there: SolvedPoses) -> dict[str, Floats]:
         """Numbers of a row a pose, at solved poses; and what is zero where they go to infinity.
 

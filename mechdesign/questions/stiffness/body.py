@@ -11,7 +11,6 @@ import numpy as np
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.rows import Poses
@@ -207,7 +206,6 @@ def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[com
     return forces
 
 
-@quiet
 def _applied(body: Body, configuration: Configuration) -> Applied:
     """The loads that do not act on the asked point alone."""
     study, poses = body.study, body.poses

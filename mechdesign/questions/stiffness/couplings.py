@@ -20,7 +20,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import node_forces, shares
 from mechdesign.questions.stiffness.applied import Wrench, borne
 from mechdesign.questions.stiffness.bodies import BodyCoupling
@@ -49,7 +49,6 @@ class Efforts:
     teeth: Complexes
 
 
-@quiet
 def efforts_on(
     network: Network, configuration: Configuration, origin: Complexes, length: Value, sides: Floats | None
 ) -> tuple[Floats, Complexes]:

@@ -9,7 +9,7 @@ beam of length L three of them at mid-span, where its compliance is diagonal: a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -178,7 +178,7 @@ def _single(wrench: Floats, chain: LegScrews, length: Value) -> EquivalentSpring
     )
 
 
-def _parallel_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:
+def _parallel_springs(twist: Floats, chain: LegScrews) -> Iterator[EquivalentSpring]:
     """The two springs of wrenches that are reciprocal to the slide `twist`, shape (3, n)."""
     along = vector(twist[0], twist[1])
     along = along / np.abs(along)
@@ -193,19 +193,15 @@ def _parallel_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]
     angle = np.mod(np.angle(across), np.pi)
     # Rigid in force or in moment: a pair of parallel springs would lie at the tip or infinitely far away.
     apart = (c11 > 0) & (c22 > 0)
-    springs = []
     for sign in (1.0, -1.0):
         total = 2 * (c11 + sign * arm * c12)
         stiffness = np.where(total > 4 * RIGID * c11, 1 / total, np.inf)
         force, moment = 1 / c11, 1 / c22
-        springs.append(
-            EquivalentSpring(
-                np.where(apart, stiffness, force if sign > 0 else moment),
-                np.where(apart, chain.tip + sign * arm * along, chain.tip),
-                np.where(apart, angle, angle if sign > 0 else np.nan),
-            )
+        yield EquivalentSpring(
+            np.where(apart, stiffness, force if sign > 0 else moment),
+            np.where(apart, chain.tip + sign * arm * along, chain.tip),
+            np.where(apart, angle, angle if sign > 0 else np.nan),
         )
-    return springs
 
 
 def _pin_springs(twist: Floats, chain: LegScrews) -> list[EquivalentSpring]:

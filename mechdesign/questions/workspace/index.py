@@ -12,7 +12,7 @@ import numpy as np
 from mechdesign.ground import indices
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.numerics.arrays import Floats
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.questions.columns import power_of_length
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -68,7 +68,6 @@ class Prepared:
     index: Index
     evaluate: Evaluate = dataclasses.field(repr=False)
 
-    @quiet
     def values(self, local: Local) -> Value:
         """Values at points, computed once."""
         if self.name not in local.values:

@@ -11,7 +11,6 @@ import numpy as np
 from mechdesign.ground.errors import AssemblyError, Problem, StudyError
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Result
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first
@@ -49,7 +48,6 @@ class _Path:
         curve = _curve(self.study, self.drive, self.low, self.high)
         coordinates = [mechanism.coordinate(name) for name in outputs]
 
-        @quiet
         def evaluate(line: Ints, s: Floats) -> tuple[Floats, Floats]:
             pose = curve.solve(line, s, judged=False).configuration
             linear = mechanism.linearize(pose)

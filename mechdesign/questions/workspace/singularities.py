@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.ground.numerics.zero_curves import joined, zero_curves
@@ -135,10 +136,8 @@ def _inside(field: Field, patches: Sequence[Patch]) -> list[tuple[str, str, list
 
 def _places(patch: Patch) -> Callable[[Floats, Floats], Complexes]:
     """Points of the plane at fractional rows and columns of a patch's grid."""
-    from scipy.interpolate import CubicSpline
-
     # In the number of the row, angles and radii are smooth also where a ray is tangent to the boundary.
-    rays = CubicSpline(np.arange(len(patch.theta)), [patch.theta, patch.inner, patch.outer], axis=1)
+    rays = scipy.interpolate.CubicSpline(np.arange(len(patch.theta)), [patch.theta, patch.inner, patch.outer], axis=1)
 
     def place(row: Floats, column: Floats) -> Complexes:
         theta, inner, outer = rays(row)

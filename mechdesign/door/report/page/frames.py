@@ -10,7 +10,6 @@ import numpy as np
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.ground.results import Table
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.motion.finer import CHORD, MAX_POSES, near_chords, paths_of, together
 from mechdesign.motion.question import PoseValues
 from mechdesign.questions.kinematics.drawn import DrawnPoses, DrawnVectors
@@ -53,7 +52,6 @@ def frames(drawn: DrawnPoses, table: Table, marked: Sequence[float]) -> tuple[Sw
     sizes = largest(drawn.vectors(drawn.motion, some.shown))
     points = [*Sweep.of(some.shown).places]
 
-    @quiet
     def ways(places: Floats) -> Complexes:
         """Where points and tips of arrows are; `sizes` are those of the longest by their units."""
         there, size = drawn.at(places), CHORD * along.curve.mechanism.size

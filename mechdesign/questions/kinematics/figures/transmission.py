@@ -14,7 +14,6 @@ from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Table
-from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.loops import SAME_ANGLE
@@ -127,7 +126,6 @@ def _angles(x: Floats, loops: list[Transmission], over: Along) -> Panel:
     return Panel(marks, over.axis, axis, f"{BEST:g} deg is best; 0 and 180 deg pass no force", size=1.4)
 
 
-@quiet
 def _advantage(over: Along, values: Floats, unit: str, toggles: Floats, title: str) -> Panel:
     """A mechanical advantage; on a logarithmic axis its size, where it is boundless or spans `_WIDE`."""
     x, sizes, blue = over.values, np.abs(values), {"color": style.BLUE, "linewidth": 1.8}
@@ -166,7 +164,6 @@ def _towards(x: Floats, sizes: Floats, places: Floats) -> tuple[Floats, Floats]:
     return every, above
 
 
-@quiet
 def boundless(x: Floats, values: Floats, toggles: Floats) -> Floats:
     """Where a mechanical advantage goes through infinity: at poses, and between two at the toggle that lies there.
 

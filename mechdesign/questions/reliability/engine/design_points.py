@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.questions.reliability.engine.descent import alike, descend, sizes
@@ -307,6 +308,4 @@ def _turned(problem: LimitStates, limit: Ints, u: Floats) -> tuple[Floats, Float
 
 def _hazard(distance: Floats) -> Floats:
     """Derivative of -log P(a standard normal variable is beyond)."""
-    from scipy.special import log_ndtr
-
-    return np.asarray(np.exp(-0.5 * distance**2 - log_ndtr(-distance)) / np.sqrt(2.0 * np.pi))
+    return np.asarray(np.exp(-0.5 * distance**2 - scipy.special.log_ndtr(-distance)) / np.sqrt(2.0 * np.pi))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.reliability.engine.problem import LimitStates
@@ -54,22 +55,18 @@ class Mixture:
     @cached_property
     def _outside(self) -> float:
         """Probability of the law beyond the distance."""
-        from scipy.special import gammaincc
-
         d = len(self.problem.normals)
-        return float(gammaincc(0.5 * d, 0.5 * self.beyond**2)) if d and self.beyond > 0 else 1.0
+        return float(scipy.special.gammaincc(0.5 * d, 0.5 * self.beyond**2)) if d and self.beyond > 0 else 1.0
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Points, shape (dimension, count)."""
-        from scipy.special import gammainccinv
-
         chosen = rng.choice(len(self.weight) + 1, count, p=np.append(self.weight, self.rest))
         u = self.problem.draw(rng, count)
         normal = u[self.problem.normals]
         far = chosen == len(self.weight)
         if self._outside < 1.0:
             share = self._outside * (1.0 - rng.random(int(far.sum())))
-            length = np.sqrt(2.0 * gammainccinv(0.5 * len(normal), share))
+            length = np.sqrt(2.0 * scipy.special.gammainccinv(0.5 * len(normal), share))
             normal[:, far] *= length / np.linalg.norm(normal[:, far], axis=0)
         for k in np.unique(chosen[~far]).tolist():
             own = chosen == k
@@ -82,14 +79,12 @@ class Mixture:
 
     def logs(self, u: Floats) -> Floats:
         """Logarithms of the parts' weighted densities over that of the law, (parts + 1, n); the part beyond is last."""
-        from scipy.special import i0e
-
         normal, directions = u[self.problem.normals], u[self.problem.circles.ravel()]
         half = 0.5 * (normal * normal).sum(axis=0)
         logs = np.empty((len(self.weight) + 1, u.shape[1]))
         size = np.linalg.norm(self.heading, axis=2)
         constant = np.log(self.weight) - np.log(np.diagonal(self.root, axis1=1, axis2=2)).sum(axis=1)
-        constant -= (np.log(i0e(size)) + size).sum(axis=1)
+        constant -= (np.log(scipy.special.i0e(size)) + size).sum(axis=1)
         for k, (row, one) in enumerate(zip(logs, constant, strict=False)):
             z = self.inverse[k] @ normal
             z -= (self.inverse[k] @ self.centre[k])[:, None]

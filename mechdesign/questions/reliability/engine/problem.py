@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.schema.section import Precision
@@ -38,13 +39,11 @@ def needed(precision: Precision, value: float, variance: float) -> float:
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Clopper-Pearson interval of the probability of an event that occurred in `events` of `samples`."""
-    from scipy.special import betaincinv
-
     if samples == 0:
         return float("nan"), float("nan")
     tail = 0.5 * (1.0 - confidence)
-    low = betaincinv(events, samples - events + 1, tail) if events else 0.0
-    high = betaincinv(events + 1, samples - events, 1.0 - tail) if events < samples else 1.0
+    low = scipy.special.betaincinv(events, samples - events + 1, tail) if events else 0.0
+    high = scipy.special.betaincinv(events + 1, samples - events, 1.0 - tail) if events < samples else 1.0
     return float(low), float(high)
 
 
@@ -66,12 +65,10 @@ def weighted(total: float, squares: float, most: float, samples: int) -> tuple[f
 
 def _gamma(mean: float, variance: float, share: float) -> float:
     """Quantile of a gamma law."""
-    from scipy.special import gammaincinv
-
     # A variance below the rounding error of the sums counts as zero.
     if variance <= 1e-20 * mean * mean:
         return mean
-    return float(gammaincinv(mean * mean / variance, share)) * variance / mean
+    return float(scipy.special.gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 # Step of a difference quotient of margins, in standard deviations: the third root of their rounding.
