@@ -58,8 +58,7 @@ def near_chords(
         before = np.flatnonzero(open_ & np.isfinite(ends[:, :-1] + ends[:, 1:]).any(axis=0))
         middles = (places[before] + places[before + 1]) / 2
         between, one, other = ways(middles), ends[:, before], ends[:, before + 1]
-        with np.errstate(invalid="ignore"):
-            far = np.abs(between - (one + other) / 2) > 1.0
+        far = np.abs(between - (one + other) / 2) > 1.0
         new = far.any(axis=0)
         at = before[new] + 1
         places, ends = np.insert(places, at, middles[new]), np.insert(ends, at, between[:, new], axis=1)
@@ -189,8 +188,7 @@ def _tops(places: Floats, values: Floats) -> Floats:
     lane = np.tile(np.arange(len(values)), 2)
     one, middle, other = (values[lane, row + k] for k in range(3))
     before, after = places[row + 1] - places[row], places[row + 2] - places[row + 1]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rise, fall = (middle - one) / before, (middle - other) / after
-        top = places[row + 1] + (rise * after - fall * before) / (rise + fall) / 2
+    rise, fall = (middle - one) / before, (middle - other) / after
+    top = places[row + 1] + (rise * after - fall * before) / (rise + fall) / 2
     turns = (rise * fall > 0) & (top > places[row]) & (top < places[row + 2])
     return np.asarray(top[turns])

@@ -12,7 +12,6 @@ from functools import partial
 from importlib import import_module
 from multiprocessing.connection import wait
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.door.cli import places, terminal
@@ -47,9 +46,6 @@ from mechdesign.ground.work.start import inherit
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.study import Study
 from mechdesign.study.loaded import StudySource
-
-if TYPE_CHECKING:
-    from mechdesign.door.report.page.page import IndexEntry
 
 _SUFFIXES = (".yaml", ".yml")  # of study files in a folder
 _NUMBERS = 4  # key numbers of a study in the index
@@ -355,7 +351,7 @@ def _stale(study: Study, task: Task) -> int:
     return code
 
 
-def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> IndexEntry | None:
+def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> pages.IndexEntry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
     pages.remove(task.root / pages.PRINTED)
@@ -366,10 +362,10 @@ def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: boo
     numbers = write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
-    from mechdesign.door.report.page.page import IndexEntry, thumbnail
+    from mechdesign.door.report.page.page import thumbnail
 
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
-    return IndexEntry(
+    return pages.IndexEntry(
         study.name,
         study.label,
         [(outcome.command, outcome.word, outcome.exit_code) for outcome in outcomes],

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mechdesign.door.cli import summary, terminal
 from mechdesign.door.cli.annotations import annotate, of_error
@@ -25,9 +24,6 @@ from mechdesign.ground.records import check_replaceable
 from mechdesign.ground.work.pool import LostWorkerError
 from mechdesign.study import Study
 from mechdesign.study.loaded import StudySource
-
-if TYPE_CHECKING:
-    from mechdesign.door.report.page.page import IndexEntry
 
 _LOST = "run"  # in place of the commands of a study whose process was killed
 _LEFT = "the run ended before it"
@@ -58,7 +54,7 @@ class Said:
 class End:
     """The end of a study: its line of the index, the exit code of its report, whether it was interrupted."""
 
-    entry: IndexEntry | None = None
+    entry: pages.IndexEntry | None = None
     exit_code: int = 0
     interrupted: bool = False
 
@@ -79,7 +75,7 @@ class BatchRecord:
         self._root = options.out or RESULTS
         self.check(())
         self._outcomes: list[list[Outcome]] = [[] for _ in studies]
-        self._entries: dict[int, IndexEntry] = {}
+        self._entries: dict[int, pages.IndexEntry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
@@ -100,9 +96,7 @@ class BatchRecord:
         self._left -= 1
         self.stopped |= self.options.fail_fast
         if self.options.report and self.summed:
-            from mechdesign.door.report.page.page import IndexEntry
-
-            self._entries[number] = IndexEntry(
+            self._entries[number] = pages.IndexEntry(
                 outcome.study, outcome.study, failed=outcome.failed, outcome=outcome.word
             )
 
@@ -199,12 +193,12 @@ class BatchRecord:
 
     def _index(self) -> bytes:
         """The page of all studies, also of those that the run did not come to."""
-        from mechdesign.door.report.page.page import IndexEntry, index
+        from mechdesign.door.report.page.page import index
 
         labels = {number: name_of(path) for number, path in enumerate(self._studies)}
         labels |= {task.number: task.label for task in self._tasks}
         return index([
-            self._entries.get(number) or IndexEntry(label, label, failed=_LEFT, outcome="not answered")
+            self._entries.get(number) or pages.IndexEntry(label, label, failed=_LEFT, outcome="not answered")
             for number, label in labels.items()
         ])  # fmt: skip
 

@@ -45,6 +45,5 @@ def near_curves(study: Study, goals: Sequence[Goal], conditions: Sequence[Goal],
              if one.command == "kinematics" and not one.smallest and one.column in sines]  # fmt: skip
     bound = RangeBounds(kind, turning=kind.turns, least=max([0.0, *asked]) if kind.turns else 0.0)
     samples = kind.samples(np.random.default_rng(seed), _SAMPLED, 1.0, full_turn=path.closed)
-    with np.errstate(all="ignore"):
-        found = fits(kind, kind.modes[0], path, samples, bound, _POLISHED).values[:_BEST]
+    found = fits(kind, kind.modes[0], path, samples, bound, _POLISHED).values[:_BEST]
     return np.asarray((found - kind.low) / np.where(kind.high > kind.low, kind.high - kind.low, 1.0))

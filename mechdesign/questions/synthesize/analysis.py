@@ -56,19 +56,18 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     random = np.random.default_rng(seed)
     task = task_of(study, section)
     conditions = Conditions(section, task.centre, task.size, task.factor)
-    with np.errstate(all="ignore"):
-        pools = [*task.pools(random, conditions)]
-        solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
-        told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
-        if section.judge is not None:
-            best = solutions[: section.judge.best]
-            progress.start(len(best), "linkages judged")
-            solutions = []
-            for one in best:
-                solutions.append(replace(one, made=judged(study, study_data(study, task, one, study.name))))
-                progress.update(1)
-            told.append(f"the best {len(solutions)} are judged")
-        solutions, scores = ranked(solutions, section.rank, task.size)
+    pools = [*task.pools(random, conditions)]
+    solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
+    told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
+    if section.judge is not None:
+        best = solutions[: section.judge.best]
+        progress.start(len(best), "linkages judged")
+        solutions = []
+        for one in best:
+            solutions.append(replace(one, made=judged(study, study_data(study, task, one, study.name))))
+            progress.update(1)
+        told.append(f"the best {len(solutions)} are judged")
+    solutions, scores = ranked(solutions, section.rank, task.size)
     if not solutions:
         raise _none(study, task, pools, conditions, told)
     result = _answer(study, task, solutions[: section.solutions], scores, told)

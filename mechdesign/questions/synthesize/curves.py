@@ -77,6 +77,5 @@ def poles(task: Positions) -> Complexes:
     """The points about which the body could turn from each position into each other one; nan where it shifts."""
     first, second = np.triu_indices(len(task.places), 1)
     turned = task.rotations[second] / task.rotations[first]
-    with np.errstate(all="ignore"):
-        places = (task.places[second] - turned * task.places[first]) / (1 - turned)
+    places = (task.places[second] - turned * task.places[first]) / (1 - turned)
     return np.asarray(np.where(np.abs(1 - turned) > 1e-9, places, np.nan))

@@ -166,8 +166,7 @@ def _points(free: Floats) -> Floats:
     lane, which = np.nonzero(np.abs(v.imag) < _NEARLY_REAL * (1 + np.abs(v)))
     v = v[lane, which].real
     bottom = left[lane, 0] * v + left[lane, 1]
-    with np.errstate(all="ignore"):
-        u = -((outer[lane, 0] * v + outer[lane, 1]) * v + outer[lane, 2]) / bottom
+    u = -((outer[lane, 0] * v + outer[lane, 1]) * v + outer[lane, 2]) / bottom
     u = np.where(np.isfinite(u), u, 0.0)
     point = np.stack([u, v, np.ones(len(v))], axis=1)
     point /= np.linalg.norm(point, axis=1, keepdims=True)
@@ -214,13 +213,12 @@ def dyads(equations: Floats) -> dict[str, Dyads]:
     slide = ~link & (np.abs(x) <= np.sqrt(NOTHING)) & (np.abs(a) > np.sqrt(NOTHING))
     guide = ~link & (np.abs(a) <= np.sqrt(NOTHING)) & (np.abs(x) > np.sqrt(NOTHING))
     every = [links(w[link])]
-    with np.errstate(all="ignore"):
-        normal = a[slide] / np.abs(a[slide])
-        offset = w[slide, 1] / (2 * np.abs(a[slide]))
-        pin = q[slide] / np.conj(a[slide])
-        every.append(Dyads(SLIDE, offset * normal, pin, normal, 0.0 * offset))
-        normal = x[guide] / np.abs(x[guide])
-        offset = w[guide, 1] / (2 * np.abs(x[guide]))
-        pivot = np.conj(q[guide] / x[guide])
-        every.append(Dyads(GUIDE, pivot, offset * normal, normal, 0.0 * offset))
+    normal = a[slide] / np.abs(a[slide])
+    offset = w[slide, 1] / (2 * np.abs(a[slide]))
+    pin = q[slide] / np.conj(a[slide])
+    every.append(Dyads(SLIDE, offset * normal, pin, normal, 0.0 * offset))
+    normal = x[guide] / np.abs(x[guide])
+    offset = w[guide, 1] / (2 * np.abs(x[guide]))
+    pivot = np.conj(q[guide] / x[guide])
+    every.append(Dyads(GUIDE, pivot, offset * normal, normal, 0.0 * offset))
     return {part.kind: part for part in every}

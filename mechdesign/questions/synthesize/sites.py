@@ -116,11 +116,10 @@ class Site:
             return np.asarray(feet + ((self.given[gaps.argmin(axis=1)] - feet) * np.conj(way)).real * way)
         own, step = (feet - self.origin) / self.axis, way / self.axis
         begin, end = np.full(len(feet), -np.inf), np.full(len(feet), np.inf)
-        with np.errstate(all="ignore"):
-            for place, rate, ends in zip((own.real, own.imag), (step.real, step.imag), self.ends, strict=True):
-                first, last = np.sort([(ends[0] - place) / rate, (ends[1] - place) / rate], axis=0)
-                begin, end = np.fmax(begin, first), np.fmin(end, last)
-            part = np.minimum(np.maximum(begin, 0.0), end)
+        for place, rate, ends in zip((own.real, own.imag), (step.real, step.imag), self.ends, strict=True):
+            first, last = np.sort([(ends[0] - place) / rate, (ends[1] - place) / rate], axis=0)
+            begin, end = np.fmax(begin, first), np.fmin(end, last)
+        part = np.minimum(np.maximum(begin, 0.0), end)
         return np.asarray(feet + np.where(np.isfinite(part), part, 0.0) * way)
 
     def free(self, places: Complexes, uphill: Floats) -> Floats:

@@ -204,8 +204,7 @@ class Conditions:
             x, y = (np.stack([values[:, kind[f"{BODY}.{pin}.{way}"]] for pin in "AB"], axis=1) for way in "xy")
             yield from self._of_pins(x + 1j * y)
         lengths = np.stack([*links.values()]) if links else np.ones((1, len(values)))
-        with np.errstate(all="ignore"):
-            ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
+        ratio = np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
         yield "lengths are too unequal (limits.ratio)", ratio <= section.bounds.ratio
         for name, (low, high) in section.lengths.items():
             if name in links:

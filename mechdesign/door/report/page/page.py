@@ -23,7 +23,7 @@ from mechdesign.door.report.manifest import computed_from
 from mechdesign.door.report.page import vector
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.headlines import shown
-from mechdesign.door.report.page.pages import harmless
+from mechdesign.door.report.page.pages import IndexEntry, harmless
 from mechdesign.door.report.page.tracks import joined
 from mechdesign.door.report.requirements import Verdict, judged_by, named
 from mechdesign.drawing import style
@@ -61,33 +61,6 @@ class AnsweredQuestion:
     failed: str = ""
     verdicts: Sequence[Verdict] = ()
     section: Mapping[str, Any] | None = None  # see `mechdesign.door.report.page.section`; None where nothing came out
-
-
-@dataclass(frozen=True)
-class IndexEntry:
-    """A study in an index."""
-
-    name: str
-    label: str
-    answers: Sequence[tuple[str, str, int]] = ()  # command, outcome in words and exit code
-    met: int = 0
-    required: int = 0
-    warnings: int = 0
-    numbers: Sequence[Mapping[str, str]] = ()  # some of its key numbers, see `Headline`
-    drawing: str = ""  # an image as a data URI
-    link: str = ""  # to its report; empty where there is none
-    failed: str = ""  # why there is none
-    outcome: str = ""  # the same in a word or two
-
-    @property
-    def verdict(self) -> tuple[int, str]:
-        """Its place among all verdicts, and the verdict in a word or two."""
-        wrong = next((word for _, word, code in self.answers if code > 1), self.outcome)
-        if any(code == 1 for _, _, code in self.answers):
-            return 0, "NOT MET"
-        if wrong:
-            return 1, wrong
-        return (2, "met") if self.required else (3, "nothing required")
 
 
 def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, plots: bool = True) -> bytes:

@@ -150,10 +150,9 @@ def _across(sweep: Sweep, steps: Steps) -> Iterator[tuple[str, Complexes, Comple
     for point, path in sweep.places.items():
         if ranked[point] == max(ranked.values()):
             before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
-            with np.errstate(invalid="ignore"):
-                along = np.where(np.isfinite(path[after]), path[after], path[rows])
-                along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
-                yield point, path[rows], 1j * along / np.abs(along)
+            along = np.where(np.isfinite(path[after]), path[after], path[rows])
+            along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
+            yield point, path[rows], 1j * along / np.abs(along)
 
 
 def _draw_steps(sweep: Sweep, steps: Steps, axes: Axes) -> None:

@@ -83,8 +83,7 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
         return angles
     for k, loop in enumerate(four_bars(study.mechanism)):
         sine, cosine = loop.squareness(sweep.configuration, 3)
-        with np.errstate(invalid="ignore"):
-            angle = np.degrees(np.where(sweep.configuration.valid, np.arctan2(np.abs(sine), cosine), np.nan))
+        angle = np.degrees(np.where(sweep.configuration.valid, np.arctan2(np.abs(sine), cosine), np.nan))
         if not np.isfinite(angle).any():
             continue
         place = float(table["transmission_min_at"][k]) if over.name else np.nan

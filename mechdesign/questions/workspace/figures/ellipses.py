@@ -44,9 +44,8 @@ def ellipses_picture(view: WorkspaceView) -> Picture | None:
     if stretch_of(wide / tall) != 1.0:
         return None
     marks: list[PanelMark] = [Own(partial(fill, local=region.local)), *region_marks(region)]
-    with np.errstate(divide="ignore", over="ignore"):
-        u, sizes, _ = np.linalg.svd(ellipses.matrices)
-        inverse = 1 / sizes
+    u, sizes, _ = np.linalg.svd(ellipses.matrices)
+    inverse = 1 / sizes
     directions = u[:, 0, :] + 1j * u[:, 1, :]
     mechanism = study.mechanism
     angular = section.characteristic_length is None and mechanism.quantity(mechanism.drives[0]) == "angle"
