@@ -77,7 +77,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     if result.command != "reliability" or table is None:
         return None
     from mechdesign.drawing.looks import best_probability, followed_in_words
-    from mechdesign.questions.reliability.tables import DrawnErrors
+    from mechdesign.questions.reliability.drawn import DrawnErrors
 
     drawn = DrawnErrors.of(result)
     poses, rows = drawn.poses, table.where(scope="pose", method=best_probability(table))

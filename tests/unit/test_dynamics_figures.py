@@ -10,6 +10,7 @@ import pytest
 from helpers.gallery import study_named
 from helpers.pages import faults
 from helpers.pictures import figure_of
+from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.drawing import style
@@ -249,3 +250,20 @@ def test_free_bodies_on_paper_are_those_that_a_page_holds(name: str, links: int)
         assert not list(faults(figure))
     words = " ".join(text.get_text().replace("\n", " ") for text in figure.texts)
     assert (f"of {links} links those 3 with the largest forces" in words) == (links > 3)
+
+
+def test_ring_of_a_peak_lies_on_its_curve_where_the_opposite_is_as_large() -> None:
+    """A weight of 1 kg on an arm of 100 mm holds -981 N mm at 180 deg, the first of two equal peaks, +981 at 360."""
+    study = study_of("""
+    units: {length: mm}
+    mechanism:
+      links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 1, center: [100, 0]}}
+      drives: [arm]
+    dynamics: {sweep: {arm: {from: 90, to: 450, step: 15}}, gravity: [0, -9.81 m/s^2]}
+    """)
+    with style.context():
+        axes = figure_of(study, mechdesign.dynamics(study), "efforts").axes[0]
+        ring = next(line for line in axes.get_lines() if line.get_label() == "peak")
+        unit = {"[N·mm]": 1.0, "[N·m]": 1e3}[axes.get_ylabel().rpartition(" ")[2]]
+        assert np.ravel(ring.get_xydata()) * [1, unit] == pytest.approx([180, -981], rel=1e-6)
+        assert "peak -981 N" in axes.get_title(loc="left") or "peak -0.981 N" in axes.get_title(loc="left")

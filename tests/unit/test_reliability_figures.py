@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -532,3 +533,34 @@ def test_powers_of_ten_stand_with_the_unit() -> None:
         assert not axes.yaxis.offsetText.get_visible()
         numbers = [float(text.get_text().replace("\N{MINUS SIGN}", "-")) for text in axes.get_yticklabels()]
         np.testing.assert_allclose(numbers, 1e6 * axes.get_yticks(), atol=1e-9)
+
+
+def test_curves_of_the_first_order_follow_the_motion_between_its_poses() -> None:
+    """A length of 100 +- 0.3 mm gives P.x a deviation of 0.1 mm |cos|, and 4.55 % beyond 0.2 mm where |cos| is 1."""
+    study = study_of("""
+    units: {length: mm}
+    mechanism:
+      links: {ground: {O: [0, 0]}, arm: [O, P, 100]}
+      drives: [arm]
+    reliability:
+      dimensions: {arm.length: 0.3}
+      outputs: [P.x]
+      limits: {P.x: 0.2}
+      sweep: {arm: {from: 0, to: 180, step: 60}}
+      methods: [analytic]
+    """)
+    result = mechdesign.reliability(study)
+    turn = np.linspace(0, 180, 181)
+    cosine = np.abs(np.cos(np.radians(turn)))
+    with style.context():
+        deviations, bands, failures = (
+            figure_of(study, result, name).axes[0] for name in ("deviations", "bands", "reliability")
+        )
+        line = next(line for line in deviations.get_lines() if len(line.get_xdata()) > 3)
+        assert np.interp(turn, *line.get_xydata().T) == pytest.approx(0.1 * cosine, abs=2e-4)
+        edge = bands.collections[0].get_paths()[0].vertices
+        assert len(edge) > 50
+        assert np.abs(edge[:, 1]) == pytest.approx(0.3 * np.abs(np.cos(np.radians(edge[:, 0]))), abs=1e-4)
+        chance = next(line for line in failures.get_lines() if len(line.get_xdata()) > 3)
+        at_thirty = 10 ** np.interp(30, chance.get_xdata(), np.log10(chance.get_ydata()))
+        assert at_thirty == pytest.approx(2 * NormalDist().cdf(-2 / np.cos(np.pi / 6)), rel=0.02)

@@ -16,6 +16,7 @@ from mechdesign.ground.terms import command_of
 from mechdesign.ground.work.threads import keep_freed_memory, one_thread
 from mechdesign.motion.failures import failures
 from mechdesign.motion.motion import SolvedPoses
+from mechdesign.motion.question import evaluate
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.dynamics.assumed import assumed
 from mechdesign.questions.poses import study_poses
@@ -24,7 +25,8 @@ from mechdesign.questions.reliability.allocated import of_allocation
 from mechdesign.questions.reliability.allocation import allocate
 from mechdesign.questions.reliability.between import between_poses, places_between
 from mechdesign.questions.reliability.cycle import with_cycle
-from mechdesign.questions.reliability.errors import Errors, first_order
+from mechdesign.questions.reliability.drawn import drawn_errors
+from mechdesign.questions.reliability.errors import Errors, first_order, linear_task
 from mechdesign.questions.reliability.forces import kinds_of_forces
 from mechdesign.questions.reliability.method_warnings import method_warnings
 from mechdesign.questions.reliability.question import ambiguous_points
@@ -45,7 +47,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     keep_freed_memory()
     poses, section, solved = study_poses(study, "reliability"), ReliabilitySection.of(study), list[SolvedPoses]()
     errors = Errors.of(study, poses)
-    task = first_order(errors, solved.append)
+    values = evaluate(errors, also=solved.append)
+    task = linear_task(values)
     warnings = [*errors.doubts, *ambiguous_points(study, task.question)]
     closer = places_between(study, task.question, poses) if task.question.limits else None
     if closer is not None:
@@ -90,7 +93,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failed_poses, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files,
         f"interrupted: {samples} samples, {named}" if stopped else "",
-        tables.drawn_errors(task, sampled), reached=bool(failed) or not allocated.failed, allocated=made,
+        drawn_errors(task, values, sampled), reached=bool(failed) or not allocated.failed, allocated=made,
     )  # fmt: skip
     if stopped:
         raise Interrupted(result)

@@ -14,7 +14,7 @@ from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.margins import closures
 from mechdesign.motion.motion import Motion, SolvedPoses
-from mechdesign.motion.question import PoseQuestion, evaluate
+from mechdesign.motion.question import PoseQuestion, PoseValues, evaluate
 from mechdesign.motion.rows import NOWHERE, Poses
 from mechdesign.questions.kinematics.rates import DriveRates, drive_rates
 from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cautions, elasticity
@@ -124,13 +124,18 @@ def _chained(slopes: Floats, by_name: Floats) -> Floats:
 
 
 def first_order(errors: Errors, also: Callable[[SolvedPoses], object] = lambda part: None) -> Task:
-    """The nominal mechanism and its linear error model at every pose, nan where it is not assembled.
+    """The nominal mechanism and its linear error model at every pose; `also` is called with the solved poses."""
+    return linear_task(evaluate(errors, also=also))
 
-    Poses that do not hold the study's load, or of whose forces some are asked and not finite, are `NOT_HELD`. `also` is
-    called with the solved poses, part by part.
+
+def linear_task(values: PoseValues) -> Task:
+    """The nominal mechanism and its linear error model at the poses of values, nan where it is not assembled.
+
+    Poses that do not hold the study's load, or of whose forces some are asked and not finite, are `NOT_HELD`.
     """
-    question, count, found = errors.question, errors.poses.count, evaluate(errors, also=also)
-    arrays = {name: np.ascontiguousarray(np.moveaxis(values, 0, -1)) for name, values in found.arrays.items()}
+    errors: Errors = values.question
+    question, count = errors.question, errors.poses.count
+    arrays = {name: np.ascontiguousarray(np.moveaxis(part, 0, -1)) for name, part in values.arrays.items()}
     nominal, components = arrays["nominal"], arrays["components"]
     offset, elastic, held = np.zeros(nominal.shape), None, np.ones(count, dtype=bool)
     if errors.elasticity is not None:
@@ -138,8 +143,8 @@ def first_order(errors: Errors, also: Callable[[SolvedPoses], object] = lambda p
         offset, held = elastic.offset, elastic.held
     channels = len(question.channels)
     held &= np.isfinite(nominal[channels - len(question.columns) : channels]).all(axis=0)
-    assembled = np.isin(found.reason, (Reason.OK, Reason.LIMIT))
-    reason = np.where(assembled & ~held, np.int8(Reason.NOT_HELD), found.reason)
+    assembled = np.isin(values.reason, (Reason.OK, Reason.LIMIT))
+    reason = np.where(assembled & ~held, np.int8(Reason.NOT_HELD), values.reason)
     components[:, :, ~np.isin(reason, (Reason.OK, Reason.LIMIT))] = np.nan
     model = model_of(question, FirstOrder(errors.sources, components, offset), nominal)
     closing = FirstOrder(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mechdesign.ground.columns import Column
-from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
-from mechdesign.ground.results import Drawn, Table
-from mechdesign.motion.rows import Poses
+from mechdesign.ground.numerics.arrays import Floats, Ints
+from mechdesign.ground.results import Table
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.columns import (
     CAPABILITY,
@@ -26,7 +24,7 @@ from mechdesign.questions.reliability.columns import (
 )
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.questions.reliability.first_order import correlation
-from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, holders
+from mechdesign.questions.reliability.question import ReliabilityQuestion, holders
 from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.task import MethodResult, Strings, Task
@@ -243,74 +241,6 @@ def _index_values(by_pose: Mapping[int, SobolIndices], shape: tuple[int, ...]) -
             values[:, pose] = getattr(indices, kind)
         columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
     return columns
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Errors of sampled mechanisms at the pose that is shown, in the study's units.
-
-    Parameters
-    ----------
-    outputs, orders, units : ndarray of str, shape (channels,)
-    errors : ndarray, shape (channels, n)
-        Errors of the samples that can be assembled.
-    kept : ndarray of bool, shape (n,)
-        Whether a sample keeps every limit.
-    limits
-        Those of errors.
-    pair : (int, int) or None
-        The two channels whose density is drawn.
-    mean, covariance : ndarray, shapes (channels,) and (channels, channels)
-        Mean and covariance of the errors to the first order.
-    """
-
-    pose: int
-    outputs: Strings
-    orders: Strings
-    units: Strings
-    errors: Floats
-    kept: Flags
-    limits: tuple[Limit, ...]
-    pair: tuple[int, int] | None
-    mean: Floats
-    covariance: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnErrors(Drawn):
-    """The poses at which errors were asked, and samples at one of them; None where no method samples errors.
-
-    `limits` are the lowest and highest error of each limited output and order, of a circle for both coordinates of its
-    point, in the study's units; numbers or arrays of poses.
-    """
-
-    poses: Poses
-    samples: Samples | None
-    limits: Mapping[tuple[str, str], tuple[ArrayLike, ArrayLike]]
-
-
-def drawn_errors(task: Task, sums: Mapping[int, Sums]) -> DrawnErrors:
-    """What pictures show of a task and its samples, by pose."""
-    output, order, _ = task.labels
-    limits = {
-        (str(output[k]), str(order[k])): ((-limit.high if limit.round else limit.low) * scale, limit.high * scale)
-        for limit in task.question.at(task.nominal).limits for k in limit.channels for scale in (task.scale[k],)
-    }  # fmt: skip
-    return DrawnErrors(task.poses, drawn_samples(task, sums), limits)
-
-
-def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
-    """The samples that pictures show; None where no errors are drawn."""
-    setting = next((setting for setting in task.settings if setting.followed), None)
-    if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
-        return None
-    pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
-    limits = (replace(limit, low=limit.low * scale[limit.output], high=limit.high * scale[limit.output])
-              for limit in question.limits)  # fmt: skip
-    return Samples(
-        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)), tuple(limits),
-        question.pair, task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
-    )  # fmt: skip
 
 
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:

@@ -47,7 +47,7 @@ def _panel(view: DynamicsView, name: str, over: Along) -> Panel:
     extremes = view.result.tables["extremes"]
     row = extremes.take(extremes.where(output=name))
     unit, values = str(row["unit"][0]), view.column(name)
-    low, high, size, at, mean, rms = (float(row[key][0]) for key in ("min", "max", "peak", "peak_at", "mean", "rms"))
+    high, size, at, mean, rms = (float(row[key][0]) for key in ("max", "peak", "peak_at", "mean", "rms"))
     drive, _, kind = name.rpartition("_")
     marks: list[PanelMark] = [
         Trace(over.values, values, look={"color": _CURVES[kind], "linewidth": 1.8}),
@@ -61,7 +61,9 @@ def _panel(view: DynamicsView, name: str, over: Along) -> Panel:
         return Panel(marks, over.axis, Axis(kind, unit, ends=ends), f"{drive}: without bound")
     if np.isnan(at):
         return Panel(marks, over.axis, Axis(kind, unit), f"{drive}: {quantity(high, unit)} everywhere")
-    place, value = at if over.name else at + 1, high if high >= -low else low
+    place = at if over.name else at + 1
+    # Of two ends that are equally large it is the one at this place.
+    value = np.copysign(size, np.interp(place, over.values, values))
     mean = 0.0 if abs(mean) < NOTHING * size else mean
     marks.append(Dots([place], [value], label="peak", look=PEAK))
     marks.append(Lines([-rms if high <= 0 else rms], label="root mean square", look=_RMS))

@@ -16,8 +16,8 @@ from mechdesign.drawing.marks import Axis, Dots, Own, Panel, PanelMark, Picture,
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.shapes import lighter
 from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.questions.reliability.drawn import Samples
 from mechdesign.questions.reliability.figures.view import ErrorsView
-from mechdesign.questions.reliability.tables import Samples
 
 # Shares of the made mechanisms that an ellipse or a region holds, with the ellipses' dashes and the regions' tints.
 SHARES = (0.5, 0.9, 0.997)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mechdesign.drawing import style
 from mechdesign.drawing.looks import (
@@ -24,6 +23,7 @@ from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.drawn import FIRST_ORDER
 from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 
@@ -46,25 +46,22 @@ def sweep_pictures(view: ErrorsView) -> dict[str, Picture] | None:
     moments, swept = view.result.tables["moments"], view.swept
     if swept is None:
         return None
-    ends = view.drawn.limits
-    bands = [_band(moments, swept, ends.get((output, order), (-np.inf, np.inf)), output, order, unit)
-             for output, order, unit in channels(moments)[:MAX_PANELS]]  # fmt: skip
+    bands = [_band(view, swept, output, order, unit) for output, order, unit in channels(moments)[:MAX_PANELS]]
     return {
         "bands": Picture("Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations", bands, share="x"),
-        "deviations": _deviations(moments, swept),
+        "deviations": _deviations(view, swept),
     }
 
 
-def _band(
-    moments: Table, swept: Along, ends: tuple[ArrayLike, ArrayLike], output: str, order: str, unit: str
-) -> Panel:  # fmt: skip
+def _band(view: ErrorsView, swept: Along, output: str, order: str, unit: str) -> Panel:
     """Mean error and three standard deviations to both sides: computed ones as a band, simulated ones as dots."""
-    x, shown = swept.values, methods(moments)
+    shown = methods(view.result.tables["moments"])
     filled = next((method for method in shown if not look(method).sampled), None)
     marks: list[PanelMark] = [Lines([0.0], look={"color": style.FAINT, "linewidth": 0.8})]
     largest = 0.0
     for method in shown:
-        drawn, rows = look(method), moments.where(output=output, order=order, method=method)
+        drawn, (over, moments) = look(method), view.curve("moments", method)
+        x, rows = over.values, moments.where(output=output, order=order)
         mean, reach = moments["mean"][rows] - moments["nominal"][rows], 3.0 * moments["sigma"][rows]
         largest = max(largest, float(np.nanmax(np.abs(mean) + reach, initial=0.0)))
         if method == filled:
@@ -73,9 +70,10 @@ def _band(
             )
             marks.append(Trace(x, mean, look={"color": drawn.color, "linewidth": 1.2}))
             continue
-        own = _line(drawn) | {"linewidth": 1.2, "markersize": 2.8, "markevery": max(1, len(x) // _most_dots())}
+        own = _line(drawn, len(x)) | {"linewidth": 1.2, "markersize": 2.8}
         marks += [Trace(x, value, label=drawn.words, look=own) for value in (mean - reach, mean, mean + reach)]
-    far = []
+    far, x = [], view.curve("moments", FIRST_ORDER)[0].values
+    ends = view.drawn.finer[0].limits.get((output, order), (-np.inf, np.inf))
     for limit in (np.broadcast_to(end, len(x)) for end in ends):
         near = np.where(np.abs(limit) < _FAR_FROM_ERRORS * largest, limit, np.nan)
         if np.isfinite(near).any():
@@ -86,8 +84,10 @@ def _band(
     return Panel(marks, swept.axis, Axis("error", unit), heading(output, order), words)
 
 
-def _deviations(moments: Table, swept: Along) -> Picture:
+def _deviations(view: ErrorsView, swept: Along) -> Picture:
     """A panel for each order and unit; outputs by colour, methods by dashes or dots."""
+    moments = view.result.tables["moments"]
+    curves = {method: view.curve("moments", method) for method in methods(moments)}
     shown, reference = methods(moments), best_moments(moments)
     compared = [method for method in shown if not look(method).sampled] if look(reference).sampled else []
     groups: dict[tuple[str, str], list[str]] = {}
@@ -102,14 +102,15 @@ def _deviations(moments: Table, swept: Along) -> Picture:
             apart = ", ".join(_apart(sigma[method], sigma[reference]) for method in compared)
             named = f"{output} ({apart})" if apart else output
             first = f"{order} of {named}" if order != "position" else named
-            for method, values in sigma.items():
-                own = {"markersize": 3.2} | _line(look(method)) | ({} if single else {"color": color})
+            for method, (over, rows) in curves.items():
+                values = rows["sigma"][rows.where(output=output, order=order, unit=unit)]
+                own = {"markersize": 3.2} | _line(look(method), len(values)) | ({} if single else {"color": color})
                 if not single and not look(method).sampled:
-                    own |= {"marker": mark, "markersize": 6, "markevery": max(len(swept.values) // 8, 1)}
+                    own |= {"marker": mark, "markersize": 6, "markevery": over.spread(8, 0.0)}
                 words = look(method).words if single else first * (method == shown[0])
-                marks.append(Trace(swept.values, values, label=words, look=own))
+                marks.append(Trace(over.values, values, label=words, look=own))
         if not single:
-            marks += [Trace([], [], label=look(method).words, look=_line(look(method)) | {"color": style.INK})
+            marks += [Trace([], [], label=look(method).words, look=_line(look(method), 1) | {"color": style.INK})
                       for method in shown]  # fmt: skip
         panels.append(Panel(marks, swept.axis, Axis(order, unit, ends=(0.0, None)), named if single else ""))
     note = f"in brackets: difference from {look(reference).words} on average" if compared else ""
@@ -127,10 +128,11 @@ def _most_dots() -> int:
     return 36 if style.narrow() else 80
 
 
-def _line(drawn: Method) -> dict[str, Any]:
-    """Dashes of what is computed, markers of what is simulated."""
+def _line(drawn: Method, poses: int) -> dict[str, Any]:
+    """Dashes of what is computed, markers of what is simulated, of many poses at some."""
     dashes, marker = ("None", drawn.marker) if drawn.sampled else (drawn.dashes, "")
-    return {"color": drawn.color, "linestyle": dashes, "marker": marker}
+    every = max(1, -(-poses // _most_dots()))
+    return {"color": drawn.color, "linestyle": dashes, "marker": marker, "markevery": every}
 
 
 @picture(ErrorsView, "deviation_map", "failure_map", order=20)
@@ -187,10 +189,10 @@ def estimates(view: ErrorsView) -> Picture | None:
             own = {"marker": drawn.marker, "color": drawn.color, "clip_on": False}
             marks.append(Dots(at, np.maximum(value, floor), label=drawn.words, look=own))
         else:
-            own = {"linestyle": drawn.dashes, "color": drawn.color}
-            marks.append(
-                Trace(at, np.where(value > floor, value, np.nan) if floor else value, label=drawn.words, look=own)
-            )
+            over, curve = view.curve("reliability", method)
+            value, own = curve["failure"], {"linestyle": drawn.dashes, "color": drawn.color}
+            shown_value = np.where(value > floor, value, np.nan) if floor else value
+            marks.append(Trace(over.values, shown_value, label=drawn.words, look=own))
         for x, row in zip(at.tolist(), rows, strict=True) if written else ():
             height = float(table["failure_high" if unseen[row] else "failure"][row])
             if not np.isnan(height):

@@ -14,8 +14,8 @@ from mechdesign.drawing.panels import MAX_PANELS, number
 from mechdesign.drawing.pictures import picture
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Table
+from mechdesign.questions.reliability.drawn import Samples
 from mechdesign.questions.reliability.figures.view import ErrorsView
-from mechdesign.questions.reliability.tables import Samples
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6

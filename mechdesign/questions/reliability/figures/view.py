@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import cached_property
 
 from mechdesign.drawing.looks import followed_in_words, look
+from mechdesign.drawing.panels import Along, along
 from mechdesign.drawing.pictures import PosesView
+from mechdesign.ground.results import Table
 from mechdesign.motion.rows import Poses
 from mechdesign.questions.poses import pose_in_words
-from mechdesign.questions.reliability.tables import DrawnErrors, Samples
+from mechdesign.questions.reliability.drawn import FIRST_ORDER, DrawnErrors, Samples
 
 
 class ErrorsView(PosesView):
@@ -23,6 +25,14 @@ class ErrorsView(PosesView):
     def poses(self) -> Poses:
         """The poses of the tables."""
         return self.drawn.poses
+
+    def curve(self, table: str, method: str) -> tuple[Along, Table]:
+        """What a curve over the motion runs over, and the rows of a method at poses; the first order's lie closer."""
+        drawn, tables = self.drawn.finer if method == FIRST_ORDER else (self.drawn, self.result.tables)
+        over, whole = along(self.study, drawn.poses), tables[table]
+        assert over is not None
+        rows = whole.where(method=method) & (whole.where(scope="pose") if "scope" in whole.names else True)
+        return over, whole.take(rows)
 
     def sampled(self, table: str) -> Samples | None:
         """The samples; None without any, or without a table of this name."""
