@@ -30,8 +30,9 @@ DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 9 ms a picture; 9 takes 20 ms more for two hundredths.
 _DEFLATE_LEVEL = 8
 # Of colours in few: the largest distance and its root mean square (of 255 a channel), buckets of 6 bits a channel, and
-# pixels side by side from which on a colour is that of an area.
-_FARTHEST, _MEAN, _SHADES, _AREA = 48, 3.0, 1 << 18, 8
+# pixels side by side from which on a colour is that of an area, which keeps its colour but for `_OF_AREA`.
+_FARTHEST, _OF_AREA, _MEAN, _SHADES, _AREA = 48, 6, 3.0, 1 << 18, 4
+_WIDE = 64  # pixels of an area
 
 
 class Look(NamedTuple):
@@ -69,7 +70,7 @@ _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers 
 
 
 # A name, an equals sign, a number and its unit.
-_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
+_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?|\[[^] ]+ [^]]+\]")
 # What a long word may be broken into: never the value of a name, which would read as two numbers.
 _PARTS = re.compile(r"\xa0?=\xa0.+|[^._\xa0]+[._]*|[._]+|\xa0(?!=)")
 _NAME = re.compile(r"[\w.]+")
@@ -176,8 +177,8 @@ def line(size: float) -> float:
 def folded(words: str, size: float, room: float) -> str:
     """Text of a size (points) in lines of at most `room` inches.
 
-    ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a word that fits no line is broken after
-    its dots and underscores. Long names are shortened.
+    ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a unit in brackets stays whole, too. A
+    word that fits no line is broken after its dots and underscores. Long names are shortened.
     """
     fitting = int(72 * room / (_LETTER * size))
     words, lines = shortened(words, _MOST_LETTERS, max(_FEWEST_LETTERS, min(_MOST_LETTERS, fitting))), list[str]()
@@ -267,14 +268,15 @@ def name_powers(panels: Iterable[Axes]) -> None:
             if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
                 continue
             axis.offsetText.set_visible(False)
-            name, bracket, unit = label.rpartition("[")
+            name, bracket, rest = label.partition("[")
+            unit, _, rest = rest.partition("]")
             largest = float(np.abs(axis.get_view_interval()).max())
-            exponent, unit = reading(largest, as_written(unit.removesuffix("]")) if bracket else "")
+            exponent, unit = reading(largest, as_written(unit))
             formatter.set_scientific(exponent != 0)
             if exponent:
                 formatter.set_powerlimits((exponent, exponent))
             if bracket:
-                axis.set_label_text(f"{name}[{unit}]")
+                axis.set_label_text(f"{name}[{unit}]{rest}")
             elif exponent:
                 axis.set_label_text(f"{label} [{unit}]")
 
@@ -310,8 +312,9 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
 def _in_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
     """A picture of pixels (height, width, 4) in as few colours as no eye misses, at most 256.
 
-    Areas keep their colours. Of the shades along edges one after another is taken that is farthest from those taken,
-    rare ones last, until none is farther than `_FARTHEST` and all pixels are in the mean nearer than `_MEAN`.
+    Areas keep their colours. Of the shades one after another is taken that is farthest from those taken, rare ones
+    last, until none is farther than `_FARTHEST`, of areas than `_OF_AREA`, and all pixels are in the mean nearer than
+    `_MEAN`.
     """
     height, width, _ = pixels.shape
     colours = pixels.view(np.uint32).ravel()
@@ -324,14 +327,16 @@ def _in_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
     counts = np.bincount(shades, lengths, _SHADES)
     used = np.flatnonzero(counts)
     counts, colors = counts[used], shown[used].view(np.uint8).reshape(-1, 4)[:, :3].astype(float)
+    wide = np.bincount(shades[areas], lengths[areas], _SHADES)[used] > _WIDE
+    most = np.where(wide, _OF_AREA, _FARTHEST) ** 2.0
     far, nearest, taken = np.full(len(used), np.inf), np.zeros(_SHADES, dtype=np.uint8), [int(np.argmax(counts))]
     while True:
         distances = np.square(colors - colors[taken[-1]]).sum(axis=1)
         nearest[used[distances < far]] = len(taken) - 1
         far = np.minimum(far, distances)
-        if len(taken) == 256 or (far.max() <= _FARTHEST**2 and far @ counts <= _MEAN**2 * height * width):
+        if len(taken) == 256 or ((far <= most).all() and far @ counts <= _MEAN**2 * height * width):
             break
-        taken.append(int(np.argmax(far * counts**0.25)))
+        taken.append(int(np.argmax(far / most * counts**0.25)))
     picture = Image.frombytes("P", (width, height), np.repeat(nearest[shades], lengths).tobytes())
     picture.putpalette(colors[taken].astype(np.uint8).tobytes())
     return picture

@@ -14,7 +14,7 @@ LABEL = 10.0  # points, of the name of an axis
 NAMES = 0.4  # of the width, for names beside bars
 # Inches: between a text and what it is of, of a digit, from tick to tick.
 PAD, DIGIT, _UP, _ALONG = 0.06, 0.083, 0.29, 0.47
-_MOST = 9
+_MOST, _CLOSER = 9, 4
 # Of steps between ticks; those of degrees are parts of a turn.
 _STEPS, _TURNS, _MUCH_OF_A_TURN = (1, 2, 2.5, 5, 10), (1, 1.5, 3, 4.5, 6, 9, 10), 150
 
@@ -35,18 +35,19 @@ def tick(axis: Drawn, declared: Axis, inches: float) -> None:
     elif declared.scale == "linear":
         low, high = axis.get_view_interval()
         turning = declared.over and declared.label.endswith("[deg]") and abs(high - low) > _MUCH_OF_A_TURN
-        most = max(1, min(_MOST, int(inches / (_UP if upright else _ALONG))))
-        while most:
-            axis.set_major_locator(MaxNLocator(most, steps=_TURNS if turning else _STEPS, min_n_ticks=1))
+        most = min(_MOST, int(inches / (_UP if upright else _ALONG)))
+        # One number says nothing of the scale: then closer ones, as far as they lie apart.
+        for count in (*range(most, 1, -1), *range(most + 1, most + _CLOSER), 1):
+            axis.set_major_locator(MaxNLocator(count, steps=_TURNS if turning else _STEPS, min_n_ticks=1))
             places = [place for place in axis.get_majorticklocs().tolist() if min(low, high) <= place <= max(low, high)]
             numbers = axis.get_major_formatter().format_ticks(places)
             need = DIGIT * (max(map(len, numbers), default=0) + 0.7) * abs(high - low) / inches
             every = [step for step in (1, 2) if len(places) <= step or places[step] - places[0] >= need]
-            if upright or every:
-                if not upright and every[0] > 1 and len(places) > 2:
-                    axis.set_major_locator(FixedLocator(places[::2]))
+            if not upright and every and every[0] > 1:
+                places = places[::2]
+                axis.set_major_locator(FixedLocator(places))
+            if (upright or every) and len(places) > 1:
                 break
-            most -= 1
 
 
 def folded_names(names: Sequence[str]) -> list[str]:

@@ -21,6 +21,8 @@ LOOSE = 0.15
 LEAST = 6.75
 # Letters of a number along an axis.
 MOST_DIGITS = 8
+# Inches of an axis for each letter, from which two of its numbers have room.
+NUMBER = 0.25
 # Inches by which a picture may exceed the height of its page.
 HIGHER = 0.05
 # Of an axis: a curve that varies, but over less than this, is read as constant.
@@ -102,7 +104,7 @@ def lost_curves(figure: Figure) -> Iterator[str]:
 
 
 def _lost_digits(axes: Axes) -> Iterator[str]:
-    """Axes whose power of ten stands apart from their label, numbers that are alike, and those of many digits."""
+    """Axes whose power of ten stands apart from their label, numbers alike, of many digits or alone, broken units."""
     for axis in (axes.xaxis, axes.yaxis) if axes.get_visible() and axes.name != "3d" else ():
         label = axis.get_label_text()
         power = axis.offsetText.get_text() if axis.offsetText.get_visible() else ""
@@ -112,6 +114,11 @@ def _lost_digits(axes: Axes) -> Iterator[str]:
         numbers = [text for text in drawn if text.strip("-\N{MINUS SIGN}.0123456789") == "" and text]
         if len(set(numbers)) < len(numbers) or any(len(text) > MOST_DIGITS for text in numbers):
             yield f"numbers {numbers} along {label!r}"
+        room = axes.bbox.width / style.dots()
+        if len(numbers) == 1 and axis.get_scale() == "linear" and room > NUMBER * (len(numbers[0]) + 1):
+            yield f"{numbers[0]} alone along {label!r}"
+        if any(line.count("[") != line.count("]") for line in label.split("\n")):
+            yield f"a unit in two lines of {label!r}"
 
 
 def _place(labels: tuple[str, str]) -> bool:

@@ -16,6 +16,7 @@ from mechdesign.drawing.panels import drawn_plane
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.scene import Scene
 from mechdesign.drawing.sweep import ranks
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.instant_centres import Centre
@@ -57,7 +58,7 @@ def poses_picture(view: MotionView) -> Picture | None:
                 if abs(special.centres[centre] - middle) <= _NEAR * side}  # fmt: skip
         marks += [Dots([z.real], [z.imag], label=f"instant centre {centre.name}", look=centre_look(shape))
                   for centre, shape in near.items() for z in [special.centres[centre]]]  # fmt: skip
-        away = [_where(centre, special.centres[centre]) for centre in centres if centre not in near]
+        away = [_where(study, centre, special.centres[centre]) for centre in centres if centre not in near]
         lost = chosen.rates and not np.isfinite(list(special.velocities.values())).all()
         remark = "; ".join(filter(None, (special.event, "singular, no rates" * lost, *away)))
         tips = [mark.places + mark.vectors for mark in marks if isinstance(mark, Arrows)]
@@ -122,10 +123,11 @@ def _arrows(
     return Arrows(places, along, size, unit, label=KINDS[order], look=RATES[order])
 
 
-def _where(centre: Centre, z: complex) -> str:
+def _where(study: Study, centre: Centre, z: complex) -> str:
     """A centre that is not drawn, and where it is."""
     x, y = (part if abs(part) > _STILL * abs(z) else 0.0 for part in (z.real, z.imag))
-    where = f"at ({x:.4g}, {y:.4g})" if np.isfinite(z) else "at infinity" if np.isinf(z) else "none"
+    place = f"at ({numeral(x, 4)}, {numeral(y, 4)}) {study.units.label('length')}"
+    where = place if np.isfinite(z) else "at infinity" if np.isinf(z) else "none"
     return f"centre of {centre.one}, {centre.other}: {where}"
 
 

@@ -72,6 +72,11 @@ def outside(near: Flags) -> str:
     return f"{counted(int((~near).sum()), 'far worse design')} outside"
 
 
+def goals_apart(designs: DesignSet) -> list[int]:
+    """Goals that are not variables themselves."""
+    return [k for k, goal in enumerate(designs.goals) if goal.name not in designs.variables]
+
+
 def on_front(designs: DesignSet, front: Table) -> Ints:
     """Rows of the designs whose goals are those of a front's designs."""
     best = set(zip(*(front[goal.name].tolist() for goal in designs.goals), strict=True))

@@ -12,7 +12,7 @@ from mechdesign.drawing.marks import Axis, Dots, Panel, PanelMark, Picture, Trac
 from mechdesign.drawing.pictures import picture
 from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
-from mechdesign.questions.optimize.figures.designs import FEW, GREY_DOTS, listed
+from mechdesign.questions.optimize.figures.designs import FEW, GREY_DOTS, goals_apart, listed
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import DesignSet
 
@@ -99,6 +99,6 @@ def chosen(designs: DesignSet, front: Table, row: int) -> dict[str, float | str]
 def described(designs: DesignSet, front: Table, name: str, row: int) -> str:
     """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
     lines = listed(designs, chosen(designs, front, row))
-    lines += [f"{goal.column} = {numeral(front[goal.name][row], 3)} {printed(designs.unit_of(goal.name))}"
-              for goal in designs.goals]  # fmt: skip
+    for goal in (designs.goals[k] for k in goals_apart(designs)):
+        lines.append(f"{goal.column} = {numeral(front[goal.name][row], 3)} {printed(designs.unit_of(goal.name))}")
     return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])

@@ -33,6 +33,7 @@ from mechdesign.ground.results import Table
 from mechdesign.questions.optimize.figures.designs import (
     FEW,
     GREY_DOTS,
+    goals_apart,
     listed,
     on_front,
     outside,
@@ -198,13 +199,13 @@ def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> 
     on_a_grid = len(steps[0]) * len(steps[1]) <= 4 * len(z)
     near = usual(z, smallest=smallest)
     norm: Normalize = Normalize(z[near].min(), z[near].max())
-    levels, extend = round_levels(z[near].min(), z[near].max(), MAP_LEVELS), "neither"
-    digits = FuncFormatter(lambda value, _: numeral(value, 3))
+    levels = round_levels(z[near].min(), z[near].max(), MAP_LEVELS)
+    options: dict[str, Any] = {"extend": "neither"}
     if _steep(z) and len(designs.goals) == 1:
         levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
+        options["format"] = FuncFormatter(lambda value, _: numeral(value, 3))
     elif not near.all():
-        extend = "max" if smallest else "min"
-    options = {"extend": extend, "format": digits}
+        options["extend"] = "max" if smallest else "min"
     if not on_a_grid or len(steps[0]) < 2 or len(steps[1]) < 2 or len(z) < 4:
         order = np.argsort(designs.cpi[inside] if any(goal.smallest for goal in designs.goals) else z)
         axes.margins(0.03)
@@ -216,7 +217,7 @@ def _fill(axes: Axes, designs: DesignSet, values: Floats, *, smallest: bool) -> 
     axes.margins(0.02)
     if len(z) < FEWEST_OF_FIELD:
         return axes.pcolormesh(*steps, field, cmap=style.COLORMAP, norm=norm, shading="nearest"), options
-    filled = axes.contourf(*steps, field, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
+    filled = axes.contourf(*steps, field, levels=levels, cmap=style.COLORMAP, norm=norm, extend=options["extend"])
     axes.contour(*steps, field, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
     return filled, options
 
@@ -229,8 +230,9 @@ def designs_picture(view: DesignsView) -> Picture | None:
 
 def parallel_axes(designs: DesignSet) -> Picture:
     """Each feasible design a line across its variables and goals, the colour its score, the best of all on top."""
-    names = [*designs.variables, *(goal.name for goal in designs.goals)]
-    columns = np.column_stack([*designs.variables.values(), designs.values])
+    others = goals_apart(designs)
+    names = [*designs.variables, *(designs.goals[k].name for k in others)]
+    columns = np.column_stack([*designs.variables.values(), designs.values[:, others]])
     rows = np.flatnonzero(designs.feasible)
     near = np.logical_and.reduce([usual(designs.values[rows, k], smallest=goal.smallest)
                                   for k, goal in enumerate(designs.goals)])  # fmt: skip

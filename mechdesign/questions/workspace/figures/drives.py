@@ -26,7 +26,7 @@ LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
 _LIMIT = {"color": style.INK, "linewidth": 0.9, "zorder": 1.5}
 _LETTERS = 60  # of the title of a panel
-_TOGETHER = 0.09  # of its height, between limits whose names do not touch
+_TOGETHER, _EACH = 0.09, 0.03  # of its height, alone and for each of many, between limits whose names do not touch
 _JOINED = 2e-5  # of the size of the region, between ends of curves that are one corner
 
 
@@ -41,15 +41,17 @@ class Loop(NamedTuple):
 def drives_picture(view: WorkspaceView) -> Picture | None:
     """Drive values along the boundary [S1, Fig. 7], over its length: a panel for each of its closed curves."""
     study, names = view.study, [*view.study.mechanism.drives]
+    length = study.units.label("length")
     every = [(region.boundary, loop, region.title) for region in view.regions for loop in loops(region.boundary)]
     if not every:
         return None
     parts = [every[k] for k in evenly(len(every), MAX_PANELS)]
-    words = [", ".join(filter(None, (where, _in_words(boundary, loop)))) for boundary, loop, where in parts]
+    words = [", ".join(filter(None, (where, _in_words(boundary, loop, length)))) for boundary, loop, where in parts]
     titles, held = panel_titles(words, _LETTERS)
     notes = [f"panels: values of {held}"] * bool(held)
     notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
     units = {study.units.label(study.mechanism.quantity(name)) for name in names}
+    apart = max(_TOGETHER, _EACH * len(parts))
     drive = Axis("drive", "".join(units) if len(units) == 1 else "")
     limits, panels = _drive_limits(study), []
     for (boundary, loop, _), title in zip(parts, titles, strict=True):
@@ -64,8 +66,8 @@ def drives_picture(view: WorkspaceView) -> Picture | None:
         marks += [Lines([*limits], label="limit of a drive", look=_LIMIT)]
         reach = np.ptp([*limits, *(end(own[name]) for name in names for end in (np.nanmin, np.nanmax))])
         marks += [Words(1, height, ", ".join(limited), (-2, 1.5), "x", look={"ha": "right", "path_effects": HALO})
-                  for height, limited in _together(limits, _TOGETHER * float(reach))]  # fmt: skip
-        way = Axis("length along the boundary", study.units.label("length"), ends=(0.0, float(arc[-1])))
+                  for height, limited in _together(limits, apart * float(reach))]  # fmt: skip
+        way = Axis("length along the boundary", length, ends=(0.0, float(arc[-1])))
         panels.append(Panel(marks, way, drive, title))
     return Picture("Drives along the boundary of the workspace, counterclockwise", panels, ("; ".join(notes),))
 
@@ -105,12 +107,12 @@ def _inside(way: Complexes, other: Complexes) -> bool:
     return bool(Path(np.column_stack([other.real, other.imag])).contains_point((place.real, place.imag)))
 
 
-def _in_words(boundary: Table, loop: Loop) -> str:
-    """``inner boundary from (30, 40)``: where its length is 0, to a thousandth of its size."""
+def _in_words(boundary: Table, loop: Loop, length: str) -> str:
+    """``inner boundary from (30, 40) mm``: where its length is 0, to a thousandth of its size."""
     rows = np.concatenate(loop.parts)
     step = 10.0 ** (np.floor(np.log10(np.ptp(boundary["x"][rows]) + np.ptp(boundary["y"][rows]))) - 3)
     x, y = (round(float(boundary[axis][rows[0]]) / step) * step + 0.0 for axis in "xy")
-    return f"{'inner' if loop.inner else 'outer'} boundary from ({x:.6g}, {y:.6g})"
+    return f"{'inner' if loop.inner else 'outer'} boundary from ({x:.6g}, {y:.6g}) {length}"
 
 
 def _rolled(study: Study, name: str, values: Floats) -> Floats:
