@@ -43,7 +43,7 @@ _GAP = 5.0  # and from the point that it begins at
 _NET = 4.0  # points between two places of a line that others keep off
 _ORDER = 6.0
 _NONE = 1e-9  # part of the size of the mechanism that is no distance
-_HALO = 1.5  # points about a number
+_HALO, _FROM_AXIS = 1.5, 1.5  # points about a number, and between these and the axes
 _COLUMN_GAP, _BOLD = 9.0, 1.15  # points, between columns of the table; width of bold letters over others
 _AROUND = 0.12  # of the mechanism's size, for dimension lines beside it
 
@@ -260,7 +260,7 @@ def _near(net: Floats, points: Floats, distance: float) -> int:
 
 
 def _outside(box: Floats, window: Floats) -> bool:
-    return bool((box[:2] < window[0]).any() or (box[2:] > window[1]).any())
+    return bool((box[:2] < window[0] + _FROM_AXIS).any() or (box[2:] > window[1] - _FROM_AXIS).any())
 
 
 def _over(box: Floats, other: Floats) -> bool:

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from helpers.gallery import study_named
 from helpers.pages import faults
 from helpers.studies import SLIDER_CRANK, study_of
 from matplotlib.text import Text
@@ -130,3 +131,16 @@ def test_a_sheet_is_at_a_standard_scale():
         drawn = axes.get_position().width * wide / np.ptp(axes.get_xlim())
         assert drawn == pytest.approx(scale * view.millimetres)
         assert sheet.region[1] >= 10 + (sum(BLOCK) if sheet.paper == "A4" else 0)
+
+
+@pytest.mark.slow
+def test_the_white_behind_a_number_leaves_the_axes_whole() -> None:
+    with style.context("paper"):
+        figure = draw(dimensions_picture(study_named("oldham")))
+        figure.canvas.draw()
+        axes = figure.axes[0]
+        numbers = [patch for text in axes.texts if text.get_text() and (patch := text.get_bbox_patch()) is not None]
+        assert numbers
+        for box in (patch.get_window_extent() for patch in numbers):
+            assert box.x0 > axes.bbox.x0 + 0.5
+            assert box.y0 > axes.bbox.y0 + 0.5

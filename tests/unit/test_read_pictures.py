@@ -94,3 +94,19 @@ kinematics:
     remarks = [line for axes in figure.axes for line in axes.get_title(loc="left").split("\n") if "centre of" in line]
     assert remarks
     assert all(line.endswith(") mm") for line in remarks)
+
+
+def test_drives_of_different_units_have_theirs_in_the_legend() -> None:
+    study = study_of("""
+units: {length: mm}
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: [O, A, 100], hand: {T: [0, 0]}}
+  joints: {reach: {prismatic: [arm, hand]}}
+  drives: {q: {angle: arm}, s: {slide: reach}}
+  limits: [{drive: q, min: 0, max: 90 deg}, {drive: s, min: 50, max: 80}]
+  sketch: {A: [100, 0], T: [60, 0]}
+workspace: {point: T, scan: {about: [46, 46], rays: 31}, characteristic_length: 50}
+""")
+    with style.context():
+        legend = figure_of(study, mechdesign.workspace(study), "drives").legends[0]
+    assert {"q [deg]", "s [mm]"} <= {text.get_text() for text in legend.get_texts()}

@@ -78,6 +78,18 @@ def test_pictures_of_one_page_share_no_names() -> None:
         assert set(re.findall(r"#([\w-]+-\d+)", each)) == set(own)
 
 
+@pytest.mark.slow
+def test_hatches_of_one_page_are_those_of_their_pictures() -> None:
+    """What is not met is hatched in a response map: the area is filled with the pattern of its own picture."""
+    with style.context():
+        made = style.new_figure(3.0)
+        made.subplots().fill_between([0, 1], [1, 2], hatch="////", facecolor="white")
+        drawn = vector.inline(made, "two", "")
+    patterns = re.findall(r'<pattern[^>]* id="([^"]+)"', drawn)
+    assert [name.startswith("two-") for name in patterns] == [True]
+    assert re.findall(r'fill="url\(#([^)]+)\)"', drawn) == patterns
+
+
 @pytest.mark.nightly
 def test_what_is_large_as_lines_is_a_picture_of_pixels() -> None:
     random = np.random.default_rng(0)

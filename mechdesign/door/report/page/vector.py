@@ -203,7 +203,7 @@ def _rename(root: Element, names: dict[str, str]) -> None:
     renamed: Callable[[re.Match[str]], str] = lambda match: f"#{names[match[1]]}" if match[1] in names else match[0]  # noqa: E731
     for element in root.iter():
         identity = element.attrib.pop("id", None)
-        for key in ("href", "clip-path"):
+        for key in ("href", "clip-path", "fill"):
             if key in element.attrib:
                 element.set(key, _REFERENCE.sub(renamed, element.attrib[key]))
         if identity in names:

@@ -50,17 +50,20 @@ def drives_picture(view: WorkspaceView) -> Picture | None:
     titles, held = panel_titles(words, _LETTERS)
     notes = [f"panels: values of {held}"] * bool(held)
     notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
-    units = {study.units.label(study.mechanism.quantity(name)) for name in names}
     apart = max(_TOGETHER, _EACH * len(parts))
-    drive = Axis("drive", "".join(units) if len(units) == 1 else "")
+    units = {name: study.units.label(study.mechanism.quantity(name)) for name in names}
+    # Units that differ stand in the legend.
+    drive = Axis("drive")
+    if len({*units.values()}) == 1:
+        drive, units = Axis("drive", units[names[0]]), dict.fromkeys(names, "")
     limits, panels = _drive_limits(study), []
     for (boundary, loop, _), title in zip(parts, titles, strict=True):
         rows, z = np.concatenate(loop.parts), places(boundary)
         arc = np.append(0.0, np.cumsum(np.abs(np.diff(z[rows]))))
         own = {name: _rolled(study, name, boundary[name][rows]) for name in names}
         marks: list[PanelMark] = [
-            Trace(arc, own[name], label=name, look={"color": LINE_COLORS[k % len(LINE_COLORS)],
-                  "linestyle": DASHES[k % len(DASHES)], "linewidth": 1.9})
+            Trace(arc, own[name], label=style.axis_label(name, units[name]), look={
+                  "color": LINE_COLORS[k % len(LINE_COLORS)], "linestyle": DASHES[k % len(DASHES)], "linewidth": 1.9})
             for k, name in enumerate(names)
         ]  # fmt: skip
         marks += [Lines([*limits], label="limit of a drive", look=_LIMIT)]
