@@ -59,14 +59,15 @@ def few_comparisons() -> Iterator[None]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """The name of `names` most similar to this one; None if none is similar."""
+    """The name of `names` most similar to this one, or the only one that goes on from it; None if none is similar."""
     compared = _compared.get()
     if compared is not None:
         if len(compared) >= MAX_COMPARED and name not in compared:
             return None
         compared.add(name)
     folded = {candidate.casefold(): candidate for candidate in names}
-    close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
+    longer = [candidate for candidate in folded if candidate.startswith(f"{name.casefold()}.")]
+    close = longer if len(longer) == 1 else difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else None
 
 

@@ -155,3 +155,9 @@ def test_a_reliability_that_is_kept_ends_with_the_same_words(tmp_path) -> None:
     assert again.exit_code == 0
     assert words[0] == words[1]
     assert len(words[0]) == 4
+
+
+def test_a_link_without_its_dimension_is_known_by_what_goes_on_from_it():
+    study = ARM.replace("drives: [arm]", "drives: {theta: {angle: arm}}").replace("sweep: {arm:", "sweep: {theta:")
+    done = ask("reliability", "-", study=study + "reliability: {dimensions: {arm: 0.1}}\n")
+    assert "'arm'; did you mean 'arm.length'?" in done.stderr

@@ -157,7 +157,7 @@ class LiveTable:
         """Record the progress of a study's question, and tell of a long stage how far it is."""
         now, key = time.monotonic(), (index, how.command, how.stage)
         begun, due = self._stages.setdefault(key, (now, now + _LONG))
-        if how.total and now >= due and not self._quiet:
+        if how.done < how.total and now >= due and not self._quiet:
             first, once = due == begun + _LONG, self._rows is not None
             self._stages[key] = begun, math.inf if once else now + _EVERY
             words = f"{how.done} of {how.total} {how.stage} after {now - begun:.0f} s{f'; {how.ending}' * first}"
