@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -34,6 +35,8 @@ def solved(task: Any) -> Any:
         ({"path": {"points": [[float("nan"), 0], [1, 0]]}}, "finite number, not nan"),
         ({"path": {"points": [[0, 0]] * 10_001}}, "at most 10000 points, not 10001"),
         ({"path": {"points": "missing.csv"}}, "missing.csv cannot be read"),
+        ({"path": {"points": [[1e300, 0], [0, 1]]}}, r"synthesis.path.points.0.0: the number 1e\+300 is too large"),
+        ({"path": {"points": SQUARE, "closed": True}, "full_turn": False}, "the same way forth and back"),
         ({"path": {"points": SQUARE, "timing": [0, 1]}}, "2 crank angles for 4 points"),
         ({"path": {"points": SQUARE}, "kinds": "trammel"}, "no trammel is looked for from a path"),
         ({"path": {"points": SQUARE}, "rank": "yield"}, "a yield needs 'judge'"),
@@ -86,7 +89,25 @@ def test_of_many_points_it_is_told_how_many_count() -> None:
     assert "134 of 401 points count, evenly chosen" in solved(task).notes
 
 
+@pytest.mark.parametrize("conditions", [{"lengths": {"crank": [1e6, 1e7]}}, {"pivots": [[0, 0], [0, 0]]}])
+def test_a_path_with_conditions_that_contradict_each_other_says_so(conditions: Any) -> None:
+    task = {"path": {"points": SQUARE}, "evaluations": 100, **conditions}
+    with pytest.raises(mechdesign.AssemblyError, match="four-bar: no sample has a curve within all conditions"):
+        solved(task)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
+def test_ten_thousand_points_at_any_scale_are_a_path(size: float) -> None:
+    turn = np.linspace(0, 2 * np.pi, 10_000, endpoint=False)
+    points = size * np.stack([5 * np.cos(turn), 2 * np.sin(turn)], axis=1)
+    result = solved({"path": {"points": points.tolist(), "closed": True}, "evaluations": 3000})
+    # An ellipse is drawn by Cardan's motion, not by these four-bars, but nearly.
+    assert result.tables["solutions"]["error"][0] < 0.02 * size
+    assert "200 of 10000 points count, evenly chosen" in result.notes
+
+
 def test_where_no_sample_keeps_a_condition_it_is_said() -> None:
     task = {"path": {"points": SQUARE, "closed": True}, "transmission": {"at_least": 89}, "evaluations": 100}
-    with pytest.raises(mechdesign.AssemblyError, match="no linkage does it"):
+    with pytest.raises(mechdesign.AssemblyError, match="four-bar: no sample has a curve within all conditions"):
         solved(task)

@@ -6,8 +6,9 @@ projected out of the errors, whose components along the curve's tangent do not c
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +24,8 @@ POSES = 64
 POLISHED = 1000
 _KEPT = {12: 500, 24: 200, 40: 100}
 ROUNDS = 120
+# Of more points than linkages pass exactly the best go on for as many rounds.
+_BEST = 20
 # Most points that linkages can pass exactly; of these no start is left behind, so that the exact ones are counted.
 MOST_EXACT = 9
 # Root of the sum of the squared distances, as a part of the task's size, that is rounding.
@@ -97,7 +100,16 @@ def fits(
         values, angles = _near(kind, modes, task, samples, 4 * polished)
     else:
         values, angles = begun(kind, modes, task, samples, polished, bound)
-    return polish(kind, modes, task, bound(values), angles, bound, culled=len(task.points) > MOST_EXACT)
+    if len(task.points) <= MOST_EXACT:
+        return polish(kind, modes, task, bound(values), angles, bound)
+    found = polish(kind, modes, task, bound(values), angles, bound, _KEPT)
+    # The best of linkages with many dimensions still come nearer.
+    best = polish(kind, modes, task, found.values[:_BEST], found.angles[:_BEST], bound)
+    parts = [(best.values, found.values), (best.angles, found.angles), (best.costs, found.costs)]
+    values, angles, costs = (np.concatenate([one, rest[_BEST:]]) for one, rest in parts)
+    order = np.argsort(costs, kind="stable")
+    starts = np.concatenate([found.starts[best.starts], found.starts[_BEST:]])
+    return Fits(kind, modes, values[order], angles[order], costs[order], starts[order])
 
 
 def _interpolated(wanted: Floats, rising: Floats) -> Floats:
@@ -210,9 +222,9 @@ def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints
 
 def polish(
     kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, bound: KindBounds,
-    *, culled: bool = True,
+    kept: Mapping[int, int] = MappingProxyType({}),
 ) -> Fits:  # fmt: skip
-    """All linkages at once by Levenberg and Marquardt's method, the worse ones left behind on the way if `culled`."""
+    """All linkages at once by Levenberg and Marquardt's method; `kept` are how many go on after so many rounds."""
 
     def cost(values: Floats, angles: Floats) -> Floats:
         gaps = kind.points(kind.solve(values, angles, modes)) - task.points
@@ -222,7 +234,7 @@ def polish(
     largest = _LARGEST_STEP * span
     costs, damping, starts = cost(values, angles), np.full(len(values), 1e-3), np.arange(len(values))
     for number in range(ROUNDS):
-        best = np.argsort(costs, kind="stable")[: _KEPT.get(number, len(costs)) if culled else len(costs)]
+        best = np.argsort(costs, kind="stable")[: kept.get(number, len(costs))]
         best = best[np.isfinite(costs[best])]
         values, angles, costs, damping, starts = (
             values[best], angles[best], costs[best], damping[best], starts[best],

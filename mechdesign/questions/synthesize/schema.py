@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.variation import Dimension
@@ -83,7 +83,10 @@ def _points(raw: Any) -> Any:
 class PathTask(fields.Model):
     """Points that a point of the linkage shall pass, in their order."""
 
-    points: Annotated[tuple[Point, ...] | str, BeforeValidator(_points)]
+    points: Annotated[
+        Annotated[tuple[Point, ...], Tag("points")] | Annotated[str, Tag("file")],
+        Discriminator(lambda raw: "file" if isinstance(raw, str) else "points"), BeforeValidator(_points),
+    ]  # fmt: skip
     """The points, or the name of a CSV file with a row [x, y] each. Example: [[55, 60], [45, 75], [25, 75]]"""
     closed: bool = False
     """Whether the path ends where it begins."""

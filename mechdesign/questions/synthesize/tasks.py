@@ -256,7 +256,9 @@ class PathTask(_Task):
                 values, angles = fits.values[rows], fits.angles[rows]
                 gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
                 yield Pool(passed(kind, modes, values, angles, full_turn=self.section.needs_turn), gaps)
-            if len(self.path.points) <= paths.MOST_EXACT:
+            if not any(starts for _, _, starts in exact):
+                conditions.told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
+            elif len(self.path.points) <= paths.MOST_EXACT:
                 whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
                 words = f"{whole} exact, the last new one at start {last} of {starts}" if whole else \
                     f"none exact of {starts} starts"  # fmt: skip
