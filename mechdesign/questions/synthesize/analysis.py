@@ -92,7 +92,9 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
     """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
     told = [f"{counted(count, 'linkage')}, of which {len(solutions)} keep the conditions, {whole} without a defect"]
-    lost = [f"{number} {what} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number]
+    lost = [
+        f"{counted(number, what)} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number
+    ]
     return [*told, *([f"dropped: {'; '.join(lost)}"] if lost else []), f"seed {seed}"]
 
 

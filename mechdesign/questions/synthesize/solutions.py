@@ -157,9 +157,9 @@ class Conditions:
             self._of_pivots(dyads.pivot[:, None], few=len(frame.given) == 1),
             self._of_pins(dyads.pin[:, None], few=len(body.given) == 1),
         )
-        return dyads.take(self._counted(judged, len(dyads), "dyads"))
+        return dyads.take(self._counted(judged, len(dyads), "dyad"))
 
-    def _counted(self, judged: Iterable[tuple[str, Flags]], count: int, what: str = "linkages") -> Flags:
+    def _counted(self, judged: Iterable[tuple[str, Flags]], count: int, what: str = "linkage") -> Flags:
         """Which linkages, or dyads, keep conditions; the others are counted by the first that they miss."""
         kept = np.ones(count, dtype=bool)
         for reason, good in judged:

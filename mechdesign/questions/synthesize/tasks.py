@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mechdesign.ground.errors import StudyError
+from mechdesign.ground.errors import StudyError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
@@ -88,15 +88,18 @@ class BodyTask(_Task):
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
         section, sites = self.section, conditions.sites
+        conditions.told += filter(None, [self.positions.remark])
+        if self.positions.straight:
+            return
         found, words = body.choices(self.positions, *sites, random)
         placed = [conditions.placed(part) for part in found]
         most = section.evaluations or PAIRS
-        parts = [*body.pairs(self.positions, placed, sites, section, random, most)]
-        conditions.told.append(f"{words}, {sum(pairs for _, pairs in parts)} pairs")
+        parts = [*body.pairs(self.positions, placed, sites, section.lengths, section, random, most)]
+        conditions.told.append(f"{words}, {counted(sum(pairs for _, pairs in parts), 'pair')}")
         if not parts:
-            # None is in place: the nearest is one of the others.
-            free = (Site(site.centre, site.reach) for site in sites)
-            parts = [*body.pairs(self.positions, found, (next(free), next(free)), section, random, most)]
+            # The nearest is one of the others.
+            frame, pins = (Site(site.centre, site.reach) for site in sites)
+            parts = [*body.pairs(self.positions, found, (frame, pins), {}, section, random, most)]
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
