@@ -29,8 +29,8 @@ _KINDS = {
     "stephenson": "Stephenson's six-bar of type III, P on the second coupler",
 }
 _ZEROS = {
-    "free": "angles count from any line of a link",
-    "fixed": "angles are those of the links, or of their extensions beyond the pivots",
+    "free": "angles count from any line of a link, places from any point of the slide",
+    "fixed": "angles are those of the links, or of their other ends, places count from the crank's pivot",
 }
 _DEFECTS = {"listed": "behind those without a defect", "dropped": "they are counted, and left out"}
 _RANKS = {
