@@ -84,3 +84,34 @@ class Guided:
             if way[-1] <= 2 * np.pi + 1e-9 and sine.min() > NONE**2:
                 return True
         return False
+
+
+def generates(row: Mapping[str, Any], inputs: Floats, outputs: Floats) -> bool:
+    """Whether a four-bar between (0, 0) and (1, 0) turns its rocker as its crank says, in order (degrees).
+
+    In one assembly, and between the inputs without a dead centre; a link may stand beyond its pivot from its pointer.
+    """
+    return any(_generates(row, inputs + one, outputs + other) for one in (0, 180) for other in (0, 180))
+
+
+def _generates(row: Mapping[str, Any], inputs: Floats, outputs: Floats) -> bool:
+    crank, coupler, rocker = (float(row[f"{name}.length"]) for name in ("crank", "coupler", "rocker"))
+
+    def rocker_at(angles: Floats, side: float) -> tuple[Floats, Floats]:
+        away = crank * np.exp(1j * angles) - 1
+        reach = np.abs(away)
+        cosine = (reach**2 + rocker**2 - coupler**2) / (2 * reach * rocker)
+        room = np.minimum(coupler + rocker - reach, reach - abs(coupler - rocker)) / (coupler + rocker)
+        return np.angle(away) + side * np.arccos(np.clip(cosine, -1, 1)), room
+
+    for side in (1, -1):
+        gap = rocker_at(np.radians(inputs), side)[0] - np.radians(outputs)
+        # Of pairs that no linkage meets exactly, the error is that of the best.
+        if np.abs(np.angle(np.exp(1j * gap))).max() > np.radians(row["max_error"]) + 1e-7:
+            continue
+        for direction in (1, -1):
+            way = np.append(0.0, np.cumsum(np.mod(direction * np.diff(np.radians(inputs)), 2 * np.pi)))
+            poses = np.radians(inputs[0]) + direction * np.linspace(0, way[-1], STEPS)
+            if way[-1] <= 2 * np.pi + 1e-9 and rocker_at(poses, side)[1].min() > NONE**2:
+                return True
+    return False

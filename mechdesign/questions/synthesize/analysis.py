@@ -104,8 +104,9 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
     """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
     told = [f"{len(solutions)} of {counted(count, 'linkage')} within the conditions, {whole} without a defect"]
-    lost = [f"{counted(number, what.removesuffix('s'))} as {reason}"
-            for (what, reason), number in conditions.dropped.most_common() if number]  # fmt: skip
+    lost = [
+        f"{counted(number, what)} as {reason}" for (what, reason), number in conditions.dropped.most_common() if number
+    ]
     return [*told, *([f"dropped: {'; '.join(lost)}"] if lost else []), f"seed {seed}"]
 
 

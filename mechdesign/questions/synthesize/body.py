@@ -5,7 +5,7 @@ A function is a body too: the output link, as one sees it from the input link, m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -60,6 +60,34 @@ class Positions:
     def shifts(self) -> bool:
         """Whether the body only shifts."""
         return bool(np.abs(self.rotations - self.rotations[0]).max() < _STILL)
+
+    @property
+    def poles(self) -> Complexes:
+        """The points about which the body could turn from a position into a later one; nan where it shifts."""
+        first, second = np.triu_indices(len(self.places), 1)
+        turned = self.rotations[second] / self.rotations[first]
+        with np.errstate(all="ignore"):
+            places = (self.places[second] - turned * self.places[first]) / (1 - turned)
+        return np.asarray(np.where(np.abs(1 - turned) > _STILL, places, np.nan))
+
+    @property
+    def straight(self) -> bool:
+        """Whether the body only shifts along a line, by more than two positions."""
+        about = self.places - self.centre
+        along = abs((about**2).sum()) > (1 - _STILL) * (np.abs(about) ** 2).sum()
+        return bool(len(about) > 2 and self.shifts and along)
+
+    @property
+    def remark(self) -> str:
+        """What guides the body more simply than a linkage, or in what way a special one; empty for other tasks."""
+        if self.straight:
+            return "the body shifts along a line, on which a slide alone guides it"
+        if self.shifts:
+            return "the body only shifts: two links that guide it are parallel, of one length" * (len(self.places) > 2)
+        pole, turns = self.poles.mean(), np.ptp(self.poles.real) + np.ptp(self.poles.imag) < _SAME * self.size
+        if len(self.places) < 3 or not turns:
+            return ""
+        return f"the body turns about ({pole.real:.4g}, {pole.imag:.4g}), and a pivot there alone guides it"
 
     @property
     def size(self) -> float:
@@ -232,10 +260,10 @@ def _refined(start: Dyads, task: Positions, sites: tuple[Site, Site]) -> Dyads:
 
 
 def pairs(
-    task: Positions, found: Sequence[Dyads], sites: tuple[Site, Site], section: SynthesisSection,
-    random: np.random.Generator, most: int,
+    task: Positions, found: Sequence[Dyads], sites: tuple[Site, Site], lengths: Mapping[str, tuple[float, float]],
+    section: SynthesisSection, random: np.random.Generator, most: int,
 ) -> Iterator[tuple[Candidates, int]]:  # fmt: skip
-    """Linkages of two dyads each, at most so many of a kind, and how many there are."""
+    """Linkages of two dyads each with links of these lengths, at most so many of a kind, and how many there are."""
     wanted = section.kinds or tuple(_PAIRS.values())
     by_kind = {part.kind: part for part in found}
     for (first, second), name in _PAIRS.items():
@@ -243,6 +271,10 @@ def pairs(
             continue
         one, other = by_kind[first], by_kind[second]
         good = _together(one, other, sites)
+        for link, part, axis in (("crank", one, 1), ("rocker", other, 0)):
+            if link in lengths and part.kind == LINK:
+                low, high = lengths[link]
+                good &= np.expand_dims((part.length >= low) & (part.length <= high), axis)
         # A pair of links may be driven by either; two slides are the same pair in both orders.
         if first == second:
             good &= ~np.eye(len(one), dtype=bool) if first == LINK else np.triu(np.ones(good.shape, dtype=bool), 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.synthesize import dyads
 from mechdesign.questions.synthesize.body import Positions
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
@@ -71,11 +71,3 @@ def _followed(forms: Floats, start: Floats) -> Floats:
 def _tangent(forms: Floats, point: Floats) -> Floats:
     """The direction of the curve at a point."""
     return np.asarray(np.linalg.svd(np.concatenate([forms @ point, point[None]]))[2][-1])
-
-
-def poles(task: Positions) -> Complexes:
-    """The points about which the body could turn from each position into each other one; nan where it shifts."""
-    first, second = np.triu_indices(len(task.places), 1)
-    turned = task.rotations[second] / task.rotations[first]
-    places = (task.places[second] - turned * task.places[first]) / (1 - turned)
-    return np.asarray(np.where(np.abs(1 - turned) > 1e-9, places, np.nan))

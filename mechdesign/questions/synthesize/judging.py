@@ -13,7 +13,7 @@ from mechdesign.mechanism.derivatives import regularity
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses on the way through the task; where a linkage comes nearest to a dead centre, so many more between two of them.
-POSES, FINER = 181, 17
+POSES, FINER, FEW = 181, 17, 24
 # Linkages that are followed at once: their poses stay in the processor's cache.
 _AT_ONCE = 100
 _TURN = 2 * np.pi
@@ -120,7 +120,10 @@ def passed(
     begin, end = unwound.min(axis=1), unwound.max(axis=1)
     whole_dead, whole_worst = np.ones(len(values), dtype=bool), np.zeros(len(values))
     if kind.turns:
-        whole_dead, whole_worst = along(kind, modes, values, begin, begin + _TURN)
+        # Few poses tell of most that their drives cannot turn fully.
+        few = begin[:, None] + np.linspace(0, _TURN, FEW)
+        turns = np.flatnonzero(kind.solve(values, few, modes).valid.all(axis=1))
+        whole_dead[turns], whole_worst[turns] = along(kind, modes, values[turns], begin[turns], begin[turns] + _TURN)
     rest = np.flatnonzero(whole_dead)
     dead, worst = whole_dead.copy(), whole_worst.copy()
     if not full_turn and len(rest):

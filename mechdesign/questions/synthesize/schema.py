@@ -28,7 +28,10 @@ _KINDS = {
     "watt": "Watt's six-bar, P on the second coupler",
     "stephenson": "Stephenson's six-bar of type III, P on the second coupler",
 }
-_ZEROS = {"free": "angles count from any line of a link", "fixed": "angles are those of the links"}
+_ZEROS = {
+    "free": "angles count from any line of a link, places from any point of the slide",
+    "fixed": "angles are those of the links, or of their other ends, places count from the crank's pivot",
+}
 _DEFECTS = {"listed": "behind those without a defect", "dropped": "they are counted, and left out"}
 _RANKS = {
     "error": "the smallest error first", "yield": "the largest share of made linkages that keep the limit first",

@@ -128,7 +128,7 @@ class Conditions:
         Where none does it is the first of those that miss the fewest conditions, as the nearest.
         """
         judged = [*self._of_dimensions(kind, values)]
-        kept = self._counted(judged, len(values))
+        kept = self.counted(judged, len(values))
         if not kept.any():
             misses = np.sum([~good for _, good in judged], axis=0)
             return order[[int(misses[order].argmin())]]
@@ -139,7 +139,7 @@ class Conditions:
         kept = np.ones(len(pool.way), dtype=bool)
         for _, good in self._of_dimensions(pool.kind, pool.way.values):
             kept &= good
-        return kept & self._counted(self._of_way(pool.way), len(pool.way))
+        return kept & self.counted(self._of_way(pool.way), len(pool.way))
 
     def missed(self, pool: Pool) -> list[list[str]]:
         """The conditions that each linkage of a pool does not keep."""
@@ -157,9 +157,9 @@ class Conditions:
             self._of_pivots(dyads.pivot[:, None], few=len(frame.given) == 1),
             self._of_pins(dyads.pin[:, None], few=len(body.given) == 1),
         )
-        return dyads.take(self._counted(judged, len(dyads), "dyads"))
+        return dyads.take(self.counted(judged, len(dyads), "dyad"))
 
-    def _counted(self, judged: Iterable[tuple[str, Flags]], count: int, what: str = "linkages") -> Flags:
+    def counted(self, judged: Iterable[tuple[str, Flags]], count: int, what: str = "linkage") -> Flags:
         """Which linkages, or dyads, keep conditions; the others are counted by the first that they miss."""
         kept = np.ones(count, dtype=bool)
         for reason, good in judged:

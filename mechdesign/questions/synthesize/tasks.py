@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from mechdesign.ground.errors import StudyError
+from mechdesign.ground.errors import StudyError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
@@ -88,15 +88,18 @@ class BodyTask(_Task):
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
         section, sites = self.section, conditions.sites
+        conditions.told += filter(None, [self.positions.remark])
+        if self.positions.straight:
+            return
         found, words = body.choices(self.positions, *sites, random)
         placed = [conditions.placed(part) for part in found]
         most = section.evaluations or PAIRS
-        parts = [*body.pairs(self.positions, placed, sites, section, random, most)]
-        conditions.told.append(f"{words}, {sum(pairs for _, pairs in parts)} pairs")
+        parts = [*body.pairs(self.positions, placed, sites, section.lengths, section, random, most)]
+        conditions.told.append(f"{words}, {counted(sum(pairs for _, pairs in parts), 'pair')}")
         if not parts:
-            # None is in place: the nearest is one of the others.
-            free = (Site(site.centre, site.reach) for site in sites)
-            parts = [*body.pairs(self.positions, found, (next(free), next(free)), section, random, most)]
+            # The nearest is one of the others.
+            frame, pins = (Site(site.centre, site.reach) for site in sites)
+            parts = [*body.pairs(self.positions, found, (frame, pins), {}, section, random, most)]
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
@@ -152,9 +155,12 @@ class FunctionTask(_Task):
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
         reach = self.section.bounds.reach * self.size
-        free, axis = Site(0j, reach), Site(0j, reach, ends=((-np.inf, np.inf), (0.0, 0.0)))
-        fixed = self.section.zeros == "fixed"
-        found, words = body.choices(seen, axis if fixed else free, axis if fixed and not self.slides else free, random)
+        frame = output = Site(0j, reach)
+        if self.section.zeros == "fixed":
+            # Pins lie on the x axes of the links, that of a slider on its y axis.
+            frame = replace(frame, ends=((-np.inf, np.inf), (0.0, 0.0)))
+            output = replace(frame, axis=1j) if self.slides else frame
+        found, words = body.choices(seen, frame, output, random)
         conditions.told.append(words)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
@@ -305,9 +311,10 @@ def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, 
     rows = conditions.begun(part.kind, part.values, order, MOST)
     part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
     nearest = stack.min(axis=0)
+    whole = conditions.counted([("it cannot be assembled at a position", np.isfinite(nearest).all(axis=1))], len(rows))
     first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
     for number, modes in enumerate(part.kind.modes):
-        some = np.flatnonzero((first == number) & np.isfinite(nearest).all(axis=1))
+        some = np.flatnonzero((first == number) & whole)
         if len(some):
             other = stack[number, some] > nearest[some] + _OTHER * size
             way = passed(part.kind, modes, part.values[some], part.angles[some], other.any(axis=1),

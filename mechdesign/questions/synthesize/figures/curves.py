@@ -11,7 +11,6 @@ from mechdesign.drawing.pictures import View, picture
 from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.body import Positions
-from mechdesign.questions.synthesize.curves import poles
 
 # Poles that are shown lie within so many sizes of the task, and what is shown is larger than them by a factor.
 _NEAR, _AROUND = 3.0, 1.5
@@ -25,7 +24,7 @@ def centre_points_picture(view: View) -> Picture | None:
         return None
     drawn, best = DrawnSolutions.of(view.result), view.result.tables["solutions"]
     task, links = Positions(drawn.places, drawn.directions), np.asarray(best["kind"]) == "four_bar"
-    pole, panels = poles(task), []
+    pole, panels = task.poles, []
     body = (pole - task.places[np.triu_indices(4, 1)[0]]) / task.rotations[np.triu_indices(4, 1)[0]]
     for name, title, own, places, joints in (
         ("centre", "pivots in the frame", pole, task.places, ("ground.O", "ground.D")),
