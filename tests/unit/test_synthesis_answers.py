@@ -124,6 +124,14 @@ matrix: {{vary: {{synthesis.body.4.y: [-2, 0]}}, results: [synthesize.solutions.
     assert cases[0] - cases[1] > 0.5
 
 
+def test_words_and_table_have_the_same_error() -> None:
+    """Seven pairs of a function, which are met by least squares; its error is an angle."""
+    task = "{input: [10, 20, 30, 40, 50, 60, 70], output: [10, 22, 31, 45, 52, 61, 75]}"
+    text = f"synthesis: {{function: {task}, frame: 50, zeros: free, limits: {{ratio: 100}}}}"
+    answer = mechdesign.synthesize(mechdesign.load(text=text))
+    assert f"error {answer.main['error'][0]:.4g} deg" in answer.notes[0]
+
+
 def test_a_task_may_follow_parameters() -> None:
     text = "mechanism: {parameters: {h: 21}}" + FIVE.replace("y: 21", "y: h")
     study = mechdesign.load(text=text, overrides=["mechanism.parameters.h=20"])

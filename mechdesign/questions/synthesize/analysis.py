@@ -81,7 +81,8 @@ def _answer(
 ) -> Result:  # fmt: skip
     """The answer that some solutions are, best first; or the one that comes nearest, with what it has `missed`."""
     table = solutions_table(study, task, solutions, scores[: len(solutions)])
-    errors = np.array([rounded(solution.error, task.size) for solution in solutions]) / task.error_factor
+    unit = task.error_factor
+    errors = np.array([rounded(solution.error / unit, task.size / unit) for solution in solutions])
     words = [", ".join(linkage(table, row, float(error))) for row, error in enumerate(errors)]
     data, files = [], dict[str, str]()
     for number, solution in enumerate(solutions, 1):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from mechdesign.ground.errors import counted
 from mechdesign.ground.numerals import numeral, printed
@@ -54,9 +55,8 @@ def task(study: Study) -> Iterator[str]:
                 for name, unit in (("x", length), ("y", length), ("angle", angle))]  # fmt: skip
     elif section.function is not None:
         what = f"a function through {_exactly(len(section.function.input), 'pair')}"
-        ways = [extent("input", section.function.input, angle),
-                extent("output", section.function.output, angle if section.output_kind == FOUR_BAR else length),
-                f"zeros {section.zeros}"]  # fmt: skip
+        unit = angle if section.output_kind == FOUR_BAR else length
+        ways = [extent("input", section.function.input, angle), extent("output", section.function.output, unit)]
     else:
         assert section.path is not None
         points = section.path.points
@@ -67,9 +67,9 @@ def task(study: Study) -> Iterator[str]:
     yield f"task: {what}: {', '.join(ways)}"
     kinds = section.kinds or (BODIES if section.body is not None else (section.output_kind,))
     yield f"linkages: {section.of or ', '.join(map(in_words, kinds))}"
-    written = study.resolved["synthesis"]
-    default = {"limits": {"reach": plainly(REACH), "ratio": plainly(RATIO)}} if "limits" not in written else {}
-    for key, value in (default | written).items():
+    default: dict[str, Any] = {"limits": {"reach": plainly(REACH), "ratio": plainly(RATIO)}}
+    default |= {"zeros": section.zeros} if section.function is not None else {}
+    for key, value in (default | study.resolved["synthesis"]).items():
         if key not in ("body", "function", "path", "kinds", "kind", "of"):
             yield in_one_line(key, value)
 

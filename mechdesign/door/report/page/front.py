@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -70,7 +70,9 @@ def front(drawn: DesignSet, table: Table, name: str) -> MovingPicture | None:
     rows = np.array(sorted(fits, key=lambda row: (table[drawn.goals[0].name][row], row)))
     choices = [fits[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
     knee = next((k for k, choice in enumerate(choices) if choice["mark"] == "knee"), 0)
-    numbers, entries, fields = _numbers(drawn, table, rows, knee)
+    names = dict.fromkeys([*drawn.variables, *(goal.name for goal in drawn.goals)])
+    columns = [table.column(name) for name in names if table.column(name).numeric]
+    numbers, entries, fields = numbers_of(columns, rows, knee, drawn.study.size)
     figure = draw(front_picture(drawn, table))
     for line in figure.findobj(Line2D):
         assert isinstance(line, Line2D)
@@ -199,19 +201,14 @@ def chosen(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     sketcher.draw()
 
 
-def _numbers(
-    drawn: DesignSet, table: Table, rows: Ints, begin: int
+def numbers_of(
+    columns: Iterable[Column], rows: Ints, begin: int, size: tuple[float, str]
 ) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
-    """Variables and goals of the designs of a page: their numbers, a row each, and how the script names them."""
-    names = [*drawn.variables, *(goal.name for goal in drawn.goals if goal.name not in drawn.variables)]
-    columns = [table.column(name) for name in names if table.column(name).numeric]
-    columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in columns]
-    numbers = ShownNumbers(Table("front", tuple(columns)), rows, begin, drawn.study.size)
-    entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
-    fields = []
-    for column in columns:
-        which, _, power = numbers.scaled[column.name]
-        fields.append([column.name, numbers.units[column.name], which, power])
+    """Numbers of the designs of a page by some columns: their tracks, a row each, and how the script names them."""
+    whole = tuple(replace(column, values=np.asarray(column.values, dtype=float)) for column in columns)
+    numbers = ShownNumbers(Table("designs", whole), rows, begin, size)
+    entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in whole]
+    fields = [[name, numbers.units[name], which, power] for name, (which, _, power) in numbers.scaled.items()]
     return numbers, entries, fields
 
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from mechdesign.door.report.page.front import MOST_DESIGNS, Entry, chosen, fitting, moved, points
+from mechdesign.door.report.page.front import MOST_DESIGNS, chosen, fitting, moved, numbers_of, points
 from mechdesign.door.report.page.linkage import Canvas, Sketcher, add
-from mechdesign.door.report.page.tracks import MovingPicture, ShownNumbers, meanings
+from mechdesign.door.report.page.tracks import MovingPicture, meanings
 from mechdesign.door.report.page.vector import described, inline
 from mechdesign.drawing import style
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.pictures import View
 from mechdesign.ground.numerics.arrays import evenly
-from mechdesign.ground.results import Result, Table
+from mechdesign.ground.results import Result
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.figures.solutions import trade
@@ -54,7 +53,8 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
             "number": row + 1, "mark": kind, "words": [f"{row + 1}: {kind}", *words],
         })  # fmt: skip
     rows = np.array([row for row, _, _ in placed[: len(choices)]])
-    numbers, entries, fields = _numbers(table, rows, study.size)
+    columns = [column for column in table.columns if column.numeric and column.name not in ("solution", "full_turn")]
+    numbers, entries, fields = numbers_of(columns, rows, 0, study.size)
     figure = trade(View(study, result))
     data = {"poses": len(rows), "first": 0, "choices": choices, "given": fields, "keys": [fields],
             "numbers": numbers.tracks, "grid": True, "front": [],
@@ -79,13 +79,3 @@ def _mark(layer: Element, sheet: Canvas, drawn: DrawnSolutions) -> None:
             end = at + _AXIS * complex(drawn.directions[k]).conjugate()
             add(layer, "line", x1=at.real, y1=at.imag, x2=end.real, y2=end.imag, stroke=style.VERMILION, stroke_width=2)
         add(layer, "circle", cx=at.real, cy=at.imag, r=4, fill=style.VERMILION)
-
-
-def _numbers(table: Table, rows: Any, size: tuple[float, str]) -> tuple[ShownNumbers, list[Entry], list[list[Any]]]:
-    """The numbers of the linkages of a page: their tracks, a row each, and how the script names them."""
-    columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in table.columns
-               if column.numeric and column.name not in ("solution", "full_turn")]  # fmt: skip
-    numbers = ShownNumbers(Table(table.name, tuple(columns)), rows, 0, size)
-    entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
-    fields = [[name, numbers.units[name], which, power] for name, (which, _, power) in numbers.scaled.items()]
-    return numbers, entries, fields
