@@ -278,3 +278,10 @@ def test_steps_of_many_turns_are_told_instead_of_searched(sweep: str) -> None:
     told = warnings(ROCKER.replace("{from: 0, to: 360, step: 5}", sweep))
     assert time.process_time() - begun < 5
     assert "the steps of crank are too long for the motion between the poses" in " ".join(told)
+
+
+def test_beyond_the_end_of_its_motion_a_pose_is_nan_without_a_warning_of_numpy() -> None:
+    """The rod of length 1 reaches the guide from a crank of length 2 up to 30 deg, there as 2 cos(30 deg)."""
+    pose = study_of(SLIDER).mechanism.solve({"crank": [0, 30, 31, 90]})
+    assert pose.valid.tolist() == [True, True, False, False]
+    assert pose["B.x"] == pytest.approx([3, 3**0.5, np.nan, np.nan], abs=1e-7, nan_ok=True)
