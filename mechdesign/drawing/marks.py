@@ -42,6 +42,11 @@ class PanelMark:
         return False
 
     @property
+    def arrows(self) -> bool:
+        """Whether it has arrows about what a plane shows, for which there is room."""
+        return False
+
+    @property
     def height(self) -> float:
         """Inches that it needs; 0 where the panel has the height of its kind."""
         return 0.0

@@ -126,6 +126,16 @@ def test_the_table_of_what_is_under_way_has_room_for_it(screen):
     assert [word for word in words if word not in shown.getvalue()] == []
 
 
+def test_a_table_that_has_ended_may_begin_again(screen):
+    """As where the files of a long answer are written."""
+    screen()
+    live_table = LiveTable(quiet=False)
+    for _ in range(2):
+        with live_table:
+            live_table.start(["a"])
+            live_table.advance(0, ProgressNote("sweep", "cases", 1, 4))
+
+
 def test_the_table_fits_on_the_screen(screen):
     """Whatever has been answered, rows under way are seen, and failures as long as there is room."""
     shown = screen()

@@ -10,13 +10,12 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import mechdesign
-from mechdesign.commands import MERGE, QUESTIONS, SWEEP
+from mechdesign.commands import MERGE, SWEEP
 from mechdesign.door.cli import places, process, terminal
 from mechdesign.door.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.door.cli.live_table import Bar
@@ -24,7 +23,7 @@ from mechdesign.door.cli.options import PDF, Options
 from mechdesign.door.cli.outcome import Outcome
 from mechdesign.door.cli.places import RESUMED, extras, folder, place
 from mechdesign.door.report import manifest, requirements, writer
-from mechdesign.door.report.cases import best_of, telling
+from mechdesign.door.report.cases import arranged, best_of
 from mechdesign.door.report.closing import FAILURES, closing_words
 from mechdesign.door.report.manifest import Extras
 from mechdesign.door.report.page import pages
@@ -32,7 +31,6 @@ from mechdesign.door.report.requirements import Verdict, judged_again, judged_by
 from mechdesign.door.report.tables import from_csv
 from mechdesign.drawing.before import Before
 from mechdesign.ground.cautions import Caution
-from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.ground.files import owned, settle
 from mechdesign.ground.progress import Progress
@@ -364,13 +362,6 @@ def drawing_ahead(options: Options) -> AbstractContextManager[None]:
     return ahead.importing(PICTURES, worker_count(options.jobs))
 
 
-def _arranged(command: str, table: Table) -> list[Column]:
-    """The columns of an answer, those first that its question puts first; what says nothing in any row is last."""
-    first = getattr(import_module(QUESTIONS[command].columns), "FIRST", ())
-    order = sorted(table.columns, key=lambda column: (*first, column.name).index(column.name) if first else 0)
-    return sorted(order, key=lambda column: not column.numeric and not any(column.values.tolist()))
-
-
 def question(options: Options) -> int:
     """Answer one question of a study; returns the exit code."""
     return ask(options).exit_code
@@ -398,7 +389,7 @@ def ask(options: Options) -> Outcome:
     assert outcome.table is not None
     terminal.show(
         outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", size=study.size,
-        arranged=telling if command == SWEEP.name else partial(_arranged, command),
+        arranged=partial(arranged, command),
     )  # fmt: skip
     tell(outcome, study, options)
     best_seen = directory / pages.REPORT if options.report else outcome.picture

@@ -142,6 +142,8 @@ class LiveTable:
                 # What is shown last is the summary, and not these rows above it.
                 for row in self._rows.task_ids:
                     self._rows.remove_task(row)
+                # What follows, such as the writing of tables, has rows of its own.
+                self._under_way.clear()
                 self._rows.stop()
             finally:
                 self._rows.console.show_cursor()

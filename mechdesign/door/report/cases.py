@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.ground.columns import CHOSEN, VARIED, Column
 from mechdesign.ground.errors import OUTCOMES, counted
 from mechdesign.ground.numerals import numeral
@@ -88,6 +90,18 @@ def telling(table: Table) -> list[Column]:
     first += [column for column in table.columns if column.name in required]
     rest = [column for column in table.columns if column not in (*first, *varied) and column.name != "exit_code"]
     return [*first, *rest]
+
+
+def arranged(command: str, table: Table) -> list[Column]:
+    """The columns of an answer as people read them; of a sweep see `telling`.
+
+    Those that its question puts first are first, and what says nothing in any row is last.
+    """
+    if command == SWEEP.name:
+        return telling(table)
+    first = getattr(import_module(QUESTIONS[command].columns), "FIRST", ())
+    order = sorted(table.columns, key=lambda column: (*first, column.name).index(column.name) if first else 0)
+    return sorted(order, key=lambda column: not column.numeric and not any(column.values.tolist()))
 
 
 def best_of(table: Table) -> Best | None:

@@ -12,7 +12,7 @@ from mechdesign.ground.errors import StudyError, printable
 from mechdesign.questions.look import ask
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.own import OwnKind
-from mechdesign.questions.synthesize.solutions import Judged, Solution
+from mechdesign.questions.synthesize.solutions import Solution, Worth
 from mechdesign.questions.synthesize.tasks import Task
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
@@ -118,7 +118,7 @@ def _lines(data: Mapping[str, Any], indent: str = "") -> Iterator[str]:
             yield f"{line}]"
 
 
-def judged(study: Study, data: Mapping[str, Any]) -> Judged:
+def judged(study: Study, data: Mapping[str, Any]) -> Worth:
     """What a solution is worth: its yield with the ends of the interval, and the greatest effort of its drive.
 
     Raises
@@ -127,7 +127,7 @@ def judged(study: Study, data: Mapping[str, Any]) -> Judged:
         Where the task's `judge` names what the linkage does not have.
     """
     try:
-        made, answer = load_data(data, (), None, study.folder), Judged()
+        made, answer = load_data(data, (), None, study.folder), Worth()
     except StudyError as error:
         places = [("synthesis", "judge", *problem.key.split(".")[1:]) for problem in error.problems]
         raise StudyError([
@@ -136,7 +136,7 @@ def judged(study: Study, data: Mapping[str, Any]) -> Judged:
     if made.reliability is not None:
         table = ask(made, "reliability").tables["reliability"]
         rows = table.take(table["scope"] == "cycle")
-        answer = Judged(*(float(rows[name][0]) for name in ("reliability", "low", "high")))
+        answer = Worth(*(float(rows[name][0]) for name in ("reliability", "low", "high")))
     if made.dynamics is not None:
         table = ask(made, "dynamics").tables["extremes"]
         rows = table.take(table.where(output=f"{made.mechanism.drives[0]}_effort"))

@@ -55,7 +55,7 @@ class Pool:
         )  # fmt: skip
 
 
-class Judged(NamedTuple):
+class Worth(NamedTuple):
     """What a linkage is worth once it is made; nan where it is not asked."""
 
     share: float = np.nan  # of made linkages that keep the limit
@@ -64,7 +64,7 @@ class Judged(NamedTuple):
     effort: float = np.nan  # greatest effort of the drive, in the study's units
 
 
-_UNJUDGED = Judged()
+_UNJUDGED = Worth()
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Solution:
     defects: str
     transmission: float  # radians
     full_turn: bool
-    made: Judged = _UNJUDGED
+    made: Worth = _UNJUDGED
 
     @property
     def error(self) -> float:

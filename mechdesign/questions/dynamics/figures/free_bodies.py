@@ -188,6 +188,10 @@ class FreeBody(LateMark):
     acting: Sequence[Action]
     centers: Sequence[complex]
 
+    @property
+    def arrows(self) -> bool:
+        return True
+
     def draw(self, axes: Axes) -> None:
         """The link, its arrows, and their sizes beside them."""
         draw(axes, [*self.body, *shapes.center_shapes(self.centers)])
