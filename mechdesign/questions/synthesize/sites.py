@@ -10,8 +10,8 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize.schema import Region
 
-# Points are in place within this part of the reach.
-_SLACK = 1e-7
+# Points are in place within this part of the size of the task.
+_SLACK = 1e-6
 _EVERYWHERE = (-np.inf, np.inf)
 _NONE = np.empty(0, dtype=complex)
 
@@ -22,8 +22,8 @@ class Site:
 
     Parameters
     ----------
-    centre, reach : complex, float
-        A circle, from which samples are where the site has no end.
+    centre, size, reach : complex, float, float
+        Middle and size of the task, and how many sizes away samples are where the site has no end.
     given : ndarray of complex
         Given points; without them it is a box with sides along `axis` and across it.
     origin, axis : complex
@@ -33,6 +33,7 @@ class Site:
     """
 
     centre: complex
+    size: float
     reach: float
     given: Complexes = field(default_factory=lambda: _NONE)
     origin: complex = 0j
@@ -41,18 +42,20 @@ class Site:
 
     @classmethod
     def of(
-        cls, places: Sequence[tuple[float, float]] | Region | None, centre: complex, reach: float, factor: float
-    ) -> Site:
+        cls, places: Sequence[tuple[float, float]] | Region | None, centre: complex, size: float, reach: float,
+        factor: float,
+    ) -> Site:  # fmt: skip
         """What a study gives; `factor` is radians in its unit of angle."""
         if places is None:
-            return cls(centre, reach)
+            return cls(centre, size, reach)
         if not isinstance(places, Region):
-            return cls(centre, reach, np.array([complex(*place) for place in places]))
+            return cls(centre, size, reach, np.array([complex(*place) for place in places]))
         if places.through is not None:
-            return cls(centre, reach, _NONE, complex(*places.through), places.along(factor), (_EVERYWHERE, (0.0, 0.0)))
+            line = _EVERYWHERE, (0.0, 0.0)
+            return cls(centre, size, reach, _NONE, complex(*places.through), places.along(factor), line)
         x, y = (side if isinstance(side, tuple) else _EVERYWHERE if side is None else (side, side)
                 for side in (places.x, places.y))  # fmt: skip
-        return cls(centre, reach, ends=(x, y))
+        return cls(centre, size, reach, ends=(x, y))
 
     @property
     def fixed(self) -> tuple[bool, bool]:
@@ -63,18 +66,18 @@ class Site:
     @property
     def slack(self) -> float:
         """Within what points are in place."""
-        return _SLACK * self.reach
+        return _SLACK * self.size
 
     @property
     def around(self) -> list[Site]:
         """The sites of two points: beside a single given point the other has a choice."""
-        return [self, Site(self.centre, self.reach)] if len(self.given) == 1 else [self]
+        return [self, Site(self.centre, self.size, self.reach)] if len(self.given) == 1 else [self]
 
     def scaled(self, centre: complex, size: float) -> Site:
         """The site in lengths of a size from a centre."""
         x, y = ((low / size, high / size) for low, high in self.ends)
         return replace(
-            self, centre=(self.centre - centre) / size, reach=self.reach / size, given=(self.given - centre) / size,
+            self, centre=(self.centre - centre) / size, size=self.size / size, given=(self.given - centre) / size,
             origin=(self.origin - centre) / size, ends=(x, y),
         )  # fmt: skip
 
@@ -83,7 +86,7 @@ class Site:
         if len(self.given):
             return np.asarray(np.resize(self.given, count))
         circle = np.sqrt(random.uniform(size=count)) * np.exp(1j * random.uniform(-np.pi, np.pi, count))
-        own = (self.centre + self.reach * circle - self.origin) / self.axis
+        own = (self.centre + self.reach * self.size * circle - self.origin) / self.axis
         x, y = (side if np.isinf(ends[0]) else random.uniform(*ends, count)
                 for side, ends in zip((own.real, own.imag), self.ends, strict=True))  # fmt: skip
         return np.asarray(self.origin + self.axis * (x + 1j * y))

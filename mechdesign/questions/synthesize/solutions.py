@@ -116,9 +116,9 @@ class Conditions:
 
     def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
         self.section, self.centre, self.size, self.factor = section, centre, size, factor
-        reach = section.bounds.reach * size
+        far = size, section.bounds.reach, factor
         #: where the frame has room for pivots, and the body for pins
-        self.sites = Site.of(section.pivots, centre, reach, factor), Site.of(section.pins, 0j, reach, factor)
+        self.sites = Site.of(section.pivots, centre, *far), Site.of(section.pins, 0j, *far)
         self.dropped: Counter[tuple[str, str]] = Counter()  #: by what was dropped, and why
         self.told: list[str] = []  #: what is found, in words
 

@@ -98,7 +98,7 @@ class BodyTask(_Task):
         conditions.told.append(f"{words}, {counted(sum(pairs for _, pairs in parts), 'pair')}")
         if not parts:
             # The nearest is one of the others.
-            frame, pins = (Site(site.centre, site.reach) for site in sites)
+            frame, pins = (Site(site.centre, site.size, site.reach) for site in sites)
             parts = [*body.pairs(self.positions, found, (frame, pins), {}, section, random, most)]
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
@@ -154,8 +154,7 @@ class FunctionTask(_Task):
         back = np.exp(-1j * self.inputs)
         place = self.outputs if self.slides else np.full(len(back), self.size)
         seen = Positions(place * back, back if self.slides else back * np.exp(1j * self.outputs))
-        reach = self.section.bounds.reach * self.size
-        frame = output = Site(0j, reach)
+        frame = output = Site(0j, self.size, self.section.bounds.reach)
         if self.section.zeros == "fixed":
             # Pins lie on the x axes of the links, that of a slider on its y axis.
             frame = replace(frame, ends=((-np.inf, np.inf), (0.0, 0.0)))
