@@ -93,6 +93,15 @@ def test_timing_is_kept_where_it_is_given(tmp_path: Path) -> None:
     assert made["P_error"].max() < 1e-6
 
 
+def test_the_files_that_a_task_names_are_files_of_its_study(tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(FOUR_BAR)
+    (tmp_path / "points.csv").write_text("1,2\n3,4\n")
+    synthesis = {"path": {"points": "points.csv"}, "of": "own.yaml", "ranges": RANGES}
+    (tmp_path / "task.yaml").write_text(yaml.safe_dump({"synthesis": synthesis}))
+    study = mechdesign.load(tmp_path / "task.yaml")
+    assert [file.name for _, file, _ in study.inputs()] == ["points.csv", "own.yaml"]
+
+
 @pytest.mark.parametrize(
     ("text", "task", "words"),
     [

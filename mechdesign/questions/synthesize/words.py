@@ -67,7 +67,7 @@ def task(study: Study) -> Iterator[str]:
     yield f"task: {what}: {', '.join(ways)}"
     kinds = section.kinds or (BODIES if section.body is not None else (section.output_kind,))
     yield f"linkages: {section.of or ', '.join(map(in_words, kinds))}"
-    default: dict[str, Any] = {"limits": {"reach": plainly(REACH), "ratio": plainly(RATIO)}}
+    default: dict[str, Any] = {} if section.of else {"limits": {"reach": plainly(REACH), "ratio": plainly(RATIO)}}
     default |= {"zeros": section.zeros} if section.function is not None else {}
     for key, value in (default | study.resolved["synthesis"]).items():
         if key not in ("body", "function", "path", "kinds", "kind", "of"):

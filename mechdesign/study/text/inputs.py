@@ -101,5 +101,10 @@ def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[Ke
     for name, raw in ((data.get("reliability") or {}).get("dimensions") or {}).items():
         if isinstance(raw, Mapping) and isinstance(raw.get("measured"), str):
             yield ("reliability", "dimensions", name, "measured"), raw["measured"]
+    synthesis = data.get("synthesis") or {}
+    if isinstance(points := (synthesis.get("path") or {}).get("points"), str):
+        yield ("synthesis", "path", "points"), points
+    if isinstance(synthesis.get("of"), str):
+        yield ("synthesis", "of"), synthesis["of"]
     if isinstance(cases := (data.get("matrix") or {}).get("cases"), str):
         yield ("matrix", "cases"), cases
