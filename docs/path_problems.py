@@ -31,42 +31,6 @@ POSES, ZOOMS = 3600, 9  # crank angles of a curve, and how often the nearest is 
 EXACT = 1e-9  # errors below this part of the task are none
 # Of the path that a given linkage draws.
 DRAWN = 36
-OPENING = """# Ten path problems
-
-```{index} ! path generation, ! coupler curve, ! benchmark
-```
-
-Ten tasks of path generation from the literature, on which searches for four-bars are compared: their points, the
-linkage that the source prints, and those that `mechdesign synthesize` finds. One command repeats all of it, and
-prints this table:
-
-```sh
-python docs/path_problems.py
-```
-
-TABLE
-
-Each cell has the error, and in brackets the smallest transmission angle over a turn of the crank.
-
-**The measure.** The error of a linkage is the root mean square, over the points, of their distance from the nearest
-place of the curve that its coupler point draws in one assembly. It is in the unit of the points. Which crank angle
-belongs to a point is free. It is measured by `docs/path_problems.py` with a closed form of its own, for printed and
-for found linkages alike.
-
-**The searches.** Four-bars whose crank turns fully where the path is closed, that pass the points in their order
-without a defect, in one run with seed 1. *Usual limits* are those that hold where a study says nothing: pivots within
-three times the task's size from its middle, the longest link at most six times the shortest. *Wide limits* are a
-hundred times and a thousand times: they give the best fits, with links that are long and transmission angles that are
-small. What that does to a linkage once it is made, [a curve whose best fit loses](../gallery/robust_curve.md) shows.
-
-**The sources.** Points and printed linkages were read in the test files of
-[Four-bar](https://github.com/KmolYuan/four-bar-rs) (Y. Chang), which name the papers, not in the papers themselves: a
-printed linkage is measured as it stands there, to its printed digits. Of three problems none was at hand.
-
-In the tables below *left* and *right* say on which side of the line from the crank's pin to the second pivot the pin
-of coupler and rocker lies, and P is the coupler point along the coupler from the crank's pin, and across it to the
-left.
-"""
 
 
 @dataclass(frozen=True)
@@ -273,21 +237,20 @@ def section(problem: Problem, bars: Mapping[str, FourBar]) -> str:
     return "\n\n".join(parts)
 
 
-def page() -> str:
-    """The text of the page."""
+def sections() -> str:
+    """The text of all problems."""
     solved = found()
-    parts = [section(problem, linkages(problem, solved[problem.name])) for problem in problems()]
-    return "\n\n".join([OPENING.rstrip().replace("TABLE", overview()), *parts]) + "\n"
+    return "\n\n".join(section(problem, linkages(problem, solved[problem.name])) for problem in problems()) + "\n"
 
 
 def pages() -> dict[str, str]:
-    """The text of the page and its pictures, by their paths in the folder of the site."""
+    """What the page of the ten problems includes, and its pictures, by their paths in the folder of the site."""
     solved = found()
     drawings = {
         f"theory/path_problems_{problem.name}.svg": drawing(problem, linkages(problem, solved[problem.name]))
         for problem in problems()
     }
-    return {"theory/path_problems.md": page()} | drawings
+    return {"theory/_path_problems_table.md": overview() + "\n", "theory/_path_problems.md": sections()} | drawings
 
 
 def main() -> None:

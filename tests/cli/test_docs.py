@@ -35,7 +35,8 @@ def test_a_word_is_told(word, told, invoke):
     ("counterweight", "docs/howto/moving_torque.md (page)"), ("balancing", "a counterweight balances"),
     ("planetary", "configs/gallery/planetary.yaml (shipped study)"), ("gears", "docs/howto/gears_and_cams.md (page)"),
     ("transmission angle", "docs/theory/kinematics.md (page)"),
-    ("synthesis", "configs/gallery/path_synthesis.yaml (shipped study)"),
+    ("synthesis", "docs/theory/synthesis.md (page)"), ("body guidance", "docs/howto/body_positions.md (page)"),
+    ("path problems", "docs/theory/path_problems.md (page)"),
 ])  # fmt: skip
 def test_a_word_of_a_page_leads_to_the_page_with_a_sentence_of_it(word, told, invoke):
     done = invoke("docs", word)

@@ -11,7 +11,10 @@ from helpers.gallery import study_named
 import mechdesign
 from mechdesign.questions.synthesize import dyads
 
-CASES = yaml.safe_load((Path(__file__).parents[1] / "data" / "synthesis_paths.yaml").read_text(encoding="utf-8"))
+CASES = yaml.safe_load((Path(__file__).parents[2] / "docs" / "path_problems.yaml").read_text(encoding="utf-8"))
+# Sums of the squared distances that a search should reach: near the best that were known, by another one.
+BEST = {"eighteen": 0.00310352, "twelve": 7.7611e-05, "thirty_five": 7.5, "twenty": 0.871345, "triangle": 0.951546,
+        "line": 1e-5}  # fmt: skip
 WIDE = {"reach": 100, "ratio": 1000}
 # Own: a bar pinned to a crank of 1 runs through a swivel at (3, 0). Place and angle of the bar, five times.
 BAR = [
@@ -112,27 +115,27 @@ def test_both_linkages_between_given_pivots_pass_five_points_in_one_assembly() -
 
 def path_task(name: str) -> dict:
     case = CASES[name]
-    return {"path": {"points": case["points"], "closed": case["closed"]}, "limits": WIDE}
+    return {"path": {"points": case["points"], "closed": case.get("closed", True)}, "limits": WIDE}
 
 
 @pytest.mark.parametrize(
     ("name", "seed"),
     [
-        pytest.param(name, seed, marks=pytest.mark.slow if (name, seed) == ("P3_mkh2", 0) else pytest.mark.nightly)
-        for name in CASES
+        pytest.param(name, seed, marks=pytest.mark.slow if (name, seed) == ("twelve", 0) else pytest.mark.nightly)
+        for name in BEST
         for seed in range(10)
     ],
 )
 def test_a_path_is_met_as_well_as_by_the_best_known_linkage(name: str, seed: int) -> None:
     table = solved(path_task(name), seed).tables["solutions"]
-    assert table["error"].min() ** 2 * len(CASES[name]["points"]) <= CASES[name]["pass_if_at_most"]
+    assert table["error"].min() ** 2 * len(CASES[name]["points"]) <= BEST[name]
 
 
 @pytest.mark.nightly
 def test_a_fit_that_stops_to_turn_once_it_is_made_ranks_below_a_robust_one() -> None:
-    # Own, with the points of P1: the best fit has a transmission angle of 1.2 deg, and 40 % of those made cannot turn.
+    # Own, with eighteen points: the best fit has a transmission angle of 1.2 deg, and 40 % of those made cannot turn.
     judge = {"tolerance": 0.006, "within": 0.03}
-    table = solved({**path_task("P1_mkh1"), "judge": judge, "rank": "yield"}).tables["solutions"]
+    table = solved({**path_task("eighteen"), "judge": judge, "rank": "yield"}).tables["solutions"]
     best = int(table["error"].argmin())
     assert table["transmission_angle"][best] < 3
     assert table["yield"][best] < 0.8
@@ -141,7 +144,7 @@ def test_a_fit_that_stops_to_turn_once_it_is_made_ranks_below_a_robust_one() -> 
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", ["P9_triangle", "P11_line6"])
+@pytest.mark.parametrize("name", ["triangle", "line"])
 def test_a_solution_passes_its_points_as_a_study_of_its_own(name: str) -> None:
     result = solved({**path_task(name), "solutions": 3})
     table = result.tables["solutions"]
