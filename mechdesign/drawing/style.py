@@ -69,8 +69,8 @@ COLORMAP = "cividis"
 _DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers of ten alone have ticks
 
 
-# A name, an equals sign, a number and its unit.
-_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?|\[[^] ]+ [^]]+\]")
+# What stands in one line: a name, an equals sign, a number and its unit; a unit in brackets; a number and its unit.
+_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?|\[[^] ]+ [^]]+\]|(?<!\S)-?\d[\d.]* [^\W\d]\S*")
 # What a long word may be broken into: never the value of a name, which would read as two numbers.
 _PARTS = re.compile(r"\xa0?=\xa0.+|[^._\xa0]+[._]*|[._]+|\xa0(?!=)")
 _NAME = re.compile(r"[\w.]+")
@@ -177,8 +177,8 @@ def line(size: float) -> float:
 def folded(words: str, size: float, room: float) -> str:
     """Text of a size (points) in lines of at most `room` inches.
 
-    ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a unit in brackets stays whole, too. A
-    word that fits no line is broken after its dots and underscores. Long names are shortened.
+    ``x = 2 mm`` is broken only where it does not fit, before the equals sign; a number keeps its unit, a unit in
+    brackets its factors. A word that fits no line is broken after its dots and underscores. Long names are shortened.
     """
     fitting = int(72 * room / (_LETTER * size))
     words, lines = shortened(words, _MOST_LETTERS, max(_FEWEST_LETTERS, min(_MOST_LETTERS, fitting))), list[str]()

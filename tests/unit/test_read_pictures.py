@@ -110,3 +110,9 @@ workspace: {point: T, scan: {about: [46, 46], rays: 31}, characteristic_length: 
     with style.context():
         legend = figure_of(study, mechdesign.workspace(study), "drives").legends[0]
     assert {"q [deg]", "s [mm]"} <= {text.get_text() for text in legend.get_texts()}
+
+
+def test_a_number_and_its_unit_stay_in_one_line() -> None:
+    lines = style.folded("1: four-bar, error 0.25 mm\ntransmission 62.5 deg", 9.5, 1.35).split("\n")
+    assert len(lines) > 2
+    assert {"0.25 mm", "62.5 deg"} <= {number for line in lines for number in ("0.25 mm", "62.5 deg") if number in line}
