@@ -39,13 +39,14 @@ from mechdesign.drawing.panels import abscissa, round_down
 from mechdesign.drawing.scene import Scene, Still
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.columns import Column
-from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.errors import AssemblyError, MechdesignError
 from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Reason
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_rows
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.kinematics.columns import MOTION
@@ -89,14 +90,16 @@ _RATES = ("velocity", "acceleration")
 
 
 def moving(
-    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False
+    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False,
+    sheet: Canvas | None = None,
 ) -> MovingPicture | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design, of a sweep that of the best case. Beside a motion, and in its
     curves, stands that of the study before.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
-    linkage with its paths, without names, ruler and curves.
+    linkage with its paths, without names, ruler and curves. A motion is drawn on a `sheet` where one is given, else on
+    one that shows all of it.
     """
     command = result.command
     if isinstance(result.drawn, DrawnDesigns):
@@ -112,7 +115,7 @@ def moving(
         title, study, result = case
     with style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
-            part = _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
+            part = _motion(study, result, result.drawn, f"{command}-curves", before, marked, sheet, plain=plain)
             return part and part.titled(title)
         return roaming(study, result, command) if "local" in result.tables else None
 
@@ -140,6 +143,7 @@ def _motion(
     name: str,
     before: Before | None,
     marked: Sequence[float],
+    sheet: Canvas | None,
     *,
     plain: bool,
 ) -> MovingPicture | None:
@@ -151,21 +155,21 @@ def _motion(
     begin = int(sweep.valid[0])
     few = sweep.valid[evenly(len(sweep.valid), _FEW_POSES)]
     scenes = Scene(sweep.mechanism, sweep.configuration, whole.scene.travel).some(few.tolist())
-    # Guides reach farther than points.
-    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
     earlier = None if before is None else _earlier(DrawnMotion.of(before.result), sweep)
-    sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
+    if sheet is None:
+        # Guides reach farther than points.
+        ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
+        sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
     numbers = ShownNumbers(table, sweep.rows, begin, study.size)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
-    data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
+    data |= _tracks(sheet, sweep, earlier)
     section = motion.question.section
-    data |= {"gaps": gaps(sweep), **_time(study, section, sweep, table, whole.returns)}
+    data |= _time(study, section, sweep, table, whole.returns)
     data |= {"arrows": _arrows(drawn, motion, sweep, sheet), "rows": deltas(sweep.poses.numbers[sweep.rows], ROWS)}
     data["course"] = _course(whole.poses)
     if before is not None and earlier is not None:
-        data["before"] = {"title": f"Before: {before.names[1]}"}
-        data["before"] |= places(sheet, earlier.configuration, earlier.mechanism.description.links)
+        data["before"]["title"] = f"Before: {before.names[1]}"
     data["given"] = []
     for column in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(column).unit
@@ -191,6 +195,41 @@ def _motion(
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), earlier, plain=plain)
     replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
     return MovingPicture(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
+
+
+def posed(study: Study, rows: Floats, sheet: Canvas, earlier: Study) -> tuple[str, dict[str, Any]]:
+    """The mechanism of a study at places of its motion, in rows, over that of an earlier one: drawing and tracks alone.
+
+    This is what changes while a hand changes a dimension; numbers, names and arrows need the whole answer.
+
+    Raises
+    ------
+    AssemblyError
+        If it cannot be assembled at any of the places.
+    """
+    sweep, before = (_at_rows(one, rows) for one in (study, earlier))
+    if not len(sweep.valid):
+        raise AssemblyError(study.motion(sweep.poses).invalid_in_words(sweep.configuration.reason))
+    begin = int(sweep.valid[0])
+    under = before if study is not earlier and len(before.valid) else None
+    scenes = Scene(sweep.mechanism, sweep.configuration, sweep.scene.travel).some([begin])
+    drawing = _drawing(study, sweep, sheet, scenes, sweep.words(begin), under, plain=True)
+    return drawing, _tracks(sheet, sweep, under)
+
+
+def _at_rows(study: Study, rows: Floats) -> Sweep:
+    """The poses of a study's motion at places between its rows."""
+    poses = replace(study.motions["kinematics"], picked=(np.zeros(len(rows), dtype=np.intp), rows))
+    every = np.arange(len(rows))
+    return Sweep(study, poses, every, solve_rows(study.motion(poses), every))
+
+
+def _tracks(sheet: Canvas, sweep: Sweep, earlier: Sweep | None) -> dict[str, Any]:
+    """Where points and links of a motion are, and of that before, and where there are none."""
+    tracks = {**places(sheet, sweep.configuration, sweep.mechanism.description.links), "gaps": gaps(sweep)}
+    if earlier is not None:
+        tracks["before"] = places(sheet, earlier.configuration, earlier.mechanism.description.links)
+    return tracks
 
 
 def _earlier(drawn: DrawnMotion, sweep: Sweep) -> Sweep | None:
