@@ -33,6 +33,7 @@ from mechdesign.door.report.page.vector import described, inline
 from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
+from mechdesign.drawing.framing import extent
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.overlay import COLOR, DASHES
 from mechdesign.drawing.panels import abscissa, round_down
@@ -63,6 +64,7 @@ _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid th
 # Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
+_HAND_ROOM = 1.3  # size of a drawing that a hand changes, as a multiple of what it shows
 _DASHED = 1.8  # width of a line whose dashes the mechanism before has
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
 _ARROW, _SHARE = 90.0, 0.3  # length of the longest arrow, and the part of a low drawing's height that it has at most
@@ -91,14 +93,14 @@ _RATES = ("velocity", "acceleration")
 
 def moving(
     study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False,
-    sheet: Canvas | None = None,
+    sheet: Canvas | None = None, handled: bool = False,
 ) -> MovingPicture | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design, of a sweep that of the best case. Beside a motion, and in its
     curves, stands that of the study before.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
-    linkage with its paths, without names, ruler and curves. A motion is drawn on a `sheet` where one is given, else on
+    linkage with its paths, without names, ruler and curves; one that is `handled` has room for a hand around it, and no curves. A motion is drawn on a `sheet` where one is given, else on
     one that shows all of it.
     """
     command = result.command
@@ -115,7 +117,9 @@ def moving(
         title, study, result = case
     with style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
-            part = _motion(study, result, result.drawn, f"{command}-curves", before, marked, sheet, plain=plain)
+            part = _motion(
+                study, result, result.drawn, f"{command}-curves", before, marked, sheet, plain=plain, handled=handled
+            )
             return part and part.titled(title)
         return roaming(study, result, command) if "local" in result.tables else None
 
@@ -146,6 +150,7 @@ def _motion(
     sheet: Canvas | None,
     *,
     plain: bool,
+    handled: bool,
 ) -> MovingPicture | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(drawn.shown)
@@ -159,7 +164,11 @@ def _motion(
     if sheet is None:
         # Guides reach farther than points.
         ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
-        sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
+        reached = np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])])
+        if handled:
+            middle, wide, tall = extent(reached)
+            reached = middle + _HAND_ROOM * complex(wide, tall) * np.array([-0.5, 0.5])
+        sheet = Canvas.around(reached)
     numbers = ShownNumbers(table, sweep.rows, begin, study.size)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
@@ -185,7 +194,7 @@ def _motion(
     data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
     data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
     curves, beside, data["dots"] = None, "", []
-    if isinstance(drawn, DrawnMotion) and not plain:
+    if isinstance(drawn, DrawnMotion) and not (handled or plain):
         curves = motion_curves(study, {**result.tables, "motion": table}, sweep.poses, before)
     if curves is not None:
         figure = draw(curves)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -27,8 +26,7 @@ from mechdesign.drawing.framing import fit
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.mechanism import sketch_picture
 from mechdesign.drawing.scene import sketched
-from mechdesign.ground.errors import counted, explain
-from mechdesign.ground.numerals import printed
+from mechdesign.ground.errors import explain
 from mechdesign.ground.terms import path_of
 from mechdesign.ground.versions import installed
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words

@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const PLACES = 20, TURNS = 100, TIMES = 10000; // integers in a unit, as the page writes them
+  const PLACES = 20, TURNS = 100, TIMES = 10000, ROWS = 1000000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
   const ROW_POSES = 60; // of a workspace, through which it goes in that time
@@ -511,6 +511,7 @@
     // stays what is marked to stay, unless `whole` is asked.
     figure.moving = {
       drawing, leading, stop: player.stop, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
+      rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
       take(next, markup, entire) {
         const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
         const stays = part => part.classList.contains("moving-stays") || (!entire && part.classList.contains("moving-kept"));
