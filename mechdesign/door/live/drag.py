@@ -41,7 +41,7 @@ class Drag:
 
 @dataclass(frozen=True)
 class Dragged:
-    """Numbers of a study after a drag, those that the hand changes, and why the point does not follow it; or nothing."""
+    """Numbers of a study after a drag, those that the hand changes, and why the point does not follow it, if so."""
 
     changes: Mapping[str, float]
     names: tuple[str, ...] = ()
@@ -200,7 +200,8 @@ def _ways(
 
 def _fewest(ways: Mapping[str, Complexes], missing: complex) -> tuple[str, ...]:
     """The first number, else the first pair, that brings a point all the way; else what brings it nearest."""
-    want, best, least = _parts(np.array([missing])), (), math.inf
+    best: tuple[str, ...] = ()
+    want, least = _parts(np.array([missing])), math.inf
     for count in (1, 2):
         for names in combinations(ways, count):
             matrix = np.column_stack([_parts(ways[name]) for name in names])

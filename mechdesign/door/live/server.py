@@ -157,11 +157,10 @@ class _Handler(BaseHTTPRequestHandler):
         """The address behind the token, in words; None of a request that was refused."""
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
+        foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
         if self.headers.get_all("Host", []) not in ([hosts[0]], [hosts[1]]):
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
-        elif (origin is not None and origin not in [f"http://{host}" for host in hosts]) or not compare_digest(
-            token.encode(errors="replace"), self.server.token.encode()
-        ):
+        elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
             self._refuse(HTTPStatus.FORBIDDEN)
         else:
             return rest.split("/")

@@ -100,8 +100,8 @@ def moving(
     Of an optimisation it is that of the best design, of a sweep that of the best case. Beside a motion, and in its
     curves, stands that of the study before.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
-    linkage with its paths, without names, ruler and curves; one that is `handled` has room for a hand around it, and no curves. A motion is drawn on a `sheet` where one is given, else on
-    one that shows all of it.
+    linkage with its paths, without names, ruler and curves; one that is `handled` has room for a hand around it, and no
+    curves. A motion is drawn on a `sheet` where one is given, else on one that shows all of it.
     """
     command = result.command
     if isinstance(result.drawn, DrawnDesigns):
