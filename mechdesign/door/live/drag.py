@@ -102,6 +102,7 @@ def value_of(study: Study, name: str) -> float:
     return study.sizes[name] / study.parameters.factors.get(name, 1.0)
 
 
+@np.errstate(all="ignore")
 def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragged:
     """Change as few free numbers as bring a point to the hand, or as near as they can.
 

@@ -10,6 +10,8 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from mechdesign.commands import COMMANDS
 from mechdesign.door.live.drag import Drag, dragged, free_numbers, value_of
 from mechdesign.door.report.page.dark import dark
@@ -107,6 +109,7 @@ class Session:
             self.version += 1
             self.changed.notify_all()
 
+    @np.errstate(all="ignore")
     def page(self) -> bytes:
         """The page of the study as it is in the file."""
         study = self.study
@@ -114,15 +117,16 @@ class Session:
         if part is None:
             raise StudyError("the study has no motion that can be shown: give its kinematics a sweep or a path")
         data = dict(part.data)
+        questions = self._questions()
         about = {
-            "version": self.version, "questions": self._questions(), "length": study.units.label("length"),
+            "version": self.version, "questions": questions, "length": study.units.label("length"),
             "file": study.path.name if study.path is not None else "", "points": self._handles(),
             "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake,
         }  # fmt: skip
         return rendered(
             "live.html.j2", package=PACKAGE, parts=("moving", "live"), connect="'self'", drawings=[part.drawing],
             study=study, part=dataclasses.replace(part, data=data), about=about, groups=self._groups(),
-            questions={name: COMMANDS[name].question for name in about["questions"]}, mistake=self.mistake,
+            questions={name: COMMANDS[name].question for name in questions}, mistake=self.mistake,
         )  # fmt: skip
 
     def _questions(self) -> list[str]:
@@ -161,11 +165,13 @@ class Session:
                 self._first = self.version, import_module(COMMANDS["kinematics"].module).kinematics(self.study)
         return self._first[1]
 
+    @np.errstate(all="ignore")
     def move(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Positions with changed numbers, or with those that a drag changes; with ``wrong`` where there are none."""
-        study, changes = self.study, _changes(asked)
+        study, changes, sheet = self.study, _changes(asked), _sheet(asked)
         self._turn(asked)
-        sheet, names, why = _sheet(asked), (), ""
+        names: tuple[str, ...] = ()
+        why = ""
         if (drag := asked.get("drag")) is not None:
             if not isinstance(drag, Mapping):
                 raise AskedError
@@ -190,6 +196,7 @@ class Session:
     def _in_words(self, study: Study, name: str) -> str:
         return f"{name} = {shown(value_of(study, name))} {self.study.unit_of(name) or ''}".rstrip()
 
+    @np.errstate(all="ignore")
     def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to a question with changed numbers.
 
@@ -202,7 +209,10 @@ class Session:
         if question not in self._questions():
             raise AskedError
         page, turn = self._turn(asked)
-        overtaken = lambda: self._turns.get(page) != turn  # noqa: E731
+
+        def overtaken() -> bool:
+            return self._turns.get(page) != turn
+
         with self._computing:
             if overtaken():
                 raise OvertakenError
@@ -258,6 +268,7 @@ class Session:
         changed = leaves(changed_data(self.study, changes))
         return [f"{dotted(keys)}={in_yaml(value)}" for keys, value in changed if keys not in now or now[keys] != value]
 
+    @np.errstate(all="ignore")
     def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Write the study with changed numbers into its file, or into another in its folder.
 
