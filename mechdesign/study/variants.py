@@ -217,13 +217,18 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
         for key in keys[:-1]:
             holder = holder[key]
         holder[keys[-1]] = beside
-    text = _edited(study, data)
+    return f"# {printable(heading)}\n{in_text(study, data)}", files
+
+
+def in_text(study: Study, data: Mapping[str, Any]) -> str:
+    """The text of a study with the values of `data`; comments are kept where no more than single values change."""
+    text = edited(study, data)
     if text is None:
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
-    return f"# {printable(heading)}\n{text}", files
+    return text
 
 
-def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
+def edited(study: Study, data: Mapping[str, Any]) -> str | None:
     """The study's own text with single values changed or left out; None where it would not say the same as `data`."""
     if not study.text or len(study.text) > _MOST_BYTES:
         return None

@@ -24,7 +24,7 @@ def test_every_command_and_parameter_has_help(name, invoke):
 
 
 def test_the_commands_are_those_of_the_study_format():
-    others = {"run", "merge", "check", "watch", "compare", "export", "new", "import", "docs", "schema"}
+    others = {"run", "merge", "check", "watch", "live", "compare", "export", "new", "import", "docs", "schema"}
     assert set(GROUP.commands) == {*QUESTIONS, *others}
 
 

@@ -191,6 +191,12 @@ _add(
     "told, and it goes on until Ctrl-C.",
 )  # fmt: skip
 _add(
+    "live", "live.live", "path! port no_browser overrides seed quiet allow_files",
+    "Change a study by hand: a page in which dimensions are dragged.",
+    "Open a page on this machine in which the mechanism moves, its pivots and dimensions are dragged, and every answer "
+    "follows; what the hand changes can be saved into the study. It goes on until Ctrl-C.",
+)  # fmt: skip
+_add(
     "compare", "compare.compare", "old! new! rtol atol junit json quiet",
     "Say what moved between two folders of results.",
     "Say what moved between two folders of results, of one command, a study or many: rows are matched by their poses "

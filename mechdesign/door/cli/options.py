@@ -174,6 +174,10 @@ class Options:
     """Instead of studies: repeat what a manifest.json, or those in a folder, say was computed, and compare the bytes of
     the tables; 1 where they are others. Files that a study names are looked for beside it, else beside the manifest.
     """
+    port: Annotated[int | None, _option("N", min=1, max=65535)] = None
+    """Port of this machine at which the page is. Default: a free one."""
+    no_browser: bool = False
+    """Open no browser; the address is told."""
     executor: Annotated[str | None, _option("NAME")] = None
     """Where long computations run: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a
     concurrent.futures.Executor. The results do not depend on it. Default: here.
@@ -230,6 +234,7 @@ _MEANINGS: Mapping[str, Mapping[str, str]] = {
     "run": _OF_MANY,
     MERGE: _OF_MANY,
     "watch": {"path": "The study file.", "out": _OF_ALL},
+    "live": {"path": "The study file."},
     "check": {"out": "Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check."},
     "export": {"out": "The file, or a folder for it. Default: results/<study>/export."},
     "import": {"out": "Where to write the study. Left out: stdout."},

@@ -46,31 +46,32 @@ def watch(options: Options) -> int:
     files = {path}
     with suppress(KeyboardInterrupt):
         while True:
-            contents = _contents(files)
+            contents = contents_of(files)
             if batch.answer_all([path], options, commands) == Interrupted.exit_code:
                 return Interrupted.exit_code
-            files = {path, *_named(path, options)}
-            contents = _contents(files - contents.keys()) | {file: contents[file] for file in files & contents.keys()}
+            files = {path, *files_named(path, options)}
+            contents = contents_of(files - contents.keys()) | {file: contents[file] for file in files & contents.keys()}
             names = ", ".join(sorted(map(str, files)))
             terminal.say(
                 f"{path}: answered again when one of these is saved, until Ctrl-C: {names}", quiet=options.quiet
             )
-            _await_change(contents)
+            await_change(contents)
     return 0
 
 
-def _await_change(contents: dict[Path, bytes | None]) -> None:
+def await_change(contents: dict[Path, bytes | None]) -> None:
     """Return when a file has changed and is the same at the next look: an editor may still be writing."""
     now = contents
     while True:
         time.sleep(_LOOK)
         interrupts.check()
-        before, now = now, _contents(contents)
+        before, now = now, contents_of(contents)
         if now == before != contents:
             return
 
 
-def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
+def contents_of(files: Iterable[Path]) -> dict[Path, bytes | None]:
+    """Bytes of files; None of one that is not there."""
     contents: dict[Path, bytes | None] = {}
     for file in files:
         contents[file] = None
@@ -82,7 +83,7 @@ def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
     return contents
 
 
-def _named(path: Path, options: Options) -> set[Path]:
+def files_named(path: Path, options: Options) -> set[Path]:
     """Files that a study names; if the study has mistakes, file names found in its text."""
     try:
         return {file for _, file, _ in load_study(path, options).inputs()}

@@ -35,6 +35,7 @@ _POINTS = 72.0
 _STEEL = "#777777"
 _NAME = 12.0  # size of the letters of points
 _RULER = 0.3  # part of the width that the bar of the scale is long at most
+KEPT = "moving-kept"  # class of what stays where the mechanism below is drawn anew: names and the ruler
 _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
 
@@ -181,10 +182,12 @@ class Sketcher:
         chosen = positions(labels, places, nets, window)
         for label, (point, link), position in zip(labels, owners, chosen, strict=True):
             if position and link == GROUND:
-                self._name(self._group(point), label, position)
+                group = self._group(point)
+                group.set("class", KEPT)
+                self._name(group, label, position)
             elif position:
                 anchor = label.anchors[position.anchor]
-                looks = {"data-offset": _pair(self._local(link, anchor)), "class": "moving-name moving-off"}
+                looks = {"data-offset": _pair(self._local(link, anchor)), "class": f"moving-name moving-off {KEPT}"}
                 group = add(self.root, "g", data_at=point, data_turn=link, transform=_shift(self.sheet.at(anchor)),
                             **looks)  # fmt: skip
                 self._name(group, label, position, font_style="italic")
@@ -210,8 +213,9 @@ class Sketcher:
         """A bar of the drawing's scale at its lower left corner."""
         length = round_down(_RULER * self.sheet.width / self.sheet.scale)
         begin, wide = complex(12, self.sheet.height - 6), length * self.sheet.scale
-        add(self.root, "path", d=f"M{_pair(begin - 4j)}v4h{_number(wide)}v-4", stroke=_STEEL)
-        add(self.root, "text", f"{length:g} {unit}".rstrip(), x=begin.real + wide / 2, y=begin.imag - 4,
+        group = add(self.root, "g", **{"class": KEPT})
+        add(group, "path", d=f"M{_pair(begin - 4j)}v4h{_number(wide)}v-4", stroke=_STEEL)
+        add(group, "text", f"{length:g} {unit}".rstrip(), x=begin.real + wide / 2, y=begin.imag - 4,
             text_anchor="middle", font_size=10, fill="#555555")  # fmt: skip
 
 

@@ -33,19 +33,21 @@ from mechdesign.door.report.page.vector import described, inline
 from mechdesign.door.report.requirements import DrawnCases
 from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
+from mechdesign.drawing.framing import extent
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.overlay import COLOR, DASHES
 from mechdesign.drawing.panels import abscissa, round_down
 from mechdesign.drawing.scene import Scene, Still
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.columns import Column
-from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.errors import AssemblyError, MechdesignError
 from mechdesign.ground.numerals import printed
 from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.ground.results import Result, Table
 from mechdesign.mechanism import Reason
 from mechdesign.motion.question import PoseValues
 from mechdesign.motion.rows import Poses
+from mechdesign.motion.solving import solve_rows
 from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.kinematics.columns import MOTION
@@ -62,6 +64,7 @@ _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid th
 # Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
+_HAND_ROOM = 1.3  # size of a drawing that a hand changes, as a multiple of what it shows
 _DASHED = 1.8  # width of a line whose dashes the mechanism before has
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
 _ARROW, _SHARE = 90.0, 0.3  # length of the longest arrow, and the part of a low drawing's height that it has at most
@@ -89,14 +92,16 @@ _RATES = ("velocity", "acceleration")
 
 
 def moving(
-    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False
+    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False,
+    sheet: Canvas | None = None, handled: bool = False,
 ) -> MovingPicture | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design, of a sweep that of the best case. Beside a motion, and in its
     curves, stands that of the study before.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
-    linkage with its paths, without names, ruler and curves.
+    linkage with its paths, without names, ruler and curves; one that is `handled` has room for a hand around it, and no
+    curves. A motion is drawn on a `sheet` where one is given, else on one that shows all of it.
     """
     command = result.command
     if isinstance(result.drawn, DrawnDesigns):
@@ -112,7 +117,9 @@ def moving(
         title, study, result = case
     with style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
-            part = _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
+            part = _motion(
+                study, result, result.drawn, f"{command}-curves", before, marked, sheet, plain=plain, handled=handled
+            )
             return part and part.titled(title)
         return roaming(study, result, command) if "local" in result.tables else None
 
@@ -140,8 +147,10 @@ def _motion(
     name: str,
     before: Before | None,
     marked: Sequence[float],
+    sheet: Canvas | None,
     *,
     plain: bool,
+    handled: bool,
 ) -> MovingPicture | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(drawn.shown)
@@ -151,21 +160,25 @@ def _motion(
     begin = int(sweep.valid[0])
     few = sweep.valid[evenly(len(sweep.valid), _FEW_POSES)]
     scenes = Scene(sweep.mechanism, sweep.configuration, whole.scene.travel).some(few.tolist())
-    # Guides reach farther than points.
-    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
     earlier = None if before is None else _earlier(DrawnMotion.of(before.result), sweep)
-    sheet = Canvas.around(np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])]))
+    if sheet is None:
+        # Guides reach farther than points.
+        ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
+        reached = np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])])
+        if handled:
+            middle, wide, tall = extent(reached)
+            reached = middle + _HAND_ROOM * complex(wide, tall) * np.array([-0.5, 0.5])
+        sheet = Canvas.around(reached)
     numbers = ShownNumbers(table, sweep.rows, begin, study.size)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
-    data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
+    data |= _tracks(sheet, sweep, earlier)
     section = motion.question.section
-    data |= {"gaps": gaps(sweep), **_time(study, section, sweep, table, whole.returns)}
+    data |= _time(study, section, sweep, table, whole.returns)
     data |= {"arrows": _arrows(drawn, motion, sweep, sheet), "rows": deltas(sweep.poses.numbers[sweep.rows], ROWS)}
     data["course"] = _course(whole.poses)
     if before is not None and earlier is not None:
-        data["before"] = {"title": f"Before: {before.names[1]}"}
-        data["before"] |= places(sheet, earlier.configuration, earlier.mechanism.description.links)
+        data["before"]["title"] = f"Before: {before.names[1]}"
     data["given"] = []
     for column in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(column).unit
@@ -181,7 +194,7 @@ def _motion(
     data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
     data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
     curves, beside, data["dots"] = None, "", []
-    if isinstance(drawn, DrawnMotion) and not plain:
+    if isinstance(drawn, DrawnMotion) and not (handled or plain):
         curves = motion_curves(study, {**result.tables, "motion": table}, sweep.poses, before)
     if curves is not None:
         figure = draw(curves)
@@ -191,6 +204,41 @@ def _motion(
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), earlier, plain=plain)
     replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
     return MovingPicture(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
+
+
+def posed(study: Study, rows: Floats, sheet: Canvas, earlier: Study) -> tuple[str, dict[str, Any]]:
+    """The mechanism of a study at places of its motion, in rows, over that of an earlier one: drawing and tracks alone.
+
+    This is what changes while a hand changes a dimension; numbers, names and arrows need the whole answer.
+
+    Raises
+    ------
+    AssemblyError
+        If it cannot be assembled at any of the places.
+    """
+    sweep, before = (_at_rows(one, rows) for one in (study, earlier))
+    if not len(sweep.valid):
+        raise AssemblyError(study.motion(sweep.poses).invalid_in_words(sweep.configuration.reason))
+    begin = int(sweep.valid[0])
+    under = before if study is not earlier and len(before.valid) else None
+    scenes = Scene(sweep.mechanism, sweep.configuration, sweep.scene.travel).some([begin])
+    drawing = _drawing(study, sweep, sheet, scenes, sweep.words(begin), under, plain=True)
+    return drawing, _tracks(sheet, sweep, under)
+
+
+def _at_rows(study: Study, rows: Floats) -> Sweep:
+    """The poses of a study's motion at places between its rows."""
+    poses = replace(study.motions["kinematics"], picked=(np.zeros(len(rows), dtype=np.intp), rows))
+    every = np.arange(len(rows))
+    return Sweep(study, poses, every, solve_rows(study.motion(poses), every))
+
+
+def _tracks(sheet: Canvas, sweep: Sweep, earlier: Sweep | None) -> dict[str, Any]:
+    """Where points and links of a motion are, and of that before, and where there are none."""
+    tracks = {**places(sheet, sweep.configuration, sweep.mechanism.description.links), "gaps": gaps(sweep)}
+    if earlier is not None:
+        tracks["before"] = places(sheet, earlier.configuration, earlier.mechanism.description.links)
+    return tracks
 
 
 def _earlier(drawn: DrawnMotion, sweep: Sweep) -> Sweep | None:

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import base64
-import hashlib
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from importlib.resources import files
 from itertools import zip_longest
 from operator import itemgetter
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
 from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.door.report.manifest import computed_from
 from mechdesign.door.report.page import vector
-from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.headlines import shown
-from mechdesign.door.report.page.pages import IndexEntry, harmless
+from mechdesign.door.report.page.pages import IndexEntry
+from mechdesign.door.report.page.template import rendered
 from mechdesign.door.report.page.tracks import joined
 from mechdesign.door.report.requirements import Verdict, judged_by, named
 from mechdesign.drawing import style
@@ -32,8 +26,7 @@ from mechdesign.drawing.framing import fit
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.mechanism import sketch_picture
 from mechdesign.drawing.scene import sketched
-from mechdesign.ground.errors import counted, explain
-from mechdesign.ground.numerals import printed
+from mechdesign.ground.errors import explain
 from mechdesign.ground.terms import path_of
 from mechdesign.ground.versions import installed
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
@@ -45,7 +38,6 @@ from mechdesign.study.text.units import text_of
 
 # Pixels of the drawings in an index, twice their width on the page.
 _THUMBNAIL = (240, 180)
-_INDENT = re.compile(r"^[ ]*(?://.*\n)?", re.MULTILINE)  # and a line of comment
 _FIRST_NUMBERS = 5  # at the top of a page
 
 _Number = Mapping[str, Any]
@@ -82,14 +74,14 @@ def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, pl
     parts = ["moving"] * bool(moving)
     parts += ["sorted"] * any(table["sorted"] for section in sections for table in section["tables"])
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
-    required = _requirements(study, answers)
+    required = required_of(study, answers)
     drawing = drawing or (_sketch(study) if plots and not study.is_task else "")
     drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
     # Each design of a front has a drawing.
     drawings += [entry.get("drawing", "") for part in moving.values() for entry in part["data"].get("choices", ())]
     drawings += [picture["html"] for section in sections for picture in section["pictures"]]
     first, more = _divided({section["command"]: section["headlines"] for section in sections})
-    return _page(
+    return rendered(
         "report.html.j2",
         moving=moving,
         drawings=drawings,
@@ -102,8 +94,8 @@ def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, pl
         drawing=drawing,
         plots=plots,
         answers=answers,
-        mover=partial(_mover, moving),
-        pose_of=_pose_of,
+        mover=partial(mover, moving),
+        pose_of=pose_of,
         questions=QUESTIONS,
         required=required,
         met=sum(entry["met"] for entry in required),
@@ -123,7 +115,7 @@ def _together(moving: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str,
     return parts
 
 
-def _mover(
+def mover(
     moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None, words: str = ""
 ) -> str:
     """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one.
@@ -138,7 +130,7 @@ def _mover(
     return ""
 
 
-def _pose_of(verdict: Verdict) -> dict[str, float]:
+def pose_of(verdict: Verdict) -> dict[str, float]:
     """The numbers that the place of a verdict names, such as a pose."""
     numbers = {}
     for part in verdict.place.split(", "):
@@ -163,7 +155,7 @@ def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, 
 def index(entries: Sequence[IndexEntry]) -> bytes:
     """The page of several studies, a row each: first those that will not do, then by their names."""
     entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
-    return _page("index.html.j2", entries=entries, version=installed("mechdesign"))
+    return rendered("index.html.j2", entries=entries, version=installed("mechdesign"))
 
 
 def _sketch(study: Study) -> str:
@@ -197,39 +189,7 @@ def thumbnail(study: Study) -> str:
         return ""
 
 
-def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] = (), **content: Any) -> bytes:
-    """A page with the scripts of some parts, and the colours of some drawings on a dark screen."""
-    environment = Environment(
-        loader=PackageLoader("mechdesign.door.report.page"), autoescape=True, undefined=StrictUndefined,
-        finalize=harmless, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
-    )  # fmt: skip
-    environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
-    environment.filters |= {"printed": printed, "counted": counted, "shown": shown}
-    styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
-    script = "".join(_text(f"{part}.js") for part in (*parts, "page"))
-    policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
-    policy += [f"script-src {_hash(script)}"]
-    text = environment.get_template(template).render(
-        **content,
-        policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
-        # These texts are files of the package, and none contains the end tag of its element.
-        styles=Markup(styles),
-        script=Markup(script),
-    )
-    return text.encode()
-
-
-def _text(name: str) -> str:
-    """A style sheet or a script without indents and lines of comments."""
-    text = files("mechdesign.door.report.page").joinpath("templates", name).read_text(encoding="utf-8")
-    return _INDENT.sub("", text)
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-def _requirements(study: Study, answers: Iterable[AnsweredQuestion]) -> list[dict[str, Any]]:
+def required_of(study: Study, answers: Iterable[AnsweredQuestion]) -> list[dict[str, Any]]:
     """The requirements of the questions that were asked, in the order of the study, each with its verdict.
 
     Those on warnings come after the others, and those of its cases, where they were asked, last.

@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const PLACES = 20, TURNS = 100, TIMES = 10000; // integers in a unit, as the page writes them
+  const PLACES = 20, TURNS = 100, TIMES = 10000, ROWS = 1000000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
   const ROW_POSES = 60; // of a workspace, through which it goes in that time
@@ -163,7 +163,7 @@
   }
 
   // Arrows of vectors, such as velocities or forces: a layer for each kind, and for each scale one of a round size.
-  function arrows(drawing, data, moved) {
+  function arrows(drawing, data, moved, chosen) {
     const way = (x, y) => {
       const length = Math.hypot(x, y), back = Math.min(9, length) / (length || 1);
       return `l${x.toFixed(1)} ${y.toFixed(1)}l${(-back * (x + 0.45 * y)).toFixed(1)} ${(-back * (y - 0.45 * x)).toFixed(1)}` +
@@ -187,7 +187,7 @@
         return [title, layer, on, color];
       });
       const update = () => key.classList.toggle("moving-off", drawn.every(([, layer]) => layer.classList.contains("moving-off")));
-      boxes.push(...drawn.map(([title, layer, on, color]) => check(title, [layer], on, update, color)));
+      boxes.push(...drawn.map(([title, layer, on, color]) => check(title, [layer], chosen(title, on), update, color)));
     });
     return {
       boxes,
@@ -279,25 +279,33 @@
   }
 
   // Any number of the motion over any other, which the reader picks, as a curve with a dot at the pose. Returns what
-  // moves the dot.
+  // moves the dot, and what takes new numbers.
   function chart(figure, data, readout, choose) {
-    const room = document.querySelector(`[data-chart="${figure.id}"]`);
-    const table = document.querySelector(`[data-numbers="${figure.id}"] .moving-numbers`);
-    if (!room || !table) return () => {};
-    const heads = [...table.tHead.rows[0].cells].map(cell => cell.textContent), tracks = [];
-    for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, k) => {
-      const number = cell.querySelector("[data-number]"), name = row.cells[0].firstChild.textContent;
-      if (!number) return;
-      const unit = cell.textContent.slice(number.textContent.length).trim().replace(/^\u00b7/, "");
-      const title = k > 1 ? `${heads[k]} of ${name}` : name;
-      tracks.push({values: readout.tracks[number.dataset.number][1], title, label: unit ? `${title} [${unit}]` : title});
-    });
-    if (tracks.length < 2) return () => {};
+    const room = document.querySelector(`[data-chart="${figure.id}"]`), none = {mark: () => {}, take: () => {}};
+    if (!room) return none;
+
+    // The numbers of the table beside the drawing.
+    function listed() {
+      const table = document.querySelector(`[data-numbers="${figure.id}"] .moving-numbers`), tracks = [];
+      const heads = table ? [...table.tHead.rows[0].cells].map(cell => cell.textContent) : [];
+      for (const row of table ? table.tBodies[0].rows : []) [...row.cells].forEach((cell, k) => {
+        const number = cell.querySelector("[data-number]"), name = row.cells[0].firstChild.textContent;
+        if (!number) return;
+        const unit = cell.textContent.slice(number.textContent.length).trim().replace(/^\u00b7/, "");
+        const title = k > 1 ? `${heads[k]} of ${name}` : name;
+        tracks.push({values: readout.tracks[number.dataset.number][1], title, label: unit ? `${title} [${unit}]` : title});
+      });
+      return tracks;
+    }
+
+    let tracks = listed();
+    if (tracks.length < 2) return none;
     const given = new Set(data.given.map(([name]) => name)), free = tracks.filter(({title}) => !given.has(title));
     const drawing = make("svg", {viewBox: "0 0 576 330", role: "img", "font-family": "'DejaVu Sans',Verdana,Geneva,sans-serif",
       "font-size": 10, class: "moving-curves"}, room.querySelector("div"));
+    const options = chosen => tracks.map((track, k) => html("option", {value: k, textContent: track.label, selected: track.title === chosen}));
     const pick = (text, name, chosen) => {
-      const select = html("select", {}, ...tracks.map((track, k) => html("option", {value: k, textContent: track.label, selected: track === chosen})));
+      const select = html("select", {}, ...options(chosen.title));
       select.setAttribute("aria-label", name);
       select.addEventListener("change", draw);
       return [select, html("label", {}, text, select)];
@@ -360,7 +368,13 @@
     follow(drawing, false, (a, b) => choose(place(a, b)));
     room.hidden = false;
     draw();
-    return mark;
+    return {mark, take(next, numbers) {
+      const titles = [x, y].map(select => tracks[select.value].title);
+      [data, readout] = [next, numbers];
+      tracks = listed();
+      [x, y].forEach((select, k) => select.replaceChildren(...options(titles[k])));
+      draw();
+    }};
   }
 
   // A box that shows or hides some layers, with a mark of their colour, and calls back then.
@@ -379,17 +393,13 @@
 
   // A motion: a slider, play and pause, speed, and what may be shown. Links with a pose that it passes bring it there.
   function motion(figure, data) {
-    const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), readout = numbers(figure, data);
-    const vectors = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
+    const drawing = figure.querySelector("svg"), words = figure.querySelector(".moving-words");
     const choose = pose => { player.stop(); show(pose); };
-    const {marks, inStudy} = pictures(figure, data, readout, moved, choose), other = drawing.querySelector(".moving-before");
-    const before = other && linkage(other, {...data.before, poses: data.poses});
-    marks.push(chart(figure, data, readout, choose));
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
     slider.setAttribute("aria-label", "pose of the motion");
     const speed = html("select", {}, ...[[0.25, "\u00bc\u00d7"], [0.5, "\u00bd\u00d7"], [1, "1\u00d7"], [2, "2\u00d7"], [4, "4\u00d7"]]
       .map(([value, text]) => html("option", {value, textContent: text, selected: value === 1})));
-    const controls = figure.querySelector(".moving-controls");
+    const controls = figure.querySelector(".moving-controls"), boxes = html("span", {className: "moving-boxes"});
     const player = playback(1000 * data.seconds, share => {
       const next = ahead(share * whole);
       show(calm.matches ? Math.round(next) % data.poses : next);
@@ -398,19 +408,36 @@
       end: () => { if (at % 1) show(Math.round(at) % data.poses); },
       rate: () => Number(speed.value),
     });
-    controls.append(slider, player.button, html("label", {}, "Speed", speed),
-      check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
-      check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
-      ...vectors.boxes,
-      ...other ? [check(data.before.title, [other], true)] : [],
-      html("span", {className: "moving-pace", textContent: data.pace}));
-    controls.hidden = false;
-
-    const times = decode(data.times, data.poses + 1, TIMES), last = data.poses - 1;
-    const whole = Math.max(times[data.poses], times[last]);
+    const pace = html("span", {className: "moving-pace"});
+    let moved, readout, vectors, before, times, last, whole, movable, at = data.first, forward = data.backwards ? -1 : 1;
     const gap = pose => data.gaps.find(([first, end]) => first <= pose && pose <= end);
-    const movable = Object.keys(moved.x).filter(point => [moved.x[point], moved.y[point]].some(values => values.some(value => isFinite(value) && value !== values[data.first])));
-    let at = data.first, forward = data.backwards ? -1 : 1;
+
+    // What is drawn and shown by the data; the boxes that the reader has set stay as they are.
+    function begin(numbered) {
+      const set = new Map([...boxes.querySelectorAll("input")].map(box => [box.parentNode.textContent, box.checked]));
+      const chosen = (title, on) => set.get(title) ?? on, other = drawing.querySelector(".moving-before");
+      moved = linkage(drawing, data);
+      before = other && linkage(other, {...data.before, poses: data.poses});
+      last = data.poses - 1;
+      if (numbered) {
+        readout = numbers(figure, data);
+        times = decode(data.times, data.poses + 1, TIMES);
+        whole = Math.max(times[data.poses], times[last]);
+        slider.max = last;
+        pace.textContent = data.pace;
+      }
+      vectors = arrows(drawing, numbered ? data : {}, moved, chosen);
+      movable = Object.keys(moved.x).filter(point => [moved.x[point], moved.y[point]].some(values => values.some(value => isFinite(value) && value !== values[data.first])));
+      const layer = (title, selector, on) => check(title, [...drawing.querySelectorAll(selector)], chosen(title, on));
+      boxes.replaceChildren(layer("Paths", ".moving-trace", true), layer("Link names", ".moving-name", false),
+        ...vectors.boxes, ...other ? [layer(data.before.title || "Before", ".moving-before", true)] : []);
+    }
+
+    begin(true);
+    const {marks, inStudy} = pictures(figure, data, readout, moved, choose), curve = chart(figure, data, readout, choose);
+    marks.push(curve.mark);
+    controls.append(slider, player.button, html("label", {}, "Speed", speed), boxes, pace);
+    controls.hidden = false;
 
     function show(pose) {
       at = pose;
@@ -467,15 +494,38 @@
       return best;
     }
 
-    for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
-      const place = passing(JSON.parse(link.dataset.pose));
-      if (place === null) link.removeAttribute("href");
-      else link.addEventListener("click", event => {
-        event.preventDefault();
-        choose(place);
-        figure.scrollIntoView({block: "nearest", behavior: calm.matches ? "auto" : "smooth"});
-      });
+    // Links in a part of the page that lead to a pose.
+    function leading(room) {
+      for (const link of room.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
+        const place = passing(JSON.parse(link.dataset.pose));
+        if (place === null) link.removeAttribute("href");
+        else link.addEventListener("click", event => {
+          event.preventDefault();
+          choose(place);
+          figure.scrollIntoView({block: "nearest", behavior: calm.matches ? "auto" : "smooth"});
+        });
+      }
     }
+
+    // Shows the motion anew by other data, of places alone or with all numbers, at the pose where it is. Of the drawing
+    // stays what is marked to stay, unless `whole` is asked.
+    figure.moving = {
+      drawing, leading, stop: player.stop, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
+      rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
+      take(next, markup, entire) {
+        const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
+        const stays = part => part.classList.contains("moving-stays") || (!entire && part.classList.contains("moving-kept"));
+        [...drawing.children].filter(part => !stays(part)).forEach(part => part.remove());
+        drawing.prepend(...fresh.children);
+        if (entire) drawing.setAttribute("viewBox", fresh.getAttribute("viewBox"));
+        if (next.poses && next.poses !== data.poses) at = Math.min(Math.round(share * next.poses), next.poses - 1);
+        data = {...data, before: undefined, ...next};
+        begin("numbers" in next);
+        if ("numbers" in next) curve.take(data, readout);
+        show(at);
+      },
+    };
+    leading(document);
     slider.addEventListener("input", () => choose(Number(slider.value)));
     figure.addEventListener("keydown", event => {
       if (event.key === " " && !event.target.matches("button, select, input[type=checkbox]")) {

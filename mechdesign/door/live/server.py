@@ -1,0 +1,227 @@
+"""The page of a study over HTTP, to this machine alone.
+
+Everything has a token of 128 bits in its address; requests by other names of this machine, or from other pages, are
+refused, and what comes in is a small JSON text.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+import socket
+import threading
+from contextlib import suppress
+from hmac import compare_digest
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from mechdesign.door.live.session import AskedError, OvertakenError, Session
+from mechdesign.ground.errors import explain
+
+_HOST = "127.0.0.1"
+_MOST_BYTES = 1_000_000  # of a request
+_WAIT = 20.0  # seconds after which a page asks again whether the file has changed
+_IDLE = 60.0  # seconds until a connection that says nothing is closed
+_POLICY = re.compile(rb'<meta http-equiv="Content-Security-Policy" content="([^"]+)">')
+_HEADERS = {
+    "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin", "Cross-Origin-Opener-Policy": "same-origin",
+}  # fmt: skip
+
+
+class LiveServer(ThreadingHTTPServer):
+    """Serves the pages of a session on a port of 127.0.0.1, a free one where it is 0.
+
+    `framed` pages may stand in a page of another origin, as of a notebook.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = True
+    request_queue_size = 32
+
+    def __init__(self, session: Session, port: int = 0, *, framed: bool = False) -> None:
+        self.session, self.token, self.framed = session, secrets.token_urlsafe(16), framed
+        self.waiting: dict[str, int] = {}  # requests by which open pages wait for a change of the file
+        self.connections: set[socket.socket] = set()
+        self.lock = threading.Lock()
+        super().__init__((_HOST, port), _Handler)
+
+    @property
+    def url(self) -> str:
+        """The address of the page."""
+        return f"http://{_HOST}:{self.server_port}/{self.token}/"
+
+    @property
+    def hosts(self) -> tuple[str, str]:
+        """What a browser may call this server."""
+        return f"{_HOST}:{self.server_port}", f"localhost:{self.server_port}"
+
+    def start(self) -> None:
+        """Serve in a thread of its own, until `close`."""
+        threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
+
+    def close(self) -> int:
+        """End, and return how many pages were open."""
+        with self.lock:
+            count, open_ones = len(self.waiting), [*self.connections]
+        self.shutdown()
+        self.server_close()
+        for connection in open_ones:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        return count
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A page that is closed while it is answered is no error."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: LiveServer
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "mechdesign", ""
+    timeout = _IDLE
+    wbufsize = -1  # a head and its body leave together
+
+    def setup(self) -> None:
+        super().setup()
+        self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with self.server.lock:
+            self.server.connections.add(self.connection)
+
+    def finish(self) -> None:
+        with self.server.lock:
+            self.server.connections.discard(self.connection)
+        with suppress(OSError):
+            super().finish()
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing: addresses hold the token."""
+
+    def __getattr__(self, name: str) -> Any:
+        # Methods that are none of these two.
+        if name.startswith("do_"):
+            return self._other_method
+        raise AttributeError(name)
+
+    def do_GET(self) -> None:
+        """The page, or what a page waits for."""
+        if (words := self._admitted()) is None:
+            return
+        if words == [""]:
+            try:
+                page = self.server.session.page()
+            except Exception as error:
+                self._send(HTTPStatus.OK, f"{explain(error)[1]}\n".encode(), "text/plain; charset=utf-8")
+                return
+            self._send(HTTPStatus.OK, page, "text/html; charset=utf-8")
+        elif len(words) == 3 and words[0] == "changes" and words[1].isdigit():
+            self._wait(int(words[1][:9]), words[2][:40])
+        elif len(words) == 2 and words[0] == "progress":
+            self._reply({"progress": self.server.session.progress(words[1])})
+        else:
+            self._refuse(HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """What a page asks, as JSON."""
+        if (words := self._admitted()) is None:
+            return
+        session = self.server.session
+        actions = {"move": session.move, "answer": session.answer, "save": session.save}
+        if (body := self._body()) is None:
+            return
+        if len(words) != 1 or words[0] not in actions:
+            self._refuse(HTTPStatus.NOT_FOUND)
+            return
+        try:
+            asked = json.loads(body)
+        except (ValueError, RecursionError):
+            asked = None
+        if not isinstance(asked, dict):
+            self._refuse(HTTPStatus.BAD_REQUEST)
+            return
+        try:
+            # A page of an older version of the file asks for names that there may not be.
+            answer = actions[words[0]](asked) if asked.get("version") == session.version else {"outdated": True}
+        except OvertakenError:
+            answer = {"overtaken": True}
+        except AskedError:
+            self._refuse(HTTPStatus.BAD_REQUEST)
+            return
+        except Exception as error:
+            answer = {"wrong": explain(error)[1]}
+        self._reply(answer)
+
+    def _admitted(self) -> list[str] | None:
+        """The address behind the token, in words; None of a request that was refused."""
+        hosts, origin = self.server.hosts, self.headers.get("Origin")
+        token, _, rest = self.path.removeprefix("/").partition("/")
+        foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
+        if self.headers.get_all("Host", []) not in ([hosts[0]], [hosts[1]]):
+            self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
+        elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
+            self._refuse(HTTPStatus.FORBIDDEN)
+        else:
+            return rest.split("/")
+        return None
+
+    def _body(self) -> bytes | None:
+        """The text of a request; None of one that was refused."""
+        lengths = self.headers.get_all("Content-Length", [])
+        if not lengths or "Transfer-Encoding" in self.headers:
+            self._refuse(HTTPStatus.LENGTH_REQUIRED)
+        elif len(lengths) > 1 or not (lengths[0].isascii() and lengths[0].isdigit()):
+            self._refuse(HTTPStatus.BAD_REQUEST)
+        elif len(lengths[0]) > 9 or int(lengths[0]) > _MOST_BYTES:
+            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        else:
+            return self.rfile.read(int(lengths[0]))
+        return None
+
+    def _wait(self, version: int, page: str) -> None:
+        """Answer when the file has changed, or after a while."""
+        server, session = self.server, self.server.session
+        with server.lock:
+            server.waiting[page] = server.waiting.get(page, 0) + 1
+        try:
+            with session.changed:
+                session.changed.wait_for(lambda: session.version != version, _WAIT)
+            self._reply({"version": session.version, "mistake": session.mistake})
+        finally:
+            with server.lock:
+                server.waiting[page] -= 1
+                if not server.waiting[page]:
+                    del server.waiting[page]
+
+    def _other_method(self) -> None:
+        self._refuse(HTTPStatus.METHOD_NOT_ALLOWED)
+
+    def _refuse(self, status: HTTPStatus) -> None:
+        """Say no, and end the connection: what else it holds was not read."""
+        self.close_connection = True
+        self._send(status, status.phrase.encode(), "text/plain; charset=utf-8")
+
+    def _reply(self, answer: dict[str, Any]) -> None:
+        self._send(HTTPStatus.OK, json.dumps(answer, separators=(",", ":")).encode(), "application/json")
+
+    def _send(self, status: HTTPStatus, body: bytes, kind: str) -> None:
+        # A page says its policy itself, but for who may frame it; nothing else is a page.
+        policy = found[1].decode().replace("&#39;", "'") if (found := _POLICY.search(body)) else "default-src 'none'"
+        policy += "" if self.server.framed else "; frame-ancestors 'none'"
+        headers = {
+            "Content-Type": kind,
+            "Content-Length": str(len(body)),
+            "Content-Security-Policy": policy,
+            **_HEADERS,
+        }
+        headers |= {"Allow": "GET, POST"} if status == HTTPStatus.METHOD_NOT_ALLOWED else {}
+        headers |= {"Connection": "close"} if self.close_connection else {}
+        with suppress(OSError):
+            self.send_response(status)
+            for name, value in headers.items():
+                self.send_header(name, value)
+            self.end_headers()
+            if self.command != "HEAD":
+                self.wfile.write(body)
+            self.wfile.flush()

@@ -1,0 +1,296 @@
+"""The live page as hands use it, in a real browser (Debian: chromium-headless-shell)."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import urllib.request
+
+import pytest
+
+from mechdesign import kinematics, load
+from mechdesign.door.live.server import LiveServer
+from mechdesign.door.live.session import Session
+
+try:
+    from playwright.sync_api import expect
+except ImportError:
+    expect = None
+
+pytestmark = pytest.mark.browser
+
+FOUR_BAR = """\
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}  # the pivots
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {outputs: [P, rocker.angle], rates: {theta: 60 rpm}}
+requirements: [{result: kinematics.rocker.angle, at_most: 160}]
+"""
+
+
+class Live:
+    """A page of a study's server."""
+
+    def __init__(self, browser, path, **looks):
+        self.path, self.session = path, Session(load(path), lambda: load(path))
+        self.server = LiveServer(self.session)
+        self.server.start()
+        self.complaints = []
+        self.page = self.open(browser, **looks)
+
+    def open(self, browser, **looks):
+        page = browser.new_page(**{"viewport": {"width": 1300, "height": 900}, "reduced_motion": "reduce", **looks})
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.goto(self.server.url)
+        self.answered(page)
+        return page
+
+    @staticmethod
+    def answered(page):
+        """Wait until every question is answered by the numbers as they are."""
+        page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
+        page.wait_for_selector(".live-answer[aria-busy=true]", state="detached", timeout=30_000)
+
+    def middle(self, point):
+        box = self.page.locator(f".live-handle[data-at={point}]").bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag(self, point, across, down):
+        """Take a point by the mouse, move it by pixels and let it go."""
+        x, y = self.middle(point)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + across / 2, y + down / 2, steps=4)
+        self.page.mouse.move(x + across, y + down, steps=4)
+        self.page.mouse.up()
+        self.page.wait_for_selector(".live-handle.held", state="detached")
+        self.answered(self.page)
+
+    def value(self, name):
+        return float(self.page.locator(f"[data-name='{name}'] input[type=number]").input_value())
+
+    @property
+    def scale(self):
+        """Pixels of the screen per length of the study."""
+        return self.page.evaluate("""() => {
+            const {drawing, data} = document.getElementById("kinematics-moving").moving;
+            return data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width; }""")
+
+    def close(self):
+        for page in self.page.context.pages:
+            page.close()
+        self.server.close()
+
+
+@pytest.fixture
+def live(browser, tmp_path):
+    """A function that opens the page of a study; at the end nothing complained."""
+    opened = []
+
+    def start(text=FOUR_BAR, **looks):
+        path = tmp_path / "bar.yaml"
+        path.write_text(text)
+        opened.append(Live(browser, path, **looks))
+        return opened[-1]
+
+    yield start
+    for one in opened:
+        one.close()
+        assert one.complaints == []
+
+
+def test_a_dragged_pivot_changes_the_study_that_is_saved_and_the_command_line_gives_the_same(live):
+    bar = live()
+    pixels = bar.scale
+    bar.drag("D", 10 * pixels, 0)
+    assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
+    shown = bar.page.locator("#kinematics .numbers").inner_text()
+    bar.page.get_by_role("button", name="Save as").click()
+    bar.page.get_by_label("Name of the file").fill("longer.yaml")
+    bar.page.get_by_role("button", name="Save", exact=True).click()
+    expect(bar.page.locator(".live-said")).to_contain_text("Saved as longer.yaml")
+    saved = load(bar.path.with_name("longer.yaml"))
+    assert saved.sizes["ground.D.x"] == bar.value("ground.D.x")
+    assert "# the pivots" in bar.path.with_name("longer.yaml").read_text()
+    angles = kinematics(saved).tables["extremes"]
+    most = next(row["max"] for row in angles if row["output"] == "rocker.angle")
+    assert f"to {most:.4g}" in shown
+    # One gesture is one entry of the history.
+    bar.page.get_by_role("button", name="Undo").click()
+    assert bar.value("ground.D.x") == 100
+    bar.page.get_by_role("button", name="Redo").click()
+    assert bar.value("ground.D.x") == saved.sizes["ground.D.x"]
+
+
+def test_the_numbers_that_a_drag_changes_are_named_beside_the_hand_and_a_locked_one_stays(live):
+    bar = live()
+    bar.page.get_by_label("lock rod.length").check()
+    x, y = bar.middle("B")
+    bar.page.mouse.move(x, y)
+    bar.page.mouse.down()
+    bar.page.mouse.move(x - 20, y - 5, steps=4)
+    expect(bar.page.locator(".live-hand")).to_contain_text("rocker.length = ")
+    assert "rod.length" not in bar.page.locator(".live-hand").inner_text()
+    bar.page.mouse.up()
+    bar.answered(bar.page)
+    assert bar.value("rod.length") == 90
+    assert bar.value("rocker.length") != 60
+
+
+@pytest.mark.nightly
+def test_keys_move_a_point_by_the_grid_and_what_cannot_be_assembled_is_said(live):
+    bar = live()
+    bar.page.locator(".live-grid").fill("5")
+    bar.page.locator(".live-handle[data-at=D]").focus()
+    bar.page.keyboard.press("ArrowRight")
+    expect(bar.page.locator("[data-name='ground.D.x'] input[type=number]")).to_have_value("105")
+    bar.page.wait_for_timeout(50)
+    bar.page.keyboard.press("Shift+ArrowRight")
+    expect(bar.page.locator("[data-name='ground.D.x'] input[type=number]")).not_to_have_value("105")
+    # Rod and rocker reach 150 mm from the crank's pin, 30 mm from O along the line to D.
+    assert 105 < bar.value("ground.D.x") <= 180
+    for _ in range(4):
+        bar.page.wait_for_timeout(100)
+        bar.page.keyboard.press("Shift+ArrowRight")
+    expect(bar.page.locator(".live-said")).to_contain_text("cannot be assembled")
+
+
+@pytest.mark.nightly
+def test_a_number_in_a_field_and_a_slider_do_the_same_as_a_hand(live):
+    bar = live()
+    field = bar.page.locator("[data-name='rocker.length'] input[type=number]")
+    field.fill("70")
+    field.blur()
+    bar.answered(bar.page)
+    bar.page.get_by_label("rocker.length, slider").fill("66")
+    bar.answered(bar.page)
+    assert bar.value("rocker.length") == 66
+    bar.page.get_by_role("button", name="Undo").click()
+    assert bar.value("rocker.length") == 70
+    bar.page.get_by_role("button", name="Reset").click()
+    assert bar.value("rocker.length") == 60
+
+
+@pytest.mark.nightly
+def test_a_saved_file_makes_the_page_anew_and_a_mistake_is_told_while_the_last_answer_stays(live):
+    bar = live()
+    bar.path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, x60]"))
+    bar.session.reload()
+    expect(bar.page.locator(".live-message")).to_contain_text("bar.yaml:6:")
+    assert bar.page.locator("#kinematics .numbers").count() == 1
+    bar.drag("D", 5 * bar.scale, 0)
+    assert bar.value("ground.D.x") == pytest.approx(105, abs=0.2)
+    bar.path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
+    bar.session.reload()
+    expect(bar.page.locator("[data-name='rocker.length'] input[type=number]")).to_have_value("64")
+    bar.answered(bar.page)
+    # What the hand has changed stays, and nothing is wrong any more.
+    assert bar.value("ground.D.x") == pytest.approx(105, abs=0.2)
+    assert not bar.page.locator(".live-message").is_visible()
+
+
+@pytest.mark.nightly
+def test_a_finger_drags_on_a_narrow_dark_screen_and_nothing_leaves_the_page(live):
+    bar = live(viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True, color_scheme="dark")
+    x, y = bar.middle("D")
+    session = bar.page.context.new_cdp_session(bar.page)
+    touch = lambda kind, *points: session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [*points]})  # noqa: E731
+    touch("touchStart", {"x": x, "y": y})
+    for k in range(1, 6):
+        touch("touchMove", {"x": x + 2 * k, "y": y})
+    touch("touchEnd")
+    bar.page.wait_for_selector(".live-number.changed")
+    bar.answered(bar.page)
+    assert bar.value("ground.D.x") > 101
+    assert bar.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.nightly
+def test_two_pages_do_not_disturb_each_other(live, browser):
+    bar = live()
+    other = bar.open(browser)
+    bar.drag("D", 10 * bar.scale, 0)
+    assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
+    assert other.locator("[data-name='ground.D.x'] input[type=number]").input_value() == "100"
+    assert len(bar.server.waiting) == 2
+    other.close()
+
+
+@pytest.mark.nightly
+def test_a_server_that_has_ended_is_told_and_what_was_changed_stays(live):
+    bar = live()
+    bar.drag("D", 10 * bar.scale, 0)
+    port = bar.server.server_port
+    bar.server.close()
+    bar.page.get_by_role("button", name="Undo").click()
+    expect(bar.page.locator(".live-message")).to_contain_text("does not answer")
+    assert bar.value("ground.D.x") == 100
+    # What the browser says of the server that is gone.
+    bar.complaints.clear()
+    again = LiveServer(bar.session, port)
+    again.token = bar.server.token
+    again.start()
+    bar.server = again
+    bar.page.wait_for_selector(".live-message", state="hidden", timeout=30_000)
+    bar.drag("D", 10 * bar.scale, 0)
+    assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
+    bar.complaints.clear()
+
+
+@pytest.mark.nightly
+def test_the_command_serves_until_ctrl_c_and_says_how_many_pages_were_open(browser, tmp_path):
+    path = tmp_path / "bar.yaml"
+    path.write_text(FOUR_BAR)
+    command = [sys.executable, "-m", "mechdesign", "live", str(path), "--no-browser"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        address = process.stderr.readline().partition("live at ")[2].split()[0]
+        page = browser.new_page()
+        page.goto(address)
+        page.wait_for_selector("#kinematics .numbers")
+        path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
+        expect(page.locator("[data-name='rocker.length'] input[type=number]")).to_have_value("64")
+        page.wait_for_selector("#kinematics .numbers")
+        process.send_signal(signal.SIGINT)
+        assert "ended; 1 page open" in process.communicate(timeout=20)[1]
+        assert process.returncode == 0
+        page.close()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_what_cannot_be_live(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from mechdesign.door.cli.app import app
+
+    monkeypatch.chdir(tmp_path)
+    arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}\n"
+    (tmp_path / "listed.yaml").write_text(arm + "kinematics: {poses: [{arm: 0}, {arm: 30}]}\n")
+    for words, arguments in (("no file that could be saved", ["-"]), ("no motion that can be shown", ["listed.yaml"])):
+        done = CliRunner().invoke(app, ["live", *arguments, "--no-browser"])
+        assert done.exit_code == 2
+        assert words in done.stderr
+
+
+def test_the_server_answers_a_plain_client_within_one_connection(tmp_path):
+    path = tmp_path / "bar.yaml"
+    path.write_text(FOUR_BAR)
+    server = LiveServer(Session(load(path)))
+    server.start()
+    try:
+        body = {"version": 1, "page": "p", "turn": 1, "changes": {}, "poses": 1, "rows": "", "sheet": [0, 0, 1, 9, 9]}
+        request = urllib.request.Request(f"{server.url}move", json.dumps(body).encode())
+        with urllib.request.urlopen(request, timeout=20) as answer:
+            assert json.load(answer)["names"] == []
+    finally:
+        assert server.close() == 0

@@ -1,0 +1,271 @@
+"""A study in the hand: which numbers a drag changes, what is written, and whom the server answers."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import math
+import random
+import socket
+from contextlib import closing
+
+import pytest
+
+from mechdesign import load
+from mechdesign.door.live.drag import Drag, dragged
+from mechdesign.door.live.server import LiveServer
+from mechdesign.door.live.session import Session
+
+FOUR_BAR = """\
+mechanism:
+  links:                              # a point of two links is the pin between them
+    ground: {O: [0, 0], D: [100, 0]}  # the pivots
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 10}}, outputs: [P, rocker.angle]}
+requirements: [{result: kinematics.rocker.angle, at_most: 160}]
+"""
+START = 0j, 100 + 0j, 30.0, 90.0, 60.0
+
+
+def pin(origin, pivot, crank, rod, rocker, angle):
+    """The pin B of a four-bar whose crank stands at an angle: two circles, the upper crossing."""
+    a = origin + crank * complex(math.cos(angle), math.sin(angle))
+    along = pivot - a
+    foot = (abs(along) ** 2 + rod**2 - rocker**2) / (2 * abs(along))
+    return a + along / abs(along) * complex(foot, math.sqrt(rod**2 - foot**2))
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load(text=FOUR_BAR)
+
+
+def test_a_pivot_follows_the_hand_by_its_two_coordinates(study):
+    done = dragged(study, {}, Drag("D", 112.5 + 7j, row=9, resolution=0.01))
+    assert done.changes == {"ground.D.x": 112.5, "ground.D.y": 7.0}
+    assert set(done.names) == {"ground.D.x", "ground.D.y"}
+    assert done.why == ""
+
+
+def test_the_pin_of_a_rocker_follows_by_two_lengths_that_two_circles_give(study):
+    # At row 9 the crank stands upright.
+    done = dragged(study, {}, Drag("B", 90 + 70j, row=9, resolution=1e-6))
+    assert set(done.names) == {"rod.length", "rocker.length"}
+    assert done.changes["rod.length"] == pytest.approx(abs(90 + 70j - 30j), abs=2e-6)
+    assert done.changes["rocker.length"] == pytest.approx(abs(90 + 70j - 100), abs=2e-6)
+
+
+def test_one_number_is_enough_where_it_leads_to_the_hand(study):
+    done = dragged(study, {}, Drag("A", 41j, row=9, resolution=0.01))
+    assert (done.names, done.changes) == (("crank.length",), {"crank.length": 41.0})
+
+
+def test_a_locked_number_stays_and_the_point_goes_as_near_as_the_other_brings_it(study):
+    done = dragged(study, {}, Drag("B", 90 + 70j, row=9, locked=["rod.length"], resolution=1e-6))
+    assert (done.names, list(done.changes)) == (("rocker.length",), ["rocker.length"])
+    # The nearest place on the circle of the rod around A.
+    there = pin(0j, 100 + 0j, 30.0, 90.0, done.changes["rocker.length"], math.pi / 2)
+    nearest = 30j + 90 * (90 + 40j) / abs(90 + 40j)
+    assert abs(there - nearest) < 0.05
+
+
+def test_without_a_free_number_the_hand_is_told(study):
+    done = dragged(study, {}, Drag("A", 41j, row=9, locked=["crank.length"]))
+    assert (dict(done.changes), done.names) == ({}, ())
+    assert "not locked" in done.why
+
+
+def test_what_cannot_be_assembled_is_said_and_the_last_that_can_stays(study):
+    # With the rod locked the rocker's pin cannot leave the rod's circle, 150 mm away the crank cannot be drawn.
+    done = dragged(study, {}, Drag("D", 400 + 0j, row=9, resolution=0.01))
+    assert "cannot be assembled" in done.why
+    reached = complex(done.changes["ground.D.x"], done.changes.get("ground.D.y", 0.0))
+    # Rod and rocker reach 150 from A = (0, 30).
+    assert abs(reached - 30j) == pytest.approx(150, abs=2)
+    assert abs(reached - 30j) <= 150
+
+
+def test_a_parameter_is_the_number_of_all_dimensions_that_follow_it():
+    text = FOUR_BAR.replace("  links:", "  parameters: {r: 30, d: 2*r + 40}\n  links:").replace("O, A, 30", "O, A, r")
+    study = load(text=text.replace("D: [100, 0]", "D: [d, 0]"))
+    done = dragged(study, {}, Drag("D", 120 + 0j, row=9, resolution=1e-6))
+    assert done.changes == {"r": pytest.approx(40.0)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.nightly)])
+def test_random_drags_end_with_numbers_or_a_reason(study, count):
+    generator, changes, moved = random.Random(1), {}, 0
+    for _ in range(count):
+        point = generator.choice("ODABP")
+        target = complex(generator.uniform(-150, 250), generator.uniform(-150, 150))
+        done = dragged(study, changes, Drag(point, target, row=generator.randrange(36), resolution=0.01))
+        assert all(map(math.isfinite, done.changes.values()))
+        assert done.names or done.why
+        moved += done.changes != changes
+        changes = dict(done.changes) if generator.random() < 0.7 else {}
+    assert moved > count / 2
+
+
+def file_of(tmp_path):
+    path = tmp_path / "bar.yaml"
+    path.write_text(FOUR_BAR)
+    return path, Session(load(path), lambda: load(path))
+
+
+def test_a_copy_keeps_comments_and_layout_and_has_the_changed_numbers(tmp_path):
+    path, session = file_of(tmp_path)
+    asked = {"changes": {"rocker.length": 63.5, "ground.D.x": 105.0}}
+    assert session.save({**asked, "name": "copy.yaml"}) == {"saved": "copy.yaml", "comments": True}
+    text = FOUR_BAR.replace("[D, B, 60]", "[D, B, 63.5]").replace("D: [100, 0]", "D: [105.0, 0]")
+    assert (tmp_path / "copy.yaml").read_text() == text
+    assert session.save({**asked, "name": "copy.yaml"}) == {"exists": "copy.yaml"}
+    assert session.save({**asked, "name": ""}) == {"exists": "bar.yaml"}
+    assert path.read_text() == FOUR_BAR
+    assert session.overrides(asked["changes"]) == [
+        "mechanism.links.ground.D.0=105.0", "mechanism.links.rocker.2=63.5",
+    ]  # fmt: skip
+    assert load(path, session.overrides(asked["changes"])).sizes == load(tmp_path / "copy.yaml").sizes
+
+
+@pytest.mark.parametrize("name", ["../out.yaml", "/tmp/out.yaml", "a\\b.yaml", ".hidden.yaml", "out.txt", "a\0.yaml"])
+def test_no_file_outside_the_folder_is_written(tmp_path, name):
+    (tmp_path / "in").mkdir()
+    _, session = file_of(tmp_path / "in")
+    with pytest.raises(Exception, match="no plain name"):
+        session.save({"changes": {}, "name": name})
+    assert {file.name for file in tmp_path.rglob("*")} == {"in", "bar.yaml"}
+
+
+def test_a_file_that_was_changed_meanwhile_is_not_replaced(tmp_path):
+    path, session = file_of(tmp_path)
+    path.write_text(FOUR_BAR + "# mine\n")
+    with pytest.raises(Exception, match="was changed"):
+        session.save({"changes": {"rocker.length": 63.5}, "name": "", "replace": True})
+    assert path.read_text().endswith("# mine\n")
+
+
+def test_a_mistake_in_the_file_is_told_with_its_line_and_the_last_good_study_stays(tmp_path):
+    path, session = file_of(tmp_path)
+    path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, sixty]"))
+    session.reload()
+    assert "bar.yaml:6:" in session.mistake
+    assert session.study.sizes["rocker.length"] == 60
+    path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 61]"))
+    session.reload()
+    assert (session.mistake, session.study.sizes["rocker.length"]) == ("", 61)
+
+
+@pytest.fixture(scope="module")
+def server(study):
+    running = LiveServer(Session(study))
+    running.start()
+    yield running
+    running.close()
+
+
+def ask(server, method="GET", path="", body=None, token=None, **headers):
+    """Status and body of an answer."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=20)
+    address = f"/{server.token if token is None else token}/{path}"
+    connection.request(method, address, body, {name.replace("_", "-"): text for name, text in headers.items()})
+    answer = connection.getresponse()
+    with closing(connection):
+        return answer.status, answer.read(), answer.headers
+
+
+MOVE = {"version": 1, "page": "p", "turn": 1, "changes": {}, "poses": 1, "rows": "A", "sheet": [0, 0, 1, 100, 100]}
+
+
+def test_the_page_says_that_nothing_from_outside_may_run_or_load(server):
+    status, body, headers = ask(server)
+    assert status == 200
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "connect-src 'self'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe" not in policy
+    assert b"http://" not in body.replace(b"http://www.w3.org/2000/svg", b"")
+    assert len(server.token) >= 22
+
+
+@pytest.mark.parametrize(
+    ("status", "asked"),
+    [
+        (403, {"token": ""}),
+        (403, {"token": "x" * 22}),
+        (403, {"Origin": "http://evil.example"}),
+        (403, {"Origin": "null"}),
+        (421, {"Host": "evil.example"}),
+        (421, {"Host": "127.0.0.1"}),
+        (404, {"path": "../secret"}),
+        (405, {"method": "PUT", "path": "move", "body": b"{}"}),
+        (405, {"method": "DELETE"}),
+        (405, {"method": "HEAD"}),
+        (405, {"method": "OPTIONS"}),
+        (400, {"method": "POST", "path": "move", "body": b"[" * 100_000}),
+        (400, {"method": "POST", "path": "move", "body": b"\xff{}"}),
+        (400, {"method": "POST", "path": "move", "body": json.dumps({**MOVE, "changes": {"rod.length": math.nan}})}),
+        (400, {"method": "POST", "path": "move", "body": json.dumps({**MOVE, "sheet": [0, 0, -1, 1, 1]})}),
+        (400, {"method": "POST", "path": "move", "body": json.dumps({**MOVE, "poses": 10**9})}),
+        (413, {"method": "POST", "path": "move", "body": b"{}", "Content-Length": "1000001"}),
+        (413, {"method": "POST", "path": "move", "body": b"{}", "Content-Length": "9" * 4000}),
+        (400, {"method": "POST", "path": "move", "body": b"{}", "Content-Length": "-1"}),
+        (400, {"method": "POST", "path": "move", "body": b"{}", "Content-Length": "2, 2"}),
+        (411, {"method": "POST", "path": "move", "body": b"0\r\n\r\n", "Transfer-Encoding": "chunked"}),
+    ],
+)
+def test_what_no_page_of_ours_asks_is_refused(server, status, asked):
+    if asked.get("Transfer-Encoding"):
+        # The client would encode the body itself.
+        asked = {**asked, "Content-Length": "5"}
+    assert ask(server, **asked)[0] == status
+
+
+def test_a_request_without_a_length_is_refused(server):
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=20) as line:
+        head = f"POST /{server.token}/move HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n"
+        line.sendall(head.encode())
+        assert line.recv(1000).startswith(b"HTTP/1.1 411 ")
+
+
+def test_positions_come_with_the_entries_of_the_study_that_were_changed(server):
+    drag = {"point": "D", "to": [110, 0], "row": 0}
+    status, body, _ = ask(server, "POST", "move", json.dumps({**MOVE, "drag": drag}))
+    answer = json.loads(body)
+    assert (status, answer["changes"], answer["why"]) == (200, {"ground.D.x": 110.0}, "")
+    assert answer["set"] == ["mechanism.links.ground.D.0=110.0"]
+    assert answer["words"] == ["ground.D.x = 110 mm"]
+
+
+def test_a_change_that_makes_no_study_is_a_sentence(server):
+    for changes, words in (({"rod.length": -5}, "not positive"), ({"rod.length": 500}, "cannot be assembled")):
+        status, body, _ = ask(server, "POST", "move", json.dumps({**MOVE, "changes": changes}))
+        assert status == 200
+        assert words in json.loads(body)["wrong"]
+
+
+@pytest.mark.slow
+def test_an_answer_has_verdicts_and_numbers_of_the_changed_study(server):
+    asked = {"version": 1, "page": "p", "turn": 2, "question": "kinematics", "sheet": None}
+    answers = {}
+    for length in (60.0, 48.0):
+        body = json.dumps({**asked, "changes": {"rocker.length": length}})
+        answers[length] = json.loads(ask(server, "POST", "answer", body)[1])
+    assert "✓ met" in answers[60.0]["html"]
+    # The rocker is farthest back where crank and rod are in line, folded: A to B is 90 - 30.
+    for length, answer in answers.items():
+        angle = 180 - math.degrees(math.acos((100**2 + length**2 - 60**2) / (2 * 100 * length)))
+        assert f"to {angle:.4g}" in answer["html"]
+
+
+def test_hostile_names_stay_text():
+    name = "</script><script>alert(1)</script>"
+    hostile = load(text=f'name: "{name}"\n{FOUR_BAR}')
+    page = Session(hostile).page().decode()
+    assert name not in page
+    assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page
