@@ -119,7 +119,8 @@ def choices(task: Positions, frame: Site, body: Site, random: np.random.Generato
     found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
     real = sum(map(len, found))
     words = (
-        f"{len(task.places)} positions are met by least squares" if min(spare) < 0 else
+        f"{len(task.places)} positions are met by least squares{' beside what is given' * (len(task.places) < 6)}"
+        if min(spare) < 0 else
         f"{real} dyads from {WISHES} samples of each choice" if max(spare) > 0 else
         f"{real} real dyads, all through the given places" if len(frame.given) + len(body.given) else
         f"{real} real dyads of at most 4"
