@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.drawing import style
-from mechdesign.drawing.marks import Late, LateMark, Panel
+from mechdesign.drawing.marks import Late, Panel
 from mechdesign.ground.numerics.arrays import Complexes
 
 # Inches. The height of a window: at least, alone, beside others, of all of a page together, below others at least.
@@ -60,11 +60,7 @@ def window_of(panel: Panel, wide: float, tall: float) -> Window:
     """The window of a panel of a width, and of a height at most."""
     assert panel.shows is not None
     symbols = any(mark.late and not isinstance(mark, Late) for mark in panel.marks)
-<<<<<<< HEAD
     arrows = any(mark.arrows for mark in panel.marks)
-=======
-    arrows = any(isinstance(mark, LateMark) and mark.arrows for mark in panel.marks)
->>>>>>> 85f3d6ba
     room = _ROOM_OF_ARROWS if arrows else min(_ROOM if symbols else _NO_SYMBOLS, _SHARE * min(wide, tall))
     return fit(panel.shows, wide, tall, room, panel.equal)
 

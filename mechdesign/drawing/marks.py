@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -65,12 +65,7 @@ class PanelMark:
 
 
 class LateMark(PanelMark):
-    """A mark that needs the final size of the panel; a legend shows a line in its look.
-
-    Its `arrows` reach beyond what the panel shows.
-    """
-
-    arrows: ClassVar[bool] = False
+    """A mark that needs the final size of the panel; a legend shows a line in its look."""
 
     @property
     def late(self) -> bool:

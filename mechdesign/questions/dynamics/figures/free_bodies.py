@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -181,8 +181,6 @@ def _title(view: DynamicsView, name: str, row: int, acting: Sequence[Action]) ->
 @dataclass(frozen=True, eq=False)
 class FreeBody(LateMark):
     """A body and what acts on it, forces to a scale of points."""
-
-    arrows: ClassVar[bool] = True
 
     unit: str  # of moments
     scale: float
