@@ -29,8 +29,6 @@ LIMITS: dict[str, dict[str, float]] = {"usual limits": {}, "wide limits": {"reac
 SEED = 1
 POSES, ZOOMS = 3600, 9  # crank angles of a curve, and how often the nearest is looked at closer
 EXACT = 1e-9  # errors below this part of the task are none
-# Of the path that a given linkage draws.
-DRAWN = 36
 
 
 @dataclass(frozen=True)
@@ -113,10 +111,7 @@ class Problem:
     @classmethod
     def of(cls, name: str, data: Mapping[str, Any]) -> Self:
         """From the file."""
-        if "drawn_by" in data:
-            points = FourBar.of(data["drawn_by"]).curve(2 * np.pi * np.arange(DRAWN) / DRAWN)
-        else:
-            points = np.array([complex(*point) for point in data["points"]])
+        points = np.array([complex(*point) for point in data["points"]])
         printed = FourBar.of(data["printed"]) if "printed" in data else None
         return cls(
             name, data["title"], data["source"], points, data.get("closed", True), data.get("pivots", ()), printed
@@ -255,10 +250,11 @@ def pages() -> dict[str, str]:
 
 def main() -> None:
     """Find the linkages of these problems, or of all, write them, and print the table."""
-    solved = {name: {limits: bar.data() for limits, bar in bars.items()} for name, bars in found().items()}
+    before, solved = found(), {}
     for problem in problems():
-        if problem.name in sys.argv[1:] or len(sys.argv) == 1 or problem.name not in solved:
-            solved[problem.name] = {name: problem.solve(limits).data() for name, limits in LIMITS.items()}
+        anew = problem.name in sys.argv[1:] or len(sys.argv) == 1 or problem.name not in before
+        bars = {name: problem.solve(limits) for name, limits in LIMITS.items()} if anew else before[problem.name]
+        solved[problem.name] = {name: bar.data() for name, bar in bars.items()}
     head = "# What `python docs/path_problems.py` has found, written as path_problems.yaml has the printed linkages.\n"
     text = yaml.safe_dump(solved, sort_keys=False, width=120, default_flow_style=None)
     FOUND.write_text(head + text, encoding="utf-8")
