@@ -274,9 +274,16 @@ def test_what_cannot_be_live(tmp_path, monkeypatch):
     from mechdesign.door.cli.app import app
 
     monkeypatch.chdir(tmp_path)
-    arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}\n"
-    (tmp_path / "listed.yaml").write_text(arm + "kinematics: {poses: [{arm: 0}, {arm: 30}]}\n")
-    for words, arguments in (("no file that could be saved", ["-"]), ("no motion that can be shown", ["listed.yaml"])):
+    links = "{ground: {O: [0, 0], D: [100, 0]}, a: [O, A, 60], b: [D, A, 80]}"
+    (tmp_path / "truss.yaml").write_text(f"mechanism: {{links: {links}, sketch: {{A: [36, 48]}}, drives: []}}\n")
+    (tmp_path / "task.yaml").write_text(
+        "synthesis: {function: {input: [97, 120, 143], output: [36, 65, 87]}, frame: 100}\n"
+    )
+    for words, arguments in (
+        ("no file that could be saved", ["-"]),
+        ("nothing is driven", ["truss.yaml"]),
+        ("only a task", ["task.yaml"]),
+    ):
         done = CliRunner().invoke(app, ["live", *arguments, "--no-browser"])
         assert done.exit_code == 2
         assert words in done.stderr

@@ -7,6 +7,7 @@ import json
 import math
 import random
 import socket
+import urllib.request
 from contextlib import closing
 
 import pytest
@@ -15,6 +16,7 @@ from mechdesign import load
 from mechdesign.door.live.drag import Drag, dragged
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
+from mechdesign.door.report.page.tracks import steps
 
 FOUR_BAR = """\
 mechanism:
@@ -269,3 +271,29 @@ def test_hostile_names_stay_text():
     page = Session(hostile).page().decode()
     assert name not in page
     assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page
+
+
+def test_a_robot_of_two_drives_turns_by_the_first_and_the_other_is_a_number():
+    links = "{ground: {O: [0, 0]}, upper: [O, A, 100], lower: [A, P, 80]}"
+    drives = "{q1: {angle: upper}, q2: {angle: lower}}"
+    arm = load(text=f"mechanism: {{links: {links}, drives: {drives}, sketch: {{A: [100, 0], P: [100, 80]}}}}")
+    session = Session(arm)
+    assert list(session.held.values()) == ["q2"]
+    (held,) = session.held
+    asked = {**MOVE, "poses": 1, "rows": "A", "changes": {held: 0.0, "lower.length": 50.0}}
+    answer = session.move(asked)
+    # Stretched along the x axis at the first pose, in twentieths of a unit of the drawing.
+    assert steps(answer["data"]["x"]["P"], 1)[0] == pytest.approx(20 * 150, abs=1)
+    # What stands still is no entry of the study.
+    assert answer["set"] == ["mechanism.links.lower.2=50.0"]
+
+
+def test_a_notebook_shows_the_page_in_a_frame():
+    frame = load(text=FOUR_BAR).live()
+    try:
+        assert f'src="{frame.url}"' in frame._repr_html_()
+        with urllib.request.urlopen(frame.url, timeout=20) as page:
+            assert "frame-ancestors" not in page.headers["Content-Security-Policy"]
+            assert b"ground.D.x" in page.read()
+    finally:
+        frame.close()

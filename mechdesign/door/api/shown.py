@@ -19,11 +19,14 @@ from mechdesign.ground.errors import MechdesignError, StudyError, counted, expla
 from mechdesign.ground.files import formats_of, owned
 from mechdesign.ground.results import Result
 from mechdesign.study import Study
+from mechdesign.study.loading import load_bytes, read_file
+from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reading import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechdesign.door.live.frame import LiveFrame
     from mechdesign.drawing.rendering import Gallery
 
 
@@ -43,6 +46,32 @@ class ShownStudy(Study):
         ))  # fmt: skip
         warned = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
         return f"<Study {shown(self.name)}: {words}\n  asks {', '.join(self.questions) or 'no question'}{warned}>"
+
+    def live(self, height: int = 800) -> LiveFrame:
+        """Its page in a frame of a notebook, in which dimensions are dragged; see ``mechdesign live``.
+
+        Parameters
+        ----------
+        height : int
+            Of the frame, in pixels.
+
+        Raises
+        ------
+        MechdesignError
+            If nothing of it moves.
+        """
+        from mechdesign.door.live.frame import LiveFrame
+
+        path, folder = self.path, self.folder
+        if path is None:
+            return LiveFrame(self, None, height)
+
+        def load() -> Study:
+            # The files that it names are read anew, too.
+            again = Folder(folder.path, folder.anywhere, folder.given)
+            return load_bytes(read_file(path), path, self.overrides, self.seed, again)
+
+        return LiveFrame(self, load, height)
 
     def _repr_html_(self) -> str:
         from mechdesign.door.api.html import study_html

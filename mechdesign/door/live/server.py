@@ -17,7 +17,8 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from mechdesign.door.live.session import AskedError, OvertakenError, Session
+from mechdesign.door.live.asked import AskedError
+from mechdesign.door.live.session import OvertakenError, Session
 from mechdesign.ground.errors import explain
 
 _HOST = "127.0.0.1"

@@ -13,22 +13,21 @@ from typing import Any
 import numpy as np
 
 from mechdesign.commands import COMMANDS
+from mechdesign.door.live.asked import AskedError, changes_of, number_of, numbers_of, sheet_of, texts_of
 from mechdesign.door.live.drag import Drag, dragged, free_numbers, value_of
+from mechdesign.door.live.turned import dead_centres, motion_of, turning
 from mechdesign.door.report.page.dark import dark
-from mechdesign.door.report.page.headlines import headlines, shown
-from mechdesign.door.report.page.linkage import Canvas
+from mechdesign.door.report.page.headlines import Headline, headlines, shown
 from mechdesign.door.report.page.moving import moving, posed
 from mechdesign.door.report.page.page import AnsweredQuestion, mover, pose_of, required_of
 from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.door.report.page.tracks import ROWS, joined, steps
-from mechdesign.door.report.requirements import requirements
+from mechdesign.door.report.requirements import Verdict, requirements
 from mechdesign.drawing.before import Before
 from mechdesign.ground.errors import MechdesignError, StudyError, explain
 from mechdesign.ground.files import flowing, proper, replace
 from mechdesign.ground.progress import Progress
-from mechdesign.ground.results import Result
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
 from mechdesign.study.loading import load_bytes
@@ -39,21 +38,15 @@ PACKAGE = "mechdesign.door.live"
 # Questions about one design, in the order in which they are asked first; the others make designs of their own.
 QUESTIONS = ("kinematics", "stiffness", "dynamics", "workspace", "reliability")
 _AS_IT_WAS = "As it was"
-_LARGEST = 1e150  # number that a page may send
 _MOST_ROWS = 20_000  # poses that a page draws
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
 _REACH = 0.6  # of a slider to both sides, as a part of the number
 _WAY = 0.3  # of a slider of a number that is zero, as a part of the mechanism's size
 _STEPS = 400  # of a slider
-_MOST_DEAD = 12  # dead centres that are listed
 
 
 class OvertakenError(Exception):
     """A newer change of the same page made an answer worthless."""
-
-
-class AskedError(Exception):
-    """A request that no page makes."""
 
 
 class _Watched(Progress):
@@ -91,19 +84,40 @@ class Session:
     """
 
     def __init__(self, study: Study, load: Callable[[], Study] | None = None) -> None:
-        self.study, self._load = study, load
+        self._load = load
         self.version, self.mistake = 1, ""
         self.changed = threading.Condition()
         self._computing, self._turns, self._progress = threading.Lock(), dict[str, int](), dict[str, str]()
         self._parts: dict[str, Any] = {}
-        self._first: tuple[int, Result] | None = None
+        self._take(study)
+
+    @np.errstate(all="ignore")
+    def _take(self, study: Study) -> None:
+        """The study of the file from now on, and how it moves."""
+        study.need_mechanism("live")
+        shown, held = study, dict[str, str]()
+        try:
+            first = motion_of(study)
+        except MechdesignError:
+            first = None
+        if first is None:
+            shown, held = turning(study)
+            first = motion_of(shown)
+        if first is None:
+            raise StudyError("the study has no motion that can be shown")
+        self.study, self.shown, self.held, self._first = study, shown, held, first
 
     def reload(self) -> None:
         """Read the file again; where it has mistakes the last study without any stays."""
         assert self._load is not None
         with self.changed:
             try:
-                self.study, self.mistake = self._load(), ""
+                study = self._load()
+                alike = study.text == self.study.text and [*study.inputs()] == [*self.study.inputs()]
+                if alike and not self.mistake:
+                    return
+                self._take(study)
+                self.mistake = ""
             except MechdesignError as error:
                 self.mistake = explain(error)[1]
             self.version += 1
@@ -112,11 +126,8 @@ class Session:
     @np.errstate(all="ignore")
     def page(self) -> bytes:
         """The page of the study as it is in the file."""
-        study = self.study
-        part = moving(study, self._as_it_was(), handled=True)
-        if part is None:
-            raise StudyError("the study has no motion that can be shown: give its kinematics a sweep or a path")
-        data = dict(part.data)
+        study, part = self.study, moving(self.shown, self._first, handled=True)
+        assert part is not None
         questions = self._questions()
         about = {
             "version": self.version, "questions": questions, "length": study.units.label("length"),
@@ -125,7 +136,7 @@ class Session:
         }  # fmt: skip
         return rendered(
             "live.html.j2", package=PACKAGE, parts=("moving", "live"), connect="'self'", drawings=[part.drawing],
-            study=study, part=dataclasses.replace(part, data=data), about=about, groups=self._groups(),
+            study=study, part=part, about=about, groups=self._groups(),
             questions={name: COMMANDS[name].question for name in questions}, mistake=self.mistake,
         )  # fmt: skip
 
@@ -142,33 +153,28 @@ class Session:
     def _groups(self) -> list[tuple[str, list[dict[str, Any]]]]:
         """Numbers that can be changed, by parameters and parts of the mechanism."""
         groups: dict[str, list[dict[str, Any]]] = {}
-        study = self.study
+        study = self.shown
         for name in free_numbers(study):
             value, place = value_of(study, name), study.mechanism.description.places.get(name)
             owner = "parameters" if place is None else str(place.path[1] if len(place.path) > 1 else place.path[0])
+            owner = "drives that stand still" if name in self.held else owner
             reach = _REACH * abs(value)
             if reach == 0.0:
-                lengths = place is None or place.quantity != "angle"
+                lengths = self._unit(name) != study.units.label("angle")
                 reach = _WAY * study.mechanism.size if lengths else 180.0
             low = value - reach if place is None or place.least is None else max(value - reach, 0.0)
             step = 1.0 if name in study.fixed else 10.0 ** math.floor(math.log10(2 * reach / _STEPS))
             groups.setdefault(owner, []).append({
-                "name": name, "value": value, "unit": study.unit_of(name) or "", "low": low, "high": value + reach,
+                "name": name, "label": self.held.get(name, name), "value": value,
+                "unit": self._unit(name), "low": low, "high": value + reach,
                 "step": step,
             })  # fmt: skip
         return sorted(groups.items(), key=lambda group: (group[0] != "parameters", group[0] != GROUND))
 
-    def _as_it_was(self) -> Result:
-        """The motion of the study in the file."""
-        if self._first is None or self._first[0] != self.version:
-            with self._computing:
-                self._first = self.version, import_module(COMMANDS["kinematics"].module).kinematics(self.study)
-        return self._first[1]
-
     @np.errstate(all="ignore")
     def move(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Positions with changed numbers, or with those that a drag changes; with ``wrong`` where there are none."""
-        study, changes, sheet = self.study, _changes(asked), _sheet(asked)
+        study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked)
         self._turn(asked)
         names: tuple[str, ...] = ()
         why = ""
@@ -176,14 +182,14 @@ class Session:
             if not isinstance(drag, Mapping):
                 raise AskedError
             hand = Drag(
-                str(drag.get("point")), complex(*_numbers(drag.get("to"), 2)), _number(drag.get("row")),
-                _texts(drag.get("locked")), _texts(drag.get("held")), _PIXEL / sheet.scale,
+                str(drag.get("point")), complex(*numbers_of(drag.get("to"), 2)), number_of(drag.get("row")),
+                texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
             )  # fmt: skip
             if hand.point not in study.mechanism.points:
                 raise AskedError
             done = dragged(study, changes, hand)
             changes, names, why = dict(done.changes), done.names, done.why
-        count = int(_number(asked.get("poses")))
+        count = int(number_of(asked.get("poses")))
         if not 0 < count <= _MOST_ROWS:
             raise AskedError
         now = variant(study, changes)
@@ -194,7 +200,14 @@ class Session:
                 "set": self.overrides(changes), "words": [self._in_words(now, name) for name in names]}  # fmt: skip
 
     def _in_words(self, study: Study, name: str) -> str:
-        return f"{name} = {shown(value_of(study, name))} {self.study.unit_of(name) or ''}".rstrip()
+        return f"{name} = {shown(value_of(study, name))} {self._unit(name)}".rstrip()
+
+    def _unit(self, name: str) -> str:
+        return self.shown.unit_of(self.held.get(name, name)) or ""
+
+    def _own(self, changes: Mapping[str, float]) -> dict[str, float]:
+        """Changes of the study itself, without the drives that stand still."""
+        return {name: value for name, value in changes.items() if name not in self.held}
 
     @np.errstate(all="ignore")
     def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -205,7 +218,7 @@ class Session:
         OvertakenError
             If the page has asked something newer.
         """
-        changes, question = _changes(asked), asked.get("question")
+        changes, question = changes_of(asked), asked.get("question")
         if question not in self._questions():
             raise AskedError
         page, turn = self._turn(asked)
@@ -225,19 +238,27 @@ class Session:
     def _answered(
         self, question: str, changes: Mapping[str, float], asked: Mapping[str, Any], progress: Progress
     ) -> dict[str, Any]:
-        study = variant(self.study, changes)
-        result: Result = getattr(import_module(COMMANDS[question].module), question)(study, progress=progress)
-        verdicts = requirements(study, result)
-        numbers = headlines(result.seen)
+        study = variant(self.study, self._own(changes))
+        ask = getattr(import_module(COMMANDS[question].module), question)
+        numbers: list[Headline] = []
+        verdicts: tuple[Verdict, ...] = ()
+        moves, result = study, None
+        if question in study.questions or self.shown is self.study:
+            result = ask(study, progress=progress)
+            verdicts, numbers = requirements(study, result), [*headlines(result.seen)]
+        motion = result
+        if question == "kinematics" and self.shown is not self.study:
+            moves = variant(self.shown, changes)
+            motion = ask(moves, progress=progress)
         answered: dict[str, Any] = {"set": self.overrides(changes)}
         key, part = repr((self.version, sorted(changes.items()), asked.get("sheet"))), None
-        if question in ("kinematics", "dynamics"):
+        if motion is not None and question in ("kinematics", "dynamics"):
             before = None
-            if question == "kinematics" and changes and (first := self._first) is not None:
-                before = Before(self.study, first[1].seen, ("", _AS_IT_WAS))
-            sheet = _sheet(asked) if asked.get("sheet") else None
-            marked = [number.place for number in numbers if number.place is not None]
-            part = moving(study, result.seen, before, marked, plain=sheet is not None, sheet=sheet, handled=True)
+            if question == "kinematics" and changes:
+                before = Before(self.shown, self._first.seen, ("", _AS_IT_WAS))
+            sheet = sheet_of(asked) if asked.get("sheet") else None
+            marked = [number.place for number in numbers if number.place is not None] if moves is study else []
+            part = moving(moves, motion.seen, before, marked, plain=sheet is not None, sheet=sheet, handled=True)
         if part is not None:
             whole = dataclasses.asdict(part)
             whole["data"] = dict(whole["data"])
@@ -253,19 +274,20 @@ class Session:
                 answered |= {"data": whole["data"], "drawing": whole["drawing"], "dark": dark([whole["drawing"]])}
                 answered["numbers"] = fragment("numbers.html.j2", PACKAGE, part=whole)
         section = AnsweredQuestion(question, "", 0, verdicts=verdicts)
-        moves = {"kinematics": self._parts["part"]} if self._parts.get("key") == key else {}
+        parts = {"kinematics": self._parts["part"]} if self._parts.get("key") == key else {}
         own = [entry for entry in required_of(study, [section]) if entry["verdict"] is not None]
         answered["html"] = fragment(
             "answer.html.j2", PACKAGE, command=question, question=COMMANDS[question].question, numbers=numbers,
-            required=own, mover=partial(mover, moves), pose_of=pose_of, failed=result.failed,
-            warnings=[*map(str, result.warnings)], dead=_dead_centres(result),
+            required=own, mover=partial(mover, parts), pose_of=pose_of, failed=result.failed if result else "",
+            warnings=[*map(str, result.warnings if result else ())],
+            dead=dead_centres(motion) if motion else (),
         )  # fmt: skip
         return answered
 
     def overrides(self, changes: Mapping[str, float]) -> list[str]:
         """Changes as `--set` takes them, by the entries of the study."""
         now = dict(leaves(plain(self.study.resolved)))
-        changed = leaves(changed_data(self.study, changes))
+        changed = leaves(changed_data(self.study, self._own(changes)))
         return [f"{dotted(keys)}={in_yaml(value)}" for keys, value in changed if keys not in now or now[keys] != value]
 
     @np.errstate(all="ignore")
@@ -274,7 +296,7 @@ class Session:
 
         A file that is there is replaced only where the page says so; ``exists`` asks for it.
         """
-        study, changes = self.study, _changes(asked)
+        study, changes = self.study, self._own(changes_of(asked))
         if study.path is None:
             raise StudyError("the study is no file; copy the changes as --set")
         name = str(asked.get("name") or study.path.name)
@@ -295,6 +317,8 @@ class Session:
                for key, value in variant(study, changes).sizes.items()):  # fmt: skip
             raise StudyError("the changed study could not be written so that it reads the same; nothing was written")
         replace(path, [text.encode()])
+        if own and self._load is not None:
+            self.reload()
         return {"saved": name, "comments": edited(study, data) is not None}
 
     def progress(self, page: str) -> str:
@@ -303,57 +327,8 @@ class Session:
 
     def _turn(self, asked: Mapping[str, Any]) -> tuple[str, int]:
         """The page and the number of its request; older computations for it are overtaken."""
-        page, turn = str(asked.get("page"))[:40], int(_number(asked.get("turn")))
+        page, turn = str(asked.get("page"))[:40], int(number_of(asked.get("turn")))
         if len(self._turns) > 1000:
             self._turns.clear()
         self._turns[page] = max(turn, self._turns.get(page, 0))
         return page, turn
-
-
-def _dead_centres(result: Result) -> list[dict[str, Any]]:
-    """Poses of a motion at which it cannot go on, and where links come into line, in words and by what is given."""
-    listed: list[dict[str, Any]] = []
-    given = DrawnMotion.of(result).shown.poses.values if result.command == "kinematics" else {}
-    words = {"limits": ("kind", "joint"), "toggles": ("links", "state", "effect")}
-    for table in (result.tables[name] for name in words if name in result.tables):
-        for row in range(min(len(table), _MOST_DEAD)):
-            pose = {name: float(table[name][row]) for name in given if name in table}
-            said = ", ".join(text for name in words[table.name] if (text := str(table[name][row])))
-            at = ", ".join(
-                f"{name} = {shown(value)} {table.column(name).unit}".rstrip() for name, value in pose.items()
-            )
-            if pose:
-                listed.append({"words": said, "at": at, "pose": pose})
-    return listed
-
-
-def _changes(asked: Mapping[str, Any]) -> dict[str, float]:
-    changes = asked.get("changes")
-    if not isinstance(changes, Mapping):
-        raise AskedError
-    return {str(name): _number(value) for name, value in changes.items()}
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
-        raise AskedError
-    return float(value)
-
-
-def _numbers(values: Any, count: int) -> list[float]:
-    if not isinstance(values, list) or len(values) != count:
-        raise AskedError
-    return [*map(_number, values)]
-
-
-def _texts(values: Any) -> list[str]:
-    if values is not None and not isinstance(values, list):
-        raise AskedError
-    return [str(value) for value in values or ()]
-
-
-def _sheet(asked: Mapping[str, Any]) -> Canvas:
-    x, y, scale, width, height = _numbers(asked.get("sheet"), 5)
-    if min(scale, width, height) <= 0:
-        raise AskedError
-    return Canvas(complex(x, y), scale, width, height)

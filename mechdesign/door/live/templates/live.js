@@ -228,9 +228,8 @@
 
     // The words beside the hand.
     function put(event) {
-      const box = hand.parentElement.getBoundingClientRect();
-      hand.style.left = `${Math.max(0, Math.min(event.clientX - box.left + 18, box.width - 200))}px`;
-      hand.style.top = `${Math.max(0, event.clientY - box.top + 18)}px`;
+      hand.style.left = `${Math.max(0, Math.min(event.clientX + 18, innerWidth - 220))}px`;
+      hand.style.top = `${Math.max(0, Math.min(event.clientY + 18, innerHeight - 80))}px`;
     }
 
     const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};

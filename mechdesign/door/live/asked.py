@@ -1,0 +1,51 @@
+"""What pages ask, read from plain data; what no page asks is an error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mechdesign.door.report.page.linkage import Canvas
+
+_LARGEST = 1e150  # number that a page may send
+
+
+class AskedError(Exception):
+    """A request that no page makes."""
+
+
+def changes_of(asked: Mapping[str, Any]) -> dict[str, float]:
+    """Changes of a study, by the names of parameters and dimensions."""
+    changes = asked.get("changes")
+    if not isinstance(changes, Mapping):
+        raise AskedError
+    return {str(name): number_of(value) for name, value in changes.items()}
+
+
+def number_of(value: Any) -> float:
+    """A finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
+        raise AskedError
+    return float(value)
+
+
+def numbers_of(values: Any, count: int) -> list[float]:
+    """So many numbers."""
+    if not isinstance(values, list) or len(values) != count:
+        raise AskedError
+    return [*map(number_of, values)]
+
+
+def texts_of(values: Any) -> list[str]:
+    """A list of texts; none where it is left out."""
+    if values is not None and not isinstance(values, list):
+        raise AskedError
+    return [str(value) for value in values or ()]
+
+
+def sheet_of(asked: Mapping[str, Any]) -> Canvas:
+    """The sheet on which the page draws: corner, scale, width and height."""
+    x, y, scale, width, height = numbers_of(asked.get("sheet"), 5)
+    if min(scale, width, height) <= 0:
+        raise AskedError
+    return Canvas(complex(x, y), scale, width, height)
