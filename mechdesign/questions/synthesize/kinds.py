@@ -83,6 +83,12 @@ class Kind:
         places = self.mechanism.description.places.values()
         return tuple(k for k, place in enumerate(places) if place.quantity == "length" and k not in fixed)
 
+    def scale(self, values: Floats, size: float) -> Floats:
+        """By what differences from the values of a linkage count, for a task of a size: lengths and radians."""
+        scale = np.maximum(np.abs(values), size)
+        scale[[*self.directions]] = 1.0
+        return scale
+
     def solve(self, values: Floats, angles: Floats, modes: tuple[int, ...]) -> Configuration:
         """Poses of linkages at values of the drive (radians), shape (count, poses)."""
         if modes not in self._plans:

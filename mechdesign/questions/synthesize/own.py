@@ -56,6 +56,9 @@ class OwnKind(Kind):
         """The assembly of its sketch."""
         return [self.mechanism.forward.modes]
 
+    def scale(self, values: Floats, size: float) -> Floats:
+        return self.high - self.low
+
     def written(self, values: Floats, factor: float) -> Floats:
         return values
 

@@ -22,8 +22,9 @@ from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.schema import SynthesisSection
 from mechdesign.questions.synthesize.sites import Site
 
-# Two linkages whose values differ by less than this part of the task are one.
-_SAME = 1e-5
+# Two linkages whose values differ by less than this part of their scale are one: exact ones, and others, which lie side
+# by side along a valley of the error.
+_SAME, _ALIKE = 1e-5, 0.1
 # Most linkages of a kind and assembly that are compared one by one.
 _MOST = 200
 # An error below this part of the task's size is none.
@@ -241,8 +242,8 @@ def distinct(solutions: Sequence[Solution], size: float) -> list[Solution]:
     seen: dict[tuple[str, tuple[int, ...]], list[Floats]] = {}
     for one in ordered:
         others = seen.setdefault((one.kind.name, one.modes), [])
-        scale = np.maximum(np.abs(one.values), size)
-        if not others or (np.abs(np.array(others) - one.values) / scale).max(axis=1).min() > _SAME:
+        scale, least = one.kind.scale(one.values, size), _SAME if one.error < EXACT * size else _ALIKE
+        if not others or (np.abs(np.array(others) - one.values) / scale).max(axis=1).min() > least:
             others.append(one.values)
             kept.append(one)
     return kept
