@@ -235,6 +235,7 @@ def test_a_server_that_has_ended_is_told_and_what_was_changed_stays(live):
     assert bar.value("ground.D.x") == 100
     # What the browser says of the server that is gone.
     bar.complaints.clear()
+    bar.session.ended = False
     again = LiveServer(bar.session, port)
     again.token = bar.server.token
     again.start()
@@ -243,6 +244,46 @@ def test_a_server_that_has_ended_is_told_and_what_was_changed_stays(live):
     bar.drag("D", 10 * bar.scale, 0)
     assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
     bar.complaints.clear()
+
+
+ARM = """\
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, A, 100], lower: [A, P, 80]}
+  drives: {q1: {angle: upper}, q2: {angle: lower}}
+  sketch: {A: [100, 0], P: [100, 80]}
+workspace: {point: P}
+"""
+
+
+@pytest.mark.nightly
+def test_a_robot_shows_its_workspace_and_follows_a_drive_that_stands_still(live):
+    arm = live(ARM)
+    arm.page.wait_for_selector("#workspace .live-pictures svg, #workspace .live-pictures img", timeout=60_000)
+    area = arm.page.locator("#workspace .numbers").inner_text()
+    # A ring between 20 and 180 mm: 100530 mm2.
+    assert "100\N{NARROW NO-BREAK SPACE}5" in area.replace("\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
+    field = arm.page.locator("[data-name='q2_here'] input[type=number]")
+    field.fill("0")
+    field.blur()
+    arm.answered(arm.page)
+    assert arm.page.locator("#workspace .numbers").inner_text() == area
+    # The study has no such entry.
+    arm.page.get_by_role("button", name="Copy as --set").click()
+    assert "q2" not in arm.page.locator(".live-said").inner_text()
+    arm.drag("A", 0, -10 * arm.scale)
+    assert arm.value("upper.length") != 100
+
+
+@pytest.mark.nightly
+def test_dead_centres_are_marked_along_the_motion_and_lead_there(live):
+    bar = live()
+    marks = bar.page.locator("datalist option").evaluate_all("options => options.map(option => Number(option.value))")
+    assert len(marks) == 2
+    bar.page.locator(".live-dead a").first.click()
+    assert abs(float(bar.page.locator(".moving-controls input[type=range]").input_value()) - marks[0]) <= 1
+    # Crank and rod are in line: A is 30 mm from O towards B, which is 120 mm away and 60 from D.
+    angle = 29.926
+    assert f"theta = {angle:.1f}" in bar.page.locator(".moving-words").inner_text().replace("\xa0", " ")
 
 
 @pytest.mark.nightly

@@ -48,6 +48,9 @@ def live(options: Options) -> int:
             session.reload()
             contents = contents_of({path, *files_named(path, options)})
     terminal.say(f"{path}: ended; {counted(server.close(), 'page')} open", quiet=options.quiet)
+    if server.computing:
+        # Its thread would meet an interpreter that is gone; nothing is being written.
+        os._exit(0)
     return 0
 
 

@@ -24,6 +24,7 @@ from mechdesign.ground.errors import explain
 _HOST = "127.0.0.1"
 _MOST_BYTES = 1_000_000  # of a request
 _WAIT = 20.0  # seconds after which a page asks again whether the file has changed
+_END = 5.0  # seconds that a computation is waited for at the end
 _IDLE = 60.0  # seconds until a connection that says nothing is closed
 _POLICY = re.compile(rb'<meta http-equiv="Content-Security-Policy" content="([^"]+)">')
 _HEADERS = {
@@ -46,7 +47,8 @@ class LiveServer(ThreadingHTTPServer):
         self.session, self.token, self.framed = session, secrets.token_urlsafe(16), framed
         self.waiting: dict[str, int] = {}  # requests by which open pages wait for a change of the file
         self.connections: set[socket.socket] = set()
-        self.lock = threading.Lock()
+        self.computing = 0  # requests that are answered just now
+        self.lock = threading.Condition()
         super().__init__((_HOST, port), _Handler)
 
     @property
@@ -64,11 +66,13 @@ class LiveServer(ThreadingHTTPServer):
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
 
     def close(self) -> int:
-        """End, and return how many pages were open."""
-        with self.lock:
-            count, open_ones = len(self.waiting), [*self.connections]
+        """End, and return how many pages were open; a computation is given some seconds to see that it is over."""
+        self.session.ended = True
         self.shutdown()
         self.server_close()
+        with self.lock:
+            count, open_ones = len(self.waiting), [*self.connections]
+            self.lock.wait_for(lambda: not self.computing, _END)
         for connection in open_ones:
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
@@ -126,10 +130,21 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """What a page asks, as JSON."""
+        server = self.server
+        with server.lock:
+            server.computing += 1
+        try:
+            self._do_post()
+        finally:
+            with server.lock:
+                server.computing -= 1
+                server.lock.notify_all()
+
+    def _do_post(self) -> None:
         if (words := self._admitted()) is None:
             return
         session = self.server.session
-        actions = {"move": session.move, "answer": session.answer, "save": session.save}
+        actions = {"move": session.move, "answer": session.answer, "pictures": session.pictures, "save": session.save}
         if (body := self._body()) is None:
             return
         if len(words) != 1 or words[0] not in actions:

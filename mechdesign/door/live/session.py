@@ -22,11 +22,15 @@ from mechdesign.door.report.page.moving import moving, posed
 from mechdesign.door.report.page.page import AnsweredQuestion, mover, pose_of, required_of
 from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.door.report.page.tracks import ROWS, joined, steps
+from mechdesign.door.report.page.vector import described, picture
 from mechdesign.door.report.requirements import Verdict, requirements
+from mechdesign.drawing import style
 from mechdesign.drawing.before import Before
+from mechdesign.drawing.pictures import figures
 from mechdesign.ground.errors import MechdesignError, StudyError, explain
 from mechdesign.ground.files import flowing, proper, replace
 from mechdesign.ground.progress import Progress
+from mechdesign.ground.results import Result
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
@@ -39,6 +43,8 @@ PACKAGE = "mechdesign.door.live"
 QUESTIONS = ("kinematics", "stiffness", "dynamics", "workspace", "reliability")
 _AS_IT_WAS = "As it was"
 _MOST_ROWS = 20_000  # poses that a page draws
+_MOVING = ("motion", "paths")  # pictures in whose place the mechanism moves
+_MOST_PICTURES = 2  # of a question
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
 _REACH = 0.6  # of a slider to both sides, as a part of the number
 _WAY = 0.3  # of a slider of a number that is zero, as a part of the mechanism's size
@@ -81,14 +87,18 @@ class Session:
         Counts changes of the file; a page of an older version is made anew.
     mistake : str
         What is wrong with the file since it was last right; empty where it is.
+    ended : bool
+        Whether computations are to end, for nobody waits for them.
     """
 
     def __init__(self, study: Study, load: Callable[[], Study] | None = None) -> None:
         self._load = load
-        self.version, self.mistake = 1, ""
+        self.version, self.mistake, self.ended = 1, "", False
         self.changed = threading.Condition()
         self._computing, self._turns, self._progress = threading.Lock(), dict[str, int](), dict[str, str]()
         self._parts: dict[str, Any] = {}
+        # Of the last changes, by page, number of the request and question.
+        self._results: dict[tuple[Any, ...], Result] = {}
         self._take(study)
 
     @np.errstate(all="ignore")
@@ -224,7 +234,7 @@ class Session:
         page, turn = self._turn(asked)
 
         def overtaken() -> bool:
-            return self._turns.get(page) != turn
+            return self.ended or self._turns.get(page) != turn
 
         with self._computing:
             if overtaken():
@@ -245,11 +255,15 @@ class Session:
         moves, result = study, None
         if question in study.questions or self.shown is self.study:
             result = ask(study, progress=progress)
+            kept = {key: other for key, other in self._results.items() if key[:2] == (asked["page"], asked["turn"])}
+            self._results = {**kept, (asked["page"], asked["turn"], question): result}
             verdicts, numbers = requirements(study, result), [*headlines(result.seen)]
         motion = result
         if question == "kinematics" and self.shown is not self.study:
             moves = variant(self.shown, changes)
             motion = ask(moves, progress=progress)
+            # A study that does not ask how it moves has the numbers of the turn that is shown.
+            numbers = numbers if result else [*headlines(motion.seen)]
         answered: dict[str, Any] = {"set": self.overrides(changes)}
         key, part = repr((self.version, sorted(changes.items()), asked.get("sheet"))), None
         if motion is not None and question in ("kinematics", "dynamics"):
@@ -283,6 +297,33 @@ class Session:
             dead=dead_centres(motion) if motion else (),
         )  # fmt: skip
         return answered
+
+    @np.errstate(all="ignore")
+    def pictures(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """The first pictures of the last answer to a question, as they stand in a report.
+
+        Raises
+        ------
+        OvertakenError
+            If the page has asked something newer.
+        """
+        page, turn = self._turn(asked)
+        with self._computing:
+            result = self._results.get((page, turn, asked.get("question")))
+            if result is None or self._turns.get(page) != turn:
+                raise OvertakenError
+            study = variant(self.study, self._own(changes_of(asked)))
+            drawn = dict[str, str]()
+            with style.context():
+                gallery = figures(study, result)
+                for name in [name for name in gallery if name not in _MOVING][:_MOST_PICTURES]:
+                    if self.ended or self._turns.get(page) != turn:
+                        raise OvertakenError
+                    figure = gallery[name]
+                    alt = f"{name.replace('_', ' ')}: {described(figure)}"
+                    drawn[name] = picture(figure, f"{result.command}-{name}", alt)
+        html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
+        return {"html": html, "dark": dark(drawn.values())}
 
     def overrides(self, changes: Mapping[str, float]) -> list[str]:
         """Changes as `--set` takes them, by the entries of the study."""

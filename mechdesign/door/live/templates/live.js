@@ -12,7 +12,10 @@
     const grid = document.querySelector(".live-grid"), dialog = document.querySelector("dialog");
     const rows = new Map([...document.querySelectorAll(".live-number")].map(row => [row.dataset.name, row]));
     const buttons = Object.fromEntries([...document.querySelectorAll("[data-do]")].map(button => [button.dataset.do, button]));
-    const dark = new CSSStyleSheet(), sections = new Map([...document.querySelectorAll("[data-question]")].map(part => [part.dataset.question, part]));
+    const dark = new CSSStyleSheet(), colours = new Map(), sections = new Map([...document.querySelectorAll("[data-question]")].map(part => [part.dataset.question, part]));
+    const marks = Object.assign(document.createElement("datalist"), {id: "live-marks"});
+    figure.append(marks);
+    moving.slider.setAttribute("list", marks.id);
     document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
     let changes = {}, past = [], future = [], set = [], turn = 0, timer = 0, running = false, next = null, asking = null, gesture = null, ended = false;
 
@@ -70,7 +73,7 @@
       next = job;
       if (asking) asking.abort();
       clearTimeout(timer);
-      for (const part of document.querySelectorAll(".live-answer, [data-numbers]")) part.setAttribute("aria-busy", "true");
+      for (const part of document.querySelectorAll(".live-answer, .live-pictures, [data-numbers]")) part.setAttribute("aria-busy", "true");
       if (!running) run();
     }
 
@@ -89,7 +92,9 @@
           set = answer.set;
           moving.take(answer.data, answer.drawing);
           fill();
-          beside([...answer.words, answer.why].filter(Boolean).join("\n"), Boolean(answer.why));
+          const lost = answer.data.gaps.reduce((sum, [first, end]) => sum + end - first + 1, 0);
+          const gaps = lost ? `${answer.data.gaps[0][2]} at ${lost} of ${poses} poses` : "";
+          beside([...answer.words, answer.why, gaps].filter(Boolean).join("\n"), Boolean(answer.why));
         } catch (error) {
           lost(error);
           break;
@@ -133,6 +138,25 @@
           if (own.signal.aborted) state.textContent = "";
         }
       }
+      // Pictures last: they take longer than numbers.
+      for (const question of about.questions) {
+        const room = sections.get(question).querySelector(".live-pictures");
+        try {
+          const answer = await post("pictures", {question, turn: number}, own.signal);
+          if (answer.overtaken && own.signal.aborted) return;
+          room.innerHTML = answer.html || "";
+          if (answer.dark) colour(`${question} pictures`, answer.dark);
+          room.removeAttribute("aria-busy");
+        } catch (error) {
+          if (error.name !== "AbortError") lost(error);
+          return;
+        }
+      }
+    }
+
+    function colour(part, rules) {
+      colours.set(part, rules);
+      dark.replaceSync([...colours.values()].join(""));
     }
 
     function show(question, answer, room, fit) {
@@ -141,11 +165,14 @@
         const numbers = document.querySelector("[data-numbers]");
         numbers.innerHTML = answer.numbers;
         numbers.removeAttribute("aria-busy");
-        dark.replaceSync(answer.dark);
+        colour("drawing", answer.dark);
         moving.take(answer.data, answer.drawing, fit);
       }
       room.innerHTML = answer.html;
-      moving.leading(room);
+      const dead = room.querySelector(".live-dead"), places = dead ? moving.leading(dead) : [];
+      for (const part of room.children) if (part !== dead) moving.leading(part);
+      // Dead centres are marked along the motion.
+      if (question === "kinematics") marks.replaceChildren(...places.map(place => Object.assign(document.createElement("option"), {value: Math.round(place)})));
     }
 
     function lost(error) {

@@ -494,23 +494,26 @@
       return best;
     }
 
-    // Links in a part of the page that lead to a pose.
+    // Links in a part of the page that lead to a pose; returns the places of those that the motion passes.
     function leading(room) {
+      const passed = [];
       for (const link of room.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
         const place = passing(JSON.parse(link.dataset.pose));
-        if (place === null) link.removeAttribute("href");
-        else link.addEventListener("click", event => {
+        if (place === null) { link.removeAttribute("href"); continue; }
+        passed.push(place);
+        link.addEventListener("click", event => {
           event.preventDefault();
           choose(place);
           figure.scrollIntoView({block: "nearest", behavior: calm.matches ? "auto" : "smooth"});
         });
       }
+      return passed;
     }
 
     // Shows the motion anew by other data, of places alone or with all numbers, at the pose where it is. Of the drawing
     // stays what is marked to stay, unless `whole` is asked.
     figure.moving = {
-      drawing, leading, stop: player.stop, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
+      drawing, slider, leading, stop: player.stop, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
       rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
       take(next, markup, entire) {
         const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
