@@ -57,7 +57,7 @@ class OwnKind(Kind):
         return [self.mechanism.forward.modes]
 
     def scale(self, values: Floats, size: float) -> Floats:
-        return self.high - self.low
+        return np.asarray(self.high - self.low)
 
     def written(self, values: Floats, factor: float) -> Floats:
         return values
