@@ -106,7 +106,7 @@
 
     function beside(words, wrong) {
       hand.textContent = words;
-      hand.hidden = !words || !(gesture || wrong);
+      hand.hidden = !words || !gesture;
       hand.classList.toggle("wrong", wrong);
       if (words) tell(words.replaceAll("\n", ", "));
     }
@@ -239,13 +239,12 @@
         ring.classList.remove("held");
         while (running) await new Promise(resolve => setTimeout(resolve, 5));
         gesture = null;
-        if (!hand.classList.contains("wrong")) hand.hidden = true;
+        hand.hidden = true;
         remember(before);
         fill();
       };
       const listeners = [["pointermove", moved], ["pointerup", done], ["pointercancel", done]];
       for (const [kind, call] of listeners) ring.addEventListener(kind, call);
-      put(event);
     }
 
     function within(event) {
