@@ -283,7 +283,12 @@ def test_dead_centres_are_marked_along_the_motion_and_lead_there(live):
     assert abs(float(bar.page.locator(".moving-controls input[type=range]").input_value()) - marks[0]) <= 1
     # Crank and rod are in line: A is 30 mm from O towards B, which is 120 mm away and 60 from D.
     angle = 29.926
+    drive = bar.page.get_by_role("spinbutton", name="theta deg")
     assert f"theta = {angle:.1f}" in bar.page.locator(".moving-words").inner_text().replace("\xa0", " ")
+
+    drive.fill("120")
+    drive.blur()
+    assert "theta = 120.0" in bar.page.locator(".moving-words").inner_text().replace("\xa0", " ")
 
 
 @pytest.mark.nightly

@@ -16,8 +16,20 @@
     const marks = Object.assign(document.createElement("datalist"), {id: "live-marks"});
     figure.append(marks);
     moving.slider.setAttribute("list", marks.id);
+    // A drive has a number as well, where its value is what gives the pose.
+    for (const [[name], unit] of moving.data().keys.filter(key => key.length === 1).map(([key]) => [key, unitOf(key[0])]).slice(0, 1)) {
+      const field = Object.assign(document.createElement("input"), {type: "number", step: "any", className: "live-pose"});
+      const label = document.createElement("label");
+      label.append(`${name} `, field, ` ${unit}`);
+      moving.slider.after(label);
+      field.addEventListener("change", () => {
+        if (field.value !== "" && !moving.go({[name]: Number(field.value)})) tell(`${name} = ${field.value} is no pose of the motion`);
+      });
+    }
     document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
     let changes = {}, past = [], future = [], set = [], turn = 0, timer = 0, running = false, next = null, asking = null, gesture = null, ended = false;
+
+    function unitOf(name) { return (moving.data().given.find(([own]) => own === name) || ["", ""])[1]; }
 
     async function post(action, asked, signal) {
       const body = JSON.stringify({version: about.version, page, changes, ...asked});
