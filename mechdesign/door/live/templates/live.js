@@ -58,7 +58,6 @@
       buttons.redo.disabled = !future.length;
       buttons.reset.disabled = buttons.copy.disabled = !some;
       buttons.save.disabled = !some || !about.file;
-      sessionStorage.setItem(KEEP, JSON.stringify({changes, version: about.version, page: location.pathname}));
     }
 
     // One entry of the history for each gesture, with the changes before it.
@@ -379,6 +378,11 @@
     if (kept.page === location.pathname) for (const [name, value] of Object.entries(kept.changes)) {
       if (rows.has(name) && Number(rows.get(name).querySelector("input").dataset.value) !== value) changes[name] = value;
     }
+    if (kept.page === location.pathname) {
+      moving.slider.value = kept.pose;
+      moving.slider.dispatchEvent(new Event("input"));
+    }
+    addEventListener("pagehide", () => sessionStorage.setItem(KEEP, JSON.stringify({changes, pose: moving.row(), page: location.pathname})));
     fill();
     if (Object.keys(changes).length) move({}); else ask();
     watch();
