@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import html
 import http.client
 import json
 import math
 import random
+import re
 import socket
 import urllib.request
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +21,7 @@ from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
 from mechdesign.door.report.page.tracks import steps
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 FOUR_BAR = """\
 mechanism:
   links:                              # a point of two links is the pin between them
@@ -286,6 +290,33 @@ def test_a_robot_of_two_drives_turns_by_the_first_and_the_other_is_a_number():
     assert steps(answer["data"]["x"]["P"], 1)[0] == pytest.approx(20 * 150, abs=1)
     # What stands still is no entry of the study.
     assert answer["set"] == ["mechanism.links.lower.2=50.0"]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "name",
+    ["five_bar", "gallery/watt", "gallery/cam_dwell", "gallery/planetary", "gallery/rrr_platform", "gallery/klann",
+     "gallery/flywheel_press", "gallery/scara", "gallery/braked_pendulum"],
+)  # fmt: skip
+def test_every_point_of_shipped_studies_can_be_dragged_and_the_quick_questions_are_answered(name):
+    session = Session(load(CONFIGS / f"{name}.yaml"))
+    page = html.unescape(session.page().decode())
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page)[1])
+    asked = {key: data[key] for key in ("poses", "rows")} | {"page": "p", "changes": {}}
+    asked |= {"sheet": [*data["corner"], data["scale"], 520, 400]}
+    points = json.loads(re.search(r'id="live-data">(.*?)</script>', page)[1])["points"]
+    moved = 0
+    for turn, point in enumerate(points):
+        here = [data["corner"][0] + steps(data["x"][point], 1)[0] / 20 / data["scale"],
+                data["corner"][1] - steps(data["y"][point], 1)[0] / 20 / data["scale"]]  # fmt: skip
+        away = 0.01 * session.study.mechanism.size
+        drag = {"point": point, "to": [here[0] + away, here[1] - away], "row": data["first"]}
+        answer = session.move({**asked, "turn": turn, "drag": drag})
+        assert answer["words"] or answer["why"]
+        moved += bool(answer["changes"])
+    assert moved >= len(points) / 2
+    for turn, question in enumerate({"kinematics", "dynamics", "stiffness"}.intersection(session.study.questions)):
+        assert session.answer({**asked, "turn": 100 + turn, "question": question})["html"]
 
 
 def test_a_notebook_shows_the_page_in_a_frame():

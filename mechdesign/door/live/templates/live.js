@@ -16,8 +16,20 @@
     const marks = Object.assign(document.createElement("datalist"), {id: "live-marks"});
     figure.append(marks);
     moving.slider.setAttribute("list", marks.id);
+    // A drive has a number as well, where its value is what gives the pose.
+    for (const [[name], unit] of moving.data().keys.filter(key => key.length === 1).map(([key]) => [key, unitOf(key[0])]).slice(0, 1)) {
+      const field = Object.assign(document.createElement("input"), {type: "number", step: "any", className: "live-pose"});
+      const label = document.createElement("label");
+      label.append(`${name} `, field, ` ${unit}`);
+      moving.slider.after(label);
+      field.addEventListener("change", () => {
+        if (field.value !== "" && !moving.go({[name]: Number(field.value)})) tell(`${name} = ${field.value} is no pose of the motion`);
+      });
+    }
     document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
     let changes = {}, past = [], future = [], set = [], turn = 0, timer = 0, running = false, next = null, asking = null, gesture = null, ended = false;
+
+    function unitOf(name) { return (moving.data().given.find(([own]) => own === name) || ["", ""])[1]; }
 
     async function post(action, asked, signal) {
       const body = JSON.stringify({version: about.version, page, changes, ...asked});
@@ -46,7 +58,6 @@
       buttons.redo.disabled = !future.length;
       buttons.reset.disabled = buttons.copy.disabled = !some;
       buttons.save.disabled = !some || !about.file;
-      sessionStorage.setItem(KEEP, JSON.stringify({changes, version: about.version, page: location.pathname}));
     }
 
     // One entry of the history for each gesture, with the changes before it.
@@ -106,7 +117,7 @@
 
     function beside(words, wrong) {
       hand.textContent = words;
-      hand.hidden = !words || !(gesture || wrong);
+      hand.hidden = !words || !gesture;
       hand.classList.toggle("wrong", wrong);
       if (words) tell(words.replaceAll("\n", ", "));
     }
@@ -239,13 +250,12 @@
         ring.classList.remove("held");
         while (running) await new Promise(resolve => setTimeout(resolve, 5));
         gesture = null;
-        if (!hand.classList.contains("wrong")) hand.hidden = true;
+        hand.hidden = true;
         remember(before);
         fill();
       };
       const listeners = [["pointermove", moved], ["pointerup", done], ["pointercancel", done]];
       for (const [kind, call] of listeners) ring.addEventListener(kind, call);
-      put(event);
     }
 
     function within(event) {
@@ -368,6 +378,11 @@
     if (kept.page === location.pathname) for (const [name, value] of Object.entries(kept.changes)) {
       if (rows.has(name) && Number(rows.get(name).querySelector("input").dataset.value) !== value) changes[name] = value;
     }
+    if (kept.page === location.pathname) {
+      moving.slider.value = kept.pose;
+      moving.slider.dispatchEvent(new Event("input"));
+    }
+    addEventListener("pagehide", () => sessionStorage.setItem(KEEP, JSON.stringify({changes, pose: moving.row(), page: location.pathname})));
     fill();
     if (Object.keys(changes).length) move({}); else ask();
     watch();

@@ -513,7 +513,8 @@
     // Shows the motion anew by other data, of places alone or with all numbers, at the pose where it is. Of the drawing
     // stays what is marked to stay, unless `whole` is asked.
     figure.moving = {
-      drawing, slider, leading, stop: player.stop, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
+      drawing, slider, leading, stop: player.stop,
+      go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; }, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
       rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
       take(next, markup, entire) {
         const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
