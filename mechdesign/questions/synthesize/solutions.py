@@ -24,7 +24,7 @@ from mechdesign.questions.synthesize.sites import Site
 
 # Two linkages whose values differ by less than this part of their scale are one: exact ones, and others, which lie side
 # by side along a valley of the error.
-_SAME, _ALIKE = 1e-5, 0.1
+_SAME, _ALIKE = 1e-5, 0.02
 # Most linkages of a kind and assembly that are compared one by one.
 _MOST = 200
 # An error below this part of the task's size is none.
