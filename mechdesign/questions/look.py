@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from importlib import import_module
+from typing import Any
 
 from mechdesign.commands import COMMANDS
 from mechdesign.ground.results import Result
@@ -17,9 +18,9 @@ SAMPLES = 2
 INSTANT = 1e-6
 
 
-def ask(study: Study, command: str) -> Result:
-    """A command's answer."""
-    result: Result = getattr(import_module(COMMANDS[command].module), command)(study)
+def ask(study: Study, command: str, **options: Any) -> Result:
+    """A command's answer, with options of its function."""
+    result: Result = getattr(import_module(COMMANDS[command].module), command)(study, **options)
     return result
 
 

@@ -9,6 +9,7 @@ import sys
 import urllib.request
 
 import pytest
+from helpers.studies import COMMENTED_FOUR_BAR
 
 from mechdesign import kinematics, load
 from mechdesign.door.live.server import LiveServer
@@ -21,17 +22,9 @@ except ImportError:
 
 pytestmark = pytest.mark.browser
 
-FOUR_BAR = """\
-mechanism:
-  links:
-    ground: {O: [0, 0], D: [100, 0]}  # the pivots
-    crank: [O, A, 30]
-    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
-    rocker: [D, B, 60]
-  drives: {theta: {angle: crank}}
-  sketch: {A: [0, 30], B: [75, 55]}
-kinematics: {outputs: [P, rocker.angle], rates: {theta: 60 rpm}}
-requirements: [{result: kinematics.rocker.angle, at_most: 160}]
+FOUR_BAR = f"""\
+{COMMENTED_FOUR_BAR}kinematics: {{outputs: [P, rocker.angle], rates: {{theta: 60 rpm}}}}
+requirements: [{{result: kinematics.rocker.angle, at_most: 160}}]
 """
 
 

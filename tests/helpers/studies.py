@@ -74,6 +74,12 @@ mechanism:
   drives: {theta: {angle: crank}}
   sketch: {A: [0, 30], B: [75, 55]}
 """
+# The same with comments, which stay where a program changes a number.
+COMMENTED_FOUR_BAR = (
+    FOUR_BAR.lstrip()
+    .replace("  links:", "  links:                              # a point of two links is the pin between them")
+    .replace("D: [100, 0]}", "D: [100, 0]}  # the pivots")
+)
 
 
 def study_of(text: str, *overrides: str) -> mechdesign.Study:

@@ -14,6 +14,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from helpers.studies import COMMENTED_FOUR_BAR
 
 from mechdesign import load
 from mechdesign.door.live.drag import Drag, dragged
@@ -22,17 +23,9 @@ from mechdesign.door.live.session import Session
 from mechdesign.door.report.page.tracks import steps
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-FOUR_BAR = """\
-mechanism:
-  links:                              # a point of two links is the pin between them
-    ground: {O: [0, 0], D: [100, 0]}  # the pivots
-    crank: [O, A, 30]
-    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
-    rocker: [D, B, 60]
-  drives: {theta: {angle: crank}}
-  sketch: {A: [0, 30], B: [75, 55]}
-kinematics: {sweep: {theta: {from: 0, to: 360, step: 10}}, outputs: [P, rocker.angle]}
-requirements: [{result: kinematics.rocker.angle, at_most: 160}]
+FOUR_BAR = f"""\
+{COMMENTED_FOUR_BAR}kinematics: {{sweep: {{theta: {{from: 0, to: 360, step: 10}}}}, outputs: [P, rocker.angle]}}
+requirements: [{{result: kinematics.rocker.angle, at_most: 160}}]
 """
 START = 0j, 100 + 0j, 30.0, 90.0, 60.0
 

@@ -8,22 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.studies import FOUR_BAR
 from PIL import Image
 
 import mechdesign
 
 ROOT = Path(__file__).parents[2]
-MECHANISM = """
-mechanism:
-  parameters: {rise: 90, fast: 0.3}
-  links:
-    ground: {O: [0, 0], D: [100, 0]}
-    crank: [O, A, 30]
-    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
-    rocker: [D, B, 60]
-  drives: {theta: {angle: crank}}
-  sketch: {A: [0, 30], B: [75, 55]}
-"""
+MECHANISM = FOUR_BAR.replace("  links:", "  parameters: {rise: 90, fast: 0.3}\n  links:")
 ARM = """
 mechanism:
   links:

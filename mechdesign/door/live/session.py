@@ -7,7 +7,6 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from mechdesign.ground.files import flowing, proper, replace
 from mechdesign.ground.progress import Progress
 from mechdesign.ground.results import Result
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.look import ask
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
 from mechdesign.study.loading import load_bytes
@@ -249,19 +249,18 @@ class Session:
         self, question: str, changes: Mapping[str, float], asked: Mapping[str, Any], progress: Progress
     ) -> dict[str, Any]:
         study = variant(self.study, self._own(changes))
-        ask = getattr(import_module(COMMANDS[question].module), question)
         numbers: list[Headline] = []
         verdicts: tuple[Verdict, ...] = ()
         moves, result = study, None
         if question in study.questions or self.shown is self.study:
-            result = ask(study, progress=progress)
+            result = ask(study, question, progress=progress)
             kept = {key: other for key, other in self._results.items() if key[:2] == (asked["page"], asked["turn"])}
             self._results = {**kept, (asked["page"], asked["turn"], question): result}
             verdicts, numbers = requirements(study, result), [*headlines(result.seen)]
         motion = result
         if question == "kinematics" and self.shown is not self.study:
             moves = variant(self.shown, changes)
-            motion = ask(moves, progress=progress)
+            motion = ask(moves, question, progress=progress)
             # A study that does not ask how it moves has the numbers of the turn that is shown.
             numbers = numbers if result else [*headlines(motion.seen)]
         answered: dict[str, Any] = {"set": self.overrides(changes)}

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from mechdesign.commands import COMMANDS
 from mechdesign.door.report.page.headlines import shown
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.results import Result
 from mechdesign.motion.motion import in_study_units
 from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.look import ask
 from mechdesign.study import Study
 from mechdesign.study.variants import with_entries
 
@@ -23,7 +22,7 @@ _MOST_DEAD = 12  # dead centres that are listed
 
 def motion_of(study: Study) -> Result | None:
     """The motion of a study's kinematics; None where its poses do not follow one another."""
-    result: Result = import_module(COMMANDS["kinematics"].module).kinematics(study)
+    result = ask(study, "kinematics")
     return result if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.followed else None
 
 

@@ -25,7 +25,8 @@ def centre_points_picture(view: View) -> Picture | None:
     drawn, best = DrawnSolutions.of(view.result), view.result.tables["solutions"]
     task, links = Positions(drawn.places, drawn.directions), np.asarray(best["kind"]) == "four_bar"
     pole, panels = task.poles, []
-    body = (pole - task.places[np.triu_indices(4, 1)[0]]) / task.rotations[np.triu_indices(4, 1)[0]]
+    first = np.triu_indices(4, 1)[0]
+    body = (pole - task.places[first]) / task.rotations[first]
     for name, title, own, places, joints in (
         ("centre", "pivots in the frame", pole, task.places, ("ground.O", "ground.D")),
         ("circle", "pins in the body", body, np.zeros(1, dtype=complex), ("coupler.A", "coupler.B")),

@@ -15,6 +15,7 @@ from mechdesign.drawing.scene import Still, sketched
 from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.errors import MechdesignError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.ground.numerics.fronts import front
 from mechdesign.questions.poses import solve_shown
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.declared import in_words
@@ -80,10 +81,8 @@ def trade(view: View) -> Picture | None:
     if len(table) < 2:
         return None
     whole = np.flatnonzero(~faulty)
-    better = (errors[whole] < errors[whole, None]) & (angles[whole] >= angles[whole, None])
-    better |= (errors[whole] <= errors[whole, None]) & (angles[whole] > angles[whole, None])
-    front = whole[~better.any(axis=1)]
-    order = front[np.argsort(angles[front])]
+    best = whole[front(np.column_stack([errors[whole], -angles[whole]]))]
+    order = best[np.argsort(angles[best])]
     marks: list[PanelMark] = [
         Trace(angles[order], errors[order], label="front: no other without a defect is better in both",
               look={"color": style.BLUE, "drawstyle": "steps-pre", "linewidth": 1.2}),
