@@ -17,8 +17,7 @@ def test_the_version_tells_those_of_what_numbers_come_from(invoke):
     told = invoke("--version").stdout
     libraries = ", ".join(f"{name} {version(name.lower())}" for name in ("NumPy", "SciPy", "Matplotlib"))
     assert told == (
-        f"mechdesign {mechdesign.__version__}\n"
-        f"Python {platform.python_version()} on {platform.system()}, {libraries}\n"
+        f"mechdesign {mechdesign.__version__}\nPython {platform.python_version()} on {platform.system()}, {libraries}\n"
     )
 
 

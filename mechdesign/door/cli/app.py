@@ -107,7 +107,13 @@ def _show_version(show: bool) -> None:
 @app.callback()
 def _start(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the versions of mechdesign and of what its numbers come from, and exit.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_show_version,
+            is_eager=True,
+            help="Print the versions of mechdesign and of what its numbers come from, and exit.",
+        ),
     ] = False,
 ) -> None:
     """Options before the command."""
