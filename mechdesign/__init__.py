@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from mechdesign.ground.versions import installed
+        from mechdesign.ground.versions import VERSION
 
-        return installed("mechdesign")
+        return VERSION
     if name == "__all__":
         return __dir__()
     from mechdesign.commands import QUESTIONS

@@ -1,4 +1,4 @@
-"""Versions of what is installed."""
+"""The version of mechdesign, and versions of what is installed beside it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 import sysconfig
 from functools import cache
 from pathlib import Path
+
+VERSION = "1.0.0"  # Written here alone: the build reads it.
 
 
 @cache

@@ -95,16 +95,25 @@ def _guard() -> Iterator[None]:
 
 def _show_version(show: bool) -> None:
     if show:
-        import mechdesign
+        from platform import python_version, system
 
-        print(f"mechdesign {mechdesign.__version__}")
+        from mechdesign.ground.versions import VERSION, installed
+
+        libraries = ", ".join(f"{name} {installed(name.lower())}" for name in ("NumPy", "SciPy", "Matplotlib"))
+        print(f"mechdesign {VERSION}\nPython {python_version()} on {system()}, {libraries}")
         raise typer.Exit
 
 
 @app.callback()
 def _start(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_show_version,
+            is_eager=True,
+            help="Print the versions of mechdesign and of what its numbers come from, and exit.",
+        ),
     ] = False,
 ) -> None:
     """Options before the command."""

@@ -21,7 +21,7 @@ from mechdesign.door.report.tables import json_text, plain
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.files import check_own, check_writable, digest, file_names, proper, unsettled
 from mechdesign.ground.results import Result
-from mechdesign.ground.versions import installed
+from mechdesign.ground.versions import VERSION, installed
 from mechdesign.study import Study
 
 NAME = "manifest.json"
@@ -70,7 +70,7 @@ def whole(directory: Path) -> dict[str, Any]:
 def _versions() -> dict[str, dict[str, str]]:
     libraries = {name: installed(name) for name in _LIBRARIES}
     return {
-        "tool": {"name": _TOOL, "version": installed(_TOOL)},
+        "tool": {"name": _TOOL, "version": VERSION},
         "libraries": {"python": platform.python_version(), **libraries},
     }
 

@@ -18,7 +18,7 @@ from operator import length_hint
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, cast
 
 from mechdesign.ground.errors import MechdesignError
-from mechdesign.ground.versions import installed
+from mechdesign.ground.versions import VERSION, installed
 from mechdesign.ground.work import interrupts
 from mechdesign.ground.work.start import inherit
 from mechdesign.ground.work.threads import keep_freed_memory, one_thread
@@ -257,7 +257,7 @@ def _is_loss(error: BaseException | None) -> bool:
 def _version() -> str:
     """Versions on which values depend besides the work itself."""
     python = ".".join(platform.python_version_tuple()[:2])
-    return ", ".join([f"Python {python}", *(f"{name} {installed(name)}" for name in ("mechdesign", "numpy", "scipy"))])
+    return f"Python {python}, mechdesign {VERSION}, numpy {installed('numpy')}, scipy {installed('scipy')}"
 
 
 @lru_cache(maxsize=4)

@@ -28,7 +28,7 @@ from mechdesign.drawing.mechanism import sketch_picture
 from mechdesign.drawing.scene import sketched
 from mechdesign.ground.errors import explain
 from mechdesign.ground.terms import path_of
-from mechdesign.ground.versions import installed
+from mechdesign.ground.versions import VERSION
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.questions.synthesize.words import task as task_in_words
@@ -155,7 +155,7 @@ def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, 
 def index(entries: Sequence[IndexEntry]) -> bytes:
     """The page of several studies, a row each: first those that will not do, then by their names."""
     entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
-    return rendered("index.html.j2", entries=entries, version=installed("mechdesign"))
+    return rendered("index.html.j2", entries=entries, version=VERSION)
 
 
 def _sketch(study: Study) -> str:
