@@ -1,10 +1,13 @@
-"""The files for CI servers and clusters that the site shows: they parse, and so does every command in them."""
+"""Files for CI servers and clusters, those of this repository and those that the site shows: they parse, and what they
+run is there."""
 
 from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer.main
@@ -12,28 +15,73 @@ import yaml
 
 from mechdesign.door.cli.app import app
 
-FOLDER = Path(__file__).parents[2] / "docs" / "ci"
+ROOT = Path(__file__).parents[2]
+SHOWN = sorted((ROOT / "docs" / "ci").iterdir())
+OURS = sorted((ROOT / ".github" / "workflows").iterdir())
 GROUP = typer.main.get_command(app)
+# What a scheduler or a server sets.
+VARIABLE = re.compile(r"\$\{\{[^}]*\}\}|\$\{?\w+\}?")
 
 
-def commands(path: Path) -> list[list[str]]:
-    """Commands of this package in a file, their variables replaced by what a scheduler sets."""
+def workflow(path: Path) -> dict[Any, Any]:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def steps(path: Path) -> Iterator[dict[str, Any]]:
+    for job in workflow(path)["jobs"].values():
+        yield from job["steps"]
+
+
+def lines(path: Path) -> list[str]:
+    """What a file runs, line by line, each variable replaced by a number."""
     text = path.read_text(encoding="utf-8")
-    lines = (
-        [step["run"] for job in yaml.safe_load(text)["jobs"].values() for step in job["steps"] if "run" in step]
-        if path.suffix == ".yml"
-        else text.splitlines()
-    )
-    text = re.sub(r"\$\{?\w+\}?", "8", "\n".join(lines))
-    found = re.findall(r"(?m)^(?:\s*exec )?\s*mechdesign (.*?)(?: \|\| true)?$", text)
-    return [shlex.split(line) for line in found]
+    run = "\n".join(step.get("run", "") for step in steps(path)) if path.suffix == ".yml" else text
+    return VARIABLE.sub("8", run).splitlines()
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in FOLDER.iterdir()))
-def test_every_command_line_is_one(name: str) -> None:
-    found = commands(FOLDER / name)
-    assert len(found) >= 2
-    for command, *arguments in found:
+@pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.name)
+def test_every_command_line_of_a_shown_file_is_one(path: Path) -> None:
+    found = [re.match(r"\s*(?:exec )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
+    commands = [shlex.split(line[1]) for line in found if line]
+    assert len(commands) >= 2
+    for command, *arguments in commands:
         assert command in GROUP.commands
         # What is unknown, or lacks, is an error.
         GROUP.commands[command].make_context(command, arguments)
+
+
+@pytest.mark.parametrize("path", [*SHOWN[:1], *OURS], ids=lambda path: path.name)
+def test_a_workflow_may_read_alone_ends_and_says_which_actions_it_takes(path: Path) -> None:
+    content = workflow(path)
+    assert content["permissions"] == {"contents": "read"}
+    for job in content["jobs"].values():
+        assert job["timeout-minutes"] <= 360  # more a hosted runner does not give
+        assert {job.get("needs")} <= {None, *content["jobs"]}
+    for step in steps(path):
+        assert ("run" in step) != ("uses" in step)
+        assert re.fullmatch(r"actions/[\w-]+@v\d+", step.get("uses", "actions/checkout@v4"))
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)
+def test_our_workflows_run_what_a_desk_runs(path: Path) -> None:
+    """Scripts of `.ci` alone, with files of tests that exist, for each value of a matrix."""
+    for job in workflow(path)["jobs"].values():
+        searches = job.get("strategy", {}).get("matrix", {}).get("search", [""])
+        for run in [step["run"] for step in job["steps"] if "run" in step]:
+            for search in searches:
+                shell, script, *arguments = shlex.split(run.replace("${{ matrix.search }}", search))
+                assert shell == "bash"
+                assert (ROOT / script).read_text(encoding="utf-8").startswith("#!/usr/bin/env bash")
+                assert arguments[:1] in ([], ["nightly"], ["tests"])
+                assert all((ROOT / argument).exists() for argument in arguments if argument.startswith("tests/"))
+
+
+def test_every_random_search_goes_on_for_an_hour_at_night() -> None:
+    (searches,) = (
+        job["strategy"]["matrix"]["search"]
+        for job in workflow(ROOT / ".github/workflows/nightly.yml")["jobs"].values()
+        if "strategy" in job
+    )
+    assert {f"test_hunt_{search}.py" for search in searches} == {
+        path.name for path in (ROOT / "tests/hunt").glob("test_*.py")
+    }
