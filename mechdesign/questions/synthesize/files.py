@@ -62,7 +62,7 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
     # Between the positions, all round, made linkages need only be assembled.
     around, wished = solution.angles, _plain(task.targets(solution)[1][output])
     if solution.full_turn:
-        around = np.concatenate([around, around.min() + np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)])
+        around = np.concatenate([around, around.min() + 2 * np.pi * np.arange(1, _AROUND) / _AROUND])
     order = np.argsort(around, kind="stable")
     wished = [*wished, *[None] * (len(around) - len(wished))]
     judged = study.resolved["synthesis"]["judge"]
