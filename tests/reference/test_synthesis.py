@@ -132,9 +132,43 @@ def test_a_path_is_met_as_well_as_by_the_best_known_linkage(name: str, seed: int
 
 
 @pytest.mark.nightly
+def test_a_yield_is_the_share_of_made_curves_that_pass_near_the_points() -> None:
+    """Made four-bars in closed form, each curve at every quarter of a degree: its distance from every point."""
+    names = [f"{name}.{part}" for name in ("ground.O", "ground.D") for part in "xy"]
+    names += ["crank.length", "coupler.length", "rocker.length", "coupler.P.x", "coupler.P.y"]
+    judge = {"tolerance": 0.006, "within": 0.04, "best": 4, "samples": 1000}
+    table = solved({**path_task("eighteen"), "judge": judge, "solutions": 4}).tables["solutions"]
+    points = np.array([complex(*point) for point in CASES["eighteen"]["points"]])
+    random, theta = np.random.default_rng(3), np.radians(np.arange(0, 360, 0.25))[:, None]
+    for row in range(len(table)):
+        nominal = np.array([table[name][row] for name in names])[:, None]
+        drawn = [coupler_curve(nominal, theta, side) for side in (1, -1)]
+        gaps = [np.abs(curve - points).min(axis=0) for curve in drawn]
+        side = (1, -1)[int(np.argmin([gap.max() for gap in gaps]))]
+        assert min(gap.max() for gap in gaps) == pytest.approx(table["max_error"][row], rel=0.01)
+        good = 0
+        for _ in range(4):
+            curve = coupler_curve(nominal + random.normal(0, 0.002, (9, 500)), theta, side)
+            near = [np.abs(curve - point).min(axis=0) <= 0.04 for point in points]
+            good += int((np.isfinite(curve).all(axis=0) & np.all(near, axis=0)).sum())
+        assert table["yield_low"][row] - 0.03 < good / 2000 < table["yield_high"][row] + 0.03
+
+
+def coupler_curve(values: Any, theta: Any, side: float) -> Any:
+    """Places of P, nan where the four-bar cannot be assembled, of dimensions of shape (9, linkages)."""
+    crank = values[0] + 1j * values[1] + values[4] * np.exp(1j * theta)
+    frame = values[2] + 1j * values[3] - crank
+    away = np.abs(frame)
+    along = (away**2 + values[5] ** 2 - values[6] ** 2) / (2 * away)
+    room = values[5] ** 2 - along**2
+    coupler = (along + 1j * side * np.sqrt(np.where(room >= 0, room, np.nan))) * frame / away / values[5]
+    return crank + coupler * (values[7] + 1j * values[8])
+
+
+@pytest.mark.nightly
 def test_a_fit_that_stops_to_turn_once_it_is_made_ranks_below_a_robust_one() -> None:
     # Own, with eighteen points: the best fit has a transmission angle of 1.2 deg, and 40 % of those made cannot turn.
-    judge = {"tolerance": 0.006, "within": 0.03}
+    judge = {"tolerance": 0.006, "within": 0.05}
     table = solved({**path_task("eighteen"), "judge": judge, "rank": "yield"}).tables["solutions"]
     best = int(table["error"].argmin())
     assert table["transmission_angle"][best] < 3
@@ -189,6 +223,6 @@ def test_the_pairs_of_log10_are_those_of_freudensteins_linkage() -> None:
 def test_of_the_curve_of_eighteen_points_the_robust_linkage_stands_before_the_best_fit() -> None:
     table = mechdesign.synthesize(study_named("robust_curve")).tables["solutions"]
     best = int(table["error"].argmin())
-    assert (table["transmission_angle"][best] < 5, table["yield"][best] < 0.5) == (True, True)
+    assert (table["transmission_angle"][best] < 5, table["yield"][best] < 0.7) == (True, True)
     assert (table["transmission_angle"][0] > 60, table["yield"][0] > 0.99) == (True, True)
     assert table["error"][0] < 1.01 * table["error"][best]

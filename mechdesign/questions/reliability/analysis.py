@@ -146,7 +146,7 @@ def _settings(task: Task, errors: Errors, parts: Sequence[SolvedPoses]) -> list[
                 scale = (x, y) if x[1] > 0 and y[1] > 0 else None
             settings.append(
                 Setting(
-                    task.question.at(task.nominal[:, row]), row, mechanism,
+                    task.question.take(row).at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
                     None if task.elastic is None else task.elastic.take([row]).of(whole, task.question.vectors),

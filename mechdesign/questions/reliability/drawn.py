@@ -107,9 +107,10 @@ def drawn_errors(task: Task, values: PoseValues, sums: Mapping[int, Sums]) -> Dr
 def _limits(task: Task) -> dict[tuple[str, str], tuple[ArrayLike, ArrayLike]]:
     output, order, _ = task.labels
     return {
-        (str(output[k]), str(order[k])): ((-limit.high if limit.round else limit.low) * scale, limit.high * scale)
-        for limit in task.question.at(task.nominal).limits for k in limit.channels for scale in (task.scale[k],)
-    }  # fmt: skip
+        (str(output[k]), str(order[k])): (low * task.scale[k], high * task.scale[k])
+        for limit in task.question.at(task.nominal).limits
+        for k, low, high in limit.box
+    }
 
 
 def _samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:

@@ -21,7 +21,7 @@ from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cau
 from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel, force_model, pace
 from mechdesign.questions.reliability.lengths import model_of
-from mechdesign.questions.reliability.question import ReliabilityQuestion, ask
+from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, ask
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Sources
@@ -56,7 +56,7 @@ class Errors(PoseQuestion):
             If nothing varies.
         """
         sources, doubts = find_sources(study, poses)
-        question = ask(study, poses.section(ReliabilitySection.of(study)))
+        question = ask(study, poses.section(ReliabilitySection.of(study)), poses)
         bent, notes = elasticity(study, poses)
         if bent is not None:
             notes += cautions(study, bent, question.channels)
@@ -78,6 +78,8 @@ class Errors(PoseQuestion):
         parts = {"nominal": (channels,), "components": (channels, len(self.sources.directions[1]))}
         if self.elasticity is not None:
             parts["flexibility"] = (channels, 3)
+        if self.question.free is not None:
+            parts["by_drive"] = (channels,)
         return {name: np.zeros((0, *shape)) for name, shape in parts.items()}
 
     def values(self, part: SolvedPoses) -> Mapping[str, Any]:
@@ -87,6 +89,10 @@ class Errors(PoseQuestion):
             "nominal": nominal, "components": linear.components, "closing": closing.components,
             "margins": closing.offset,
         } | ({} if elastic is None else {"flexibility": elastic.flexibility})  # fmt: skip
+        if self.question.free is not None:
+            mechanism, whole = self.study.mechanism, self.question.whole
+            by_drive = derivatives(mechanism, part.configuration, whole, mechanism.drives, self.rates(part))
+            arrays["by_drive"] = by_drive[:, 0]
         return {name: np.moveaxis(values, -1, 0) for name, values in arrays.items()}
 
     def linearized(
@@ -114,6 +120,22 @@ class Errors(PoseQuestion):
         moved = [k for k, name in enumerate(names) if name not in LOADS]
         margins, by_name = closures(self.study.mechanism.linearize(configuration), [names[k] for k in moved])
         return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
+
+
+def _freed(limit: Limit, components: Floats, offset: Floats, by_drive: Floats, nominal: Floats) -> None:
+    """Let the drive follow the errors, so that a point comes nearest to its target: its error is across its path.
+
+    Parameters
+    ----------
+    components, offset, by_drive, nominal : ndarray, shapes (channels, components, poses) and thrice (channels, poses)
+        Derivatives of the channels by the sources, which change as the errors without a source do, and by the drive.
+    """
+    pair = [*limit.channels]
+    speed = by_drive[pair]
+    square = np.where(np.isfinite(limit.high) & (speed**2 > 0).any(axis=0), (speed**2).sum(axis=0), np.inf)
+    away = nominal[pair] + offset[pair] - np.stack(limit.middle)
+    components -= by_drive[:, None] * (np.einsum("cp,czp->zp", speed, components[pair]) / square)
+    offset -= by_drive * ((speed * away).sum(axis=0) / square)
 
 
 def _chained(slopes: Floats, by_name: Floats) -> Floats:
@@ -146,6 +168,8 @@ def linear_task(values: PoseValues) -> Task:
     assembled = np.isin(values.reason, (Reason.OK, Reason.LIMIT))
     reason = np.where(assembled & ~held, np.int8(Reason.NOT_HELD), values.reason)
     components[:, :, ~np.isin(reason, (Reason.OK, Reason.LIMIT))] = np.nan
+    if question.free is not None:
+        _freed(question.free, components, offset, arrays["by_drive"], nominal)
     model = model_of(question, FirstOrder(errors.sources, components, offset), nominal)
     closing = FirstOrder(
         errors.sources, arrays.get("closing", components[:0]), arrays.get("margins", np.zeros((0, count)))

@@ -134,8 +134,7 @@ def _conditions(choices: _Choices) -> tuple[list[Floats], Floats] | None:
         return None
     poses = [setting.pose for setting in model.task.settings]
     linear, question = model.task.linear.take(poses), model.task.question.at(model.task.nominal[:, poses])
-    bands = [(channel, -limit.high if limit.round else limit.low, limit.high)
-             for limit in question.limits for channel in limit.channels]  # fmt: skip
+    bands = [side for limit in question.limits for side in limit.box]
     mean, parts = linear.shift(), np.nan_to_num(linear.share() * (linear.deviation() ** 2)[:, None])
     variances: list[list[Floats]] = [[] for _ in free]
     most = []

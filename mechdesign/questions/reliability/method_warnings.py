@@ -158,8 +158,12 @@ def disagreements(results: Sequence[MethodResult], task: Task) -> Iterator[Cauti
 def _unseen(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Warnings of methods without a failed sample, with the upper end of the interval."""
     cases = []
+    # Where nothing is limited nothing need fail.
+    limited = np.zeros(task.poses.count, dtype=bool)
+    for limit in task.question.limits:
+        limited |= np.isfinite(limit.high) | np.isfinite(limit.low)
     for result in results:
-        poses = {pose: e for pose, e in result.estimates.items() if e.samples and not e.failures}
+        poses = {pose: e for pose, e in result.estimates.items() if e.samples and not e.failures and limited[pose]}
         if poses:
             pose, widest = max(poses.items(), key=lambda item: item[1].high)
             where = f"at {task.where(pose)}" if len(poses) == 1 else f"at {len(poses)} poses"

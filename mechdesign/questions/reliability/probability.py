@@ -100,6 +100,7 @@ def estimated_failure(covariance: Floats, limits: Sequence[Limit], mean: Floats 
         Zero if left out.
     """
     mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
+    mean, limits = _about_circles(mean, limits)
     bands, discs = _kinds(limits)
     if len(bands) <= 2 and not discs:
         ends = [standard_ends(band, covariance, mean) for band in bands]
@@ -127,6 +128,21 @@ def estimated_failure(covariance: Floats, limits: Sequence[Limit], mean: Floats 
         here = _kinds([limit.at(place) for limit in limits])
         failure[place], doubt[place] = _of_several(covariance[place], *here, mean[place])
     return failure, doubt
+
+
+def _about_circles(mean: Floats, limits: Sequence[Limit]) -> tuple[Floats, list[Limit]]:
+    """Means and limits of errors that count from the middle of the circle that holds them."""
+    away = {k: part for limit in limits if limit.round for k, part in zip(limit.channels, limit.middle, strict=True)}
+    if not any(np.any(part) for part in away.values()):
+        return mean, [*limits]
+    mean = mean.copy()
+    for channel, part in away.items():
+        mean[..., channel] -= part
+    return mean, [
+        replace(limit, middle=(0.0, 0.0)) if limit.round
+        else replace(limit, low=limit.low - away.get(limit.output, 0.0), high=limit.high - away.get(limit.output, 0.0))
+        for limit in limits
+    ]  # fmt: skip
 
 
 def _kinds(limits: Sequence[Limit]) -> tuple[list[Limit], list[Limit]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,17 +11,18 @@ from typing import Any
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
-from mechdesign.ground.errors import MechanismError
+from mechdesign.ground.errors import MechanismError, StudyError
 from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.motion.rows import Poses
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.reliability.corners import Bend, bends, vector_of
 from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends
 from mechdesign.questions.reliability.laws import at_rows
-from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
+from mechdesign.questions.reliability.schema.limits import SUFFIXES, ErrorLimit, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS as QUANTITIES
@@ -89,20 +91,47 @@ def _judged(found: Iterable[Bend]) -> tuple[Bend, ...]:
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits low <= error <= high of a channel, or of two: of the length of their errors, a circle or ring about zero.
+    """Limits low <= error <= high of a channel, or of two: of the distance of their errors from the middle of a circle
+    or ring.
 
-    Either end may be infinite, or an array of poses. If `absolute`, they limit the value of the channel itself.
+    Either end may be infinite, and it and the middle an array of poses. If `absolute`, they limit the value of the
+    channel itself, or the middle is a place. If `free`, the drive of a made mechanism stands where its point comes
+    nearest to the middle.
     """
 
     channels: tuple[int, ...]
     low: Any
     high: Any
     absolute: bool = False
+    middle: tuple[Any, Any] = (0.0, 0.0)
+    free: bool = False
 
     @property
     def round(self) -> bool:
         """Whether it is a circle or ring."""
         return len(self.channels) > 1
+
+    @property
+    def box(self) -> list[tuple[int, Any, Any]]:
+        """Each channel with its lowest and highest error, those of a circle by itself."""
+        if not self.round:
+            return [(self.output, self.low, self.high)]
+        return [(k, part - self.high, part + self.high) for k, part in zip(self.channels, self.middle, strict=True)]
+
+    def distance(self, errors: Floats) -> Floats:
+        """Distance of errors, shape (channels, n), from the middle of the circle."""
+        x, y = self.away(errors)
+        return np.asarray(np.hypot(x, y))
+
+    @property
+    def origin(self) -> str:
+        """From where a circle counts, in words."""
+        return "the target" if np.any(self.middle) else "no error"
+
+    def away(self, errors: Floats) -> tuple[Floats, Floats]:
+        """The vector from the middle of the circle to errors, shape (channels, n)."""
+        (one, other), (x, y) = self.channels, self.middle
+        return errors[one] - x, errors[other] - y
 
     @property
     def output(self) -> int:
@@ -111,7 +140,8 @@ class Limit:
 
     def at(self, poses: Any) -> Limit:
         """The limit at one pose or some, by an index of the arrays of poses."""
-        return replace(self, low=at_rows(self.low, poses), high=at_rows(self.high, poses))
+        x, y = (at_rows(part, poses) for part in self.middle)
+        return replace(self, low=at_rows(self.low, poses), high=at_rows(self.high, poses), middle=(x, y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,9 +200,14 @@ class ReliabilityQuestion:
         return [(k, [next(places) for _ in bend.arguments], bend)
                 for k, channel in enumerate(self.channels) for bend in channel.bends]  # fmt: skip
 
-    def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
+    def take(self, poses: int | Sequence[int] | Ints) -> ReliabilityQuestion:
         """The question at these poses, where limits are arrays of poses."""
         return replace(self, limits=tuple(limit.at(poses) for limit in self.limits))
+
+    @property
+    def free(self) -> Limit | None:
+        """The limit of a point for whose target the drive is free."""
+        return next((limit for limit in self.limits if limit.free), None)
 
     @property
     def single(self) -> list[ReliabilityQuestion]:
@@ -185,13 +220,17 @@ class ReliabilityQuestion:
         An angle is taken at the turn nearest to the middle of its two absolute limits.
         """
         return replace(self, limits=tuple(
-            self._about(limit, nominal[limit.output]) if limit.absolute else limit for limit in self.limits
+            self._about(limit, nominal) if limit.absolute else limit for limit in self.limits
         ))  # fmt: skip
 
-    def _about(self, limit: Limit, value: Any) -> Limit:
+    def _about(self, limit: Limit, nominal: Sequence[Any] | Floats) -> Limit:
+        if limit.round:
+            x, y = (part - nominal[k] for k, part in zip(limit.channels, limit.middle, strict=True))
+            return replace(limit, middle=(x, y), absolute=False)
+        value = nominal[limit.output]
         channel, middle = self.channels[limit.output], 0.5 * (limit.low + limit.high)
-        if channel.order == 0 and channel.turns and np.isfinite(middle).all():
-            value = value - TURN * np.round((value - middle) / TURN)
+        if channel.order == 0 and channel.turns:
+            value = value - TURN * np.where(np.isfinite(middle), np.round((value - middle) / TURN), 0.0)
         return Limit(limit.channels, limit.low - value, limit.high - value)
 
     @cached_property
@@ -215,21 +254,22 @@ class ReliabilityQuestion:
         for row, limit in zip(kept, self.limits, strict=True):
             error = errors[limit.output]
             if limit.round:
-                row[:] = error * error + errors[limit.channels[1]] ** 2 <= limit.high * limit.high
+                x, y = limit.away(errors)
+                row[:] = x * x + y * y <= limit.high * limit.high
             else:
                 row[:] = (error >= limit.low) & (error <= limit.high)
         return kept
 
     @property
     def _ends(self) -> list[tuple[Limit, float, float]]:
-        """Finite ends of the limits, and 1 for an upper or -1 for a lower one."""
-        return [(limit, end, sign) for limit in self.limits for end, sign in ((limit.high, 1.0), (limit.low, -1.0))
-                if np.isfinite(end)]  # fmt: skip
+        """Finite ends of the limits, or an infinite one, and 1 for an upper or -1 for a lower one."""
+        every = [(limit, end, sign) for limit in self.limits for end, sign in ((limit.high, 1.0), (limit.low, -1.0))]
+        return [one for one in every if np.isfinite(one[1])] or every[:1]
 
     def margins(self, errors: Floats) -> Floats:
         """Distances of errors, shape (channels, n), from the finite ends and circles, negative beyond, (margins, n)."""
         return np.stack([
-            sign * (end - (np.hypot(*errors[[*limit.channels]]) if limit.round else errors[limit.output]))
+            sign * (end - (limit.distance(errors) if limit.round else errors[limit.output]))
             for limit, end, sign in self._ends
         ])  # fmt: skip
 
@@ -239,7 +279,7 @@ class ReliabilityQuestion:
         for limit, _, sign in self._ends:
             slope = slopes[limit.output]
             if limit.round:
-                x, y = errors[[*limit.channels]]
+                x, y = limit.away(errors)
                 slope = (x * slope + y * slopes[limit.channels[1]]) / np.hypot(x, y)
             gradients.append(-sign * slope)
         return np.stack(gradients)
@@ -250,8 +290,8 @@ def columns_among(channels: Sequence[Channel]) -> list[str]:
     return [channel.name for channel in channels if channel.coordinate is None]
 
 
-def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
-    """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
+def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQuestion:
+    """Channels and limits of a section at poses; limited coordinates are outputs, too."""
     mechanism, kinds, last = study.mechanism, kinds_of_forces(study), ORDERS.index(OF_DYNAMICS)
     limits = [(name, last, limit) if name in kinds else (*_limited(mechanism, name), limit)
               for name, limit in section.limits.items()]  # fmt: skip
@@ -276,20 +316,51 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
     asked = []
     for base, order, limit in limits:
+        targets = None if limit.targets is None else _targets(study, base, limit, poses)
         if limit.radius is not None:
-            asked.append(Limit((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius))
+            circle = Limit((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius)
+            if targets is not None:
+                radius, (x, y) = np.where(np.isnan(targets[0]), np.inf, limit.radius), np.nan_to_num(targets)
+                circle = replace(circle, high=radius, absolute=True, middle=(x, y), free=limit.timing == "free")
+            asked.append(circle)
             continue
         output = places[base, order]
         factor = study.units.angle_factor if channels[output].turns else 1.0
-        low, high = (bound if value is None else value * factor
-                     for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True))  # fmt: skip
-        asked.append(Limit((output,), low, high, limit.absolute))
+        ends: list[Any] = []
+        for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True):
+            end = bound if value is None else value * factor
+            ends.append(end if targets is None else np.where(np.isnan(targets[0]), bound, factor * targets[0] + end))
+        asked.append(Limit((output,), ends[0], ends[1], limit.absolute or targets is not None))
     asked.sort(key=lambda limit: limit.round)
     alone = len({limit.round for limit in asked}) < 2
     pair = [k for limit in asked for k in limit.channels] if alone else []
     if not limited:
         pair = [k for k, channel in enumerate(channels) if channel.order in (0, last)]
     return ReliabilityQuestion(tuple(channels), tuple(asked), (pair[0], pair[1]) if len(pair) == 2 else None)
+
+
+def _targets(study: Study, name: str, limit: ErrorLimit, poses: Poses) -> Floats:
+    """Targets of a limit by its coordinates, shape (1 or 2, poses), in the study's units; nan where there is none.
+
+    Of several, one for each pose, places between the poses have none.
+
+    Raises
+    ------
+    StudyError
+        Where they are not as many as poses.
+    """
+    targets = limit.targets or ()
+    count = math.prod(poses.rule.grid)
+    if len(targets) not in (1, count):
+        message = f"{len(targets)} targets for {count} poses: give one for all, or one for each"
+        raise StudyError((study.problem(message, "reliability", "limits", name, "target"),))
+    size = 1 if limit.radius is None else 2
+    parts = [target if isinstance(target, tuple) else (np.nan if target is None else target,) * size
+             for target in targets]  # fmt: skip
+    table = np.stack([np.broadcast_arrays(*row, np.empty(poses.count))[:-1] for row in parts])
+    at = 0.0 * poses.numbers if len(targets) == 1 else poses.numbers
+    row = np.round(at).astype(np.intp)
+    return np.where(at == row, table[row, :, np.arange(poses.count)].T, np.nan)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

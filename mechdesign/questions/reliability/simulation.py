@@ -13,13 +13,14 @@ from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
 from mechdesign.questions.reliability.first_order import derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import ReliabilityQuestion
+from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
 from mechdesign.questions.reliability.sources import Made, Sources
 
 # Samples of a chunk.
@@ -34,6 +35,8 @@ _DENSITY_CHUNKS = 50
 _TREND_STEP = 1000
 # Number of first chunks, whose errors are also kept for the histogram.
 _TREND_CHUNKS = 16
+# Rounds in which a free drive is set, and its largest step, radians.
+_SET, _LARGEST_STEP = 3, 0.1
 # Step of the difference quotients by the standard normal variables, in standard deviations.
 _SOURCE_STEP = 1e-5
 
@@ -109,8 +112,29 @@ def solve(setting: Setting, made: Made) -> Configuration:
     nominal = setting.nominal
     drives = [value + made.drives.get(name, 0.0) for name, value in setting.drives.items()]
     solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
+    free = setting.question.free
+    if free is not None and np.isfinite(free.high):
+        for _ in range(_SET):
+            drives = [drives[0] - _late(setting, free, solved)]
+            solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
     loads = [] if setting.forces is None else setting.forces.coordinates
     return solved.beside(nominal, [*setting.question.coordinates, *loads])
+
+
+def _late(setting: Setting, limit: Limit, solved: Configuration) -> Floats:
+    """By how much the drive stands behind the place at which a point comes nearest to its target."""
+    mechanism, by_drive = setting.mechanism, setting.mechanism.linearize(solved).by_drives[0]
+    along: Value = 0.0
+    square: Value = 0.0
+    for k, middle in zip(limit.channels, limit.middle, strict=True):
+        coordinate = setting.question.channels[k].coordinate
+        assert coordinate is not None
+        speed = first(solved, coordinate, by_drive)
+        along = along + speed * (solved.value(coordinate) - setting.centres[k] - middle)
+        square = square + speed**2
+    late = np.where(square > 0, along / square, 0.0)
+    largest = _LARGEST_STEP if mechanism.quantity(mechanism.drives[0]) == "angle" else np.inf
+    return np.clip(late, -largest, largest)
 
 
 def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:

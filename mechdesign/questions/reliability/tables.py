@@ -171,7 +171,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
         low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (own.low, own.high))
     both = np.isfinite(low) & np.isfinite(high)
     cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
-    cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
+    cpk = np.where(np.isfinite(low) | np.isfinite(high), np.minimum(high - mean, mean - low) / (3.0 * sigma), np.nan)
     upper = np.where(np.isfinite(high), np.where(rounds, 0.0, nominal) + high, np.nan)
     estimates = [_by_limit(task, result, single) for result in results]
     failure, least, most = (

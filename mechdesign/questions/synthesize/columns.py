@@ -17,7 +17,8 @@ SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("transmission_angle", "smallest over a turn where the drive turns fully, else on the way through the "
      "task; 0 at a dead centre", "angle"),
     ("size", "greatest extent of pivots and pins along x or y at the positions", "length"),
-    ("yield", "share of made linkages that deviate from the drawn one by no more than the limit, at every position"),
+    ("yield", "share of made linkages that miss the task by no more than the limit at every position, and can be "
+     "assembled all round where the drawn one turns"),
     ("yield_low", "lower end of its interval"), ("yield_high", "upper end of its interval"),
     ("peak_effort", "greatest effort of the drive on its way through the task under the loads of `judge`", "moment"),
     ("score", "sum of the ranks' shares of their ranges, by their weights; 1 is the best"),

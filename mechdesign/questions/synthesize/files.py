@@ -59,20 +59,25 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
         data["dynamics"] = {"loads": study.resolved["synthesis"]["judge"]["loads"]}
     if judge is None or judge.within is None:
         return data
-    around = solution.angles
+    # Between the positions, all round, made linkages need only be assembled.
+    around, wished = solution.angles, _plain(task.targets(solution)[1][output])
     if solution.full_turn:
-        around = np.concatenate([around, around.min() + np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)])
+        around = np.concatenate([around, around.min() + 2 * np.pi * np.arange(1, _AROUND) / _AROUND])
+    order = np.argsort(around, kind="stable")
+    wished = [*wished, *[None] * (len(around) - len(wished))]
     judged = study.resolved["synthesis"]["judge"]
     tolerances = dict(judged.get("dimensions", {}))
     if judge.tolerance is not None:
         lengths = [place for place, declared in places.items()
                    if declared.quantity == "length" and place not in task.apart]  # fmt: skip
         tolerances = dict.fromkeys(lengths, float(judge.tolerance)) | tolerances
-    limit = {output: {"radius": float(judge.within)} if output == kind.point else float(judge.within)}
-    path = {kind.drive: _plain(np.unique(around / factor).tolist())}
+    within = float(judge.within)
+    limit: dict[str, Any] = {"radius": within} if output == kind.point else {"min": -within, "max": within}
+    limit |= {"target": [wished[k] for k in order.tolist()], **({"timing": "free"} if task.free else {})}
+    path = {kind.drive: _plain((around[order] / factor).tolist())}
     data["reliability"] = {
-        "dimensions": tolerances, "path": path, "outputs": [output], "limits": limit, "methods": ["monte_carlo"],
-        "samples": judge.samples, "sobol": 0,
+        "dimensions": tolerances, "path": path, "outputs": [output], "limits": {output: limit},
+        "methods": ["monte_carlo"], "samples": judge.samples, "sobol": 0,
     }  # fmt: skip
     if judge.clearances:
         data["reliability"]["clearances"] = judged["clearances"]

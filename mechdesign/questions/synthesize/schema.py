@@ -173,8 +173,8 @@ class JudgeSection(fields.Model):
     clearances: dict[str, Clearance] = Field(default_factory=dict)
     """Clearances of joints, as ``reliability.clearances`` takes them. Example: {A: {radial: 0.02}}"""
     within: Annotated[float, fields.number(None, 0.0, exclusive=True)] | None = None
-    """By how much a made linkage may deviate from the drawn one, at the positions and over a full turn; of a path the
-    distance of its point. How far the drawn one is from the task is its ``max_error``. Example: 0.5 mm
+    """By how much a made linkage may miss the task at each position, counted as ``error`` is: of a path the distance of
+    the point from its curve, or with ``timing`` from where it stands then. Example: 0.5 mm
     """
     loads: tuple[Load, ...] = ()
     """Forces and moments under which the peak effort of the drive is told, as ``dynamics.loads`` takes them. Example:

@@ -135,12 +135,13 @@ def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
     """
     assert samples.pair is not None
     if samples.limits and samples.limits[0].round:
-        radius = samples.limits[0].high
-        words = f"limit: {radius:g} {samples.units[samples.pair[0]]}".rstrip() + " from no error"
+        circle = samples.limits[0]
+        radius, middle = circle.high, np.array(circle.middle)[:, None]
+        words = f"limit: {radius:g} {samples.units[samples.pair[0]]}".rstrip() + f" from {circle.origin}"
         if radius >= _FAR_FROM_ERRORS * reach.max():
             return np.zeros((2, 0)), words, f"{words}, outside"
         turn = np.linspace(0.0, 2 * np.pi, 181)
-        return radius * np.stack([np.cos(turn), np.sin(turn)]), words, ""
+        return middle + radius * np.stack([np.cos(turn), np.sin(turn)]), words, ""
     limits, sides, far = (
         {limit.output: (limit.low, limit.high) for limit in samples.limits},
         list[list[float]](),

@@ -49,9 +49,9 @@ def _histograms(samples: Samples, table: Table) -> list[tuple[Panel, Panel]]:
     panels, ends = [], {limit.output: (limit.low, limit.high) for limit in samples.limits if not limit.round}
     for limit in samples.limits:
         if limit.round:
-            distance = np.hypot(*samples.errors[[*limit.channels]])
+            distance = limit.distance(samples.errors)
             edges = np.linspace(distance.min(), distance.max(), _BINS + 1)
-            name = f"{samples.outputs[limit.output].rpartition('.')[0]}: distance from no error"
+            name = f"{samples.outputs[limit.output].rpartition('.')[0]}: distance from {limit.origin}"
             panels.append(_panels(samples, limit.output, name, distance, edges, None, (limit.low, limit.high)))
     for k, (output, order) in enumerate(zip(samples.outputs.tolist(), samples.orders.tolist(), strict=True)):
         rows = table.where(output=output, order=order)

@@ -74,7 +74,7 @@ def run(task: Task) -> MethodResult:
 
 
 def _at_pose(steps: Floats, law: Cumulants, task: Task, setting: Setting) -> tuple[Floats, Floats]:
-    question, count = task.question, len(task.question.channels)
+    question, count = setting.question, len(task.question.channels)
     # Components of lengths are smooth; their moments are of values, not of errors.
     smooth = replace(question, channels=question.whole)
     elastic = None if task.elastic is None else task.elastic.take([setting.pose]).of(question.whole, smooth.vectors)

@@ -143,6 +143,8 @@ class ReliabilitySection(MotionSection):
         }
         for name, limit in self.limits.items():
             _limit(checker, self, name, limit, columns)
+        if sum(limit.timing == "free" for limit in self.limits.values()) > 1:
+            checker.report(("reliability", "limits"), "one drive is free to follow one point")
         for index, correlated in enumerate(self.correlation):
             for place, name in enumerate((correlated.one, correlated.other)):
                 checker.check_name(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
@@ -315,6 +317,8 @@ def _limit(
     base, order = split_order(name, names.__contains__)
     if order and not section.rated:
         report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
+    if limit.timing == "free" and (order or len(mechanism.drives) != 1 or checker.parts.get("stiffness") is not None):
+        report((*path, "timing"), "the time is free of the places of a rigid mechanism of one drive")
     if limit.radius is not None:
         if checker.check_name(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])
