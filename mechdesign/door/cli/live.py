@@ -17,8 +17,10 @@ from mechdesign.door.cli.watch import await_change, contents_of, files_named
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
 from mechdesign.ground.errors import StudyError, counted
+from mechdesign.ground.work.threads import one_thread
 
 
+@one_thread()
 def live(options: Options) -> int:
     """Serve the page of a study until an interrupt, and read the study again whenever it is saved. Returns 0.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ _NOTHING = "."
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
 _SMALL, _LARGE = 1e-4, 1e7
-_COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
+_EXACT = 2.0**53  # integers below it are exact as numbers of 64 bits
 
 
 @dataclass(frozen=True)
@@ -136,9 +137,10 @@ def meanings(table: Table) -> dict[str, str]:
 
 
 def _size(values: Floats) -> float:
-    """How large the numbers of a column usually are."""
-    sizes = np.abs(values[np.isfinite(values)])
-    return float(np.quantile(sizes, _COMMON) or sizes.max()) if len(sizes) else 0.0
+    """How large the numbers of a column usually are: the median of their absolute values, but for zero."""
+    sizes = np.sort(np.abs(values[np.isfinite(values)]))
+    count = len(sizes)
+    return float(sizes[(count - 1) // 2] / 2 + sizes[count // 2] / 2 or sizes[-1]) if count else 0.0
 
 
 def deltas(values: Floats, factor: float) -> str:
@@ -147,15 +149,14 @@ def deltas(values: Floats, factor: float) -> str:
     A step s is 2 s, or -2 s - 1 where it is negative, in digits to the base 32, the lowest first; all but the last of
     them are 32 more. Where there is no value stands a point; steps of zero at the end are left out.
     """
-    letters: list[str] = []
-    last = 0
-    for value in (values * factor).tolist():
-        if math.isfinite(value):
-            step, last = round(value) - last, round(value)
-            letters.append(_letters(2 * step if step >= 0 else -2 * step - 1))
-        else:
-            letters.append(_NOTHING)
-    return "".join(letters).rstrip(_letters(0))
+    scaled = values * factor
+    finite = np.isfinite(scaled)
+    integers: Any = np.rint(scaled[finite])
+    exact = np.abs(integers).max(initial=0.0) < _EXACT
+    integers = integers.astype(np.int64) if exact else np.array([*map(int, integers.tolist())], dtype=object)
+    steps = np.diff(integers, prepend=0)
+    letters = map(_letters, np.where(steps >= 0, 2 * steps, -2 * steps - 1).tolist())
+    return "".join([next(letters) if known else _NOTHING for known in finite.tolist()]).rstrip(_letters(0))
 
 
 def steps(text: str, count: int) -> Floats:
@@ -220,6 +221,7 @@ def _values(track: str, count: int) -> Floats:
     return np.where(gone, np.nan, steps(track, count))
 
 
+@lru_cache(4096)
 def _letters(number: int) -> str:
     letters = ""
     while number >= _BASE:
