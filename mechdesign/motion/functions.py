@@ -270,11 +270,10 @@ class Functions(Means):
         """Places at which functions times a sign go to plus infinity: lane, piece, place in it, infinity."""
         poles: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
         poled = np.flatnonzero(self._poled[rows])
-        divisors, sizes = self._divisor[rows[poled]], self._divisor_scale[rows[poled]][:, self.pieces.line]
+        divisors, scale = self._divisor[rows[poled]], self._divisor_scale[rows[poled]][:, self.pieces.line]
         # A divisor whose constant outweighs all of its other terms comes nowhere near zero.
-        series = np.abs(chebyshev.series(divisors))
-        clear = series[..., 0] - series[..., 1:].sum(axis=2) > 2 * ZERO_AT_FOLD * sizes
-        near = (divisors != 1.0).any(axis=2) & ~clear
+        terms = np.abs(chebyshev.series(divisors))
+        near = (divisors != 1.0).any(axis=2) & ~(2 * terms[..., 0] - terms.sum(axis=2) > 2 * ZERO_AT_FOLD * scale)
         for j in np.flatnonzero(near.any(axis=1)).tolist():
             k, some = poled[j], np.flatnonzero(near[j])
             line, fold = self.pieces.line[some], self.pieces.fold[some]

@@ -136,6 +136,7 @@
           const answer = await post("answer", {question, turn: number, sheet: fit === true && question === "kinematics" ? null : sheet()}, own.signal);
           if (answer.outdated) { location.reload(); return; }
           if (own.signal.aborted || answer.overtaken) return;
+          about.questions = answer.order || about.questions;
           warn(about.mistake);
           if (answer.wrong) room.replaceChildren(Object.assign(document.createElement("p"), {className: "failed", textContent: answer.wrong}));
           else show(question, answer, room, fit === true);
