@@ -67,7 +67,8 @@ class LiveServer(ThreadingHTTPServer):
 
     def close(self) -> int:
         """End, and return how many pages were open; a computation is given some seconds to see that it is over."""
-        self.session.ended = True
+        for session in (self.session, *self.session.linkages.values()):
+            session.ended = True
         self.shutdown()
         self.server_close()
         with self.lock:
@@ -112,19 +113,20 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """The page, or what a page waits for."""
-        if (words := self._admitted()) is None:
+        if (admitted := self._admitted()) is None:
             return
+        session, words = admitted
         if words == [""]:
             try:
-                page = self.server.session.page()
+                page = session.page()
             except Exception as error:
                 self._send(HTTPStatus.OK, f"{explain(error)[1]}\n".encode(), "text/plain; charset=utf-8")
                 return
             self._send(HTTPStatus.OK, page, "text/html; charset=utf-8")
         elif len(words) == 3 and words[0] == "changes" and words[1].isdigit():
-            self._wait(int(words[1][:9]), words[2][:40])
+            self._wait(session, int(words[1][:9]), words[2][:40])
         elif len(words) == 2 and words[0] == "progress":
-            self._reply({"progress": self.server.session.progress(words[1])})
+            self._reply({"progress": session.progress(words[1])})
         else:
             self._refuse(HTTPStatus.NOT_FOUND)
 
@@ -141,12 +143,10 @@ class _Handler(BaseHTTPRequestHandler):
                 server.lock.notify_all()
 
     def _do_post(self) -> None:
-        if (words := self._admitted()) is None:
+        if (admitted := self._admitted()) is None or (body := self._body()) is None:
             return
-        session = self.server.session
-        actions = {"move": session.move, "answer": session.answer, "pictures": session.pictures, "save": session.save}
-        if (body := self._body()) is None:
-            return
+        session, words = admitted
+        actions = session.actions
         if len(words) != 1 or words[0] not in actions:
             self._refuse(HTTPStatus.NOT_FOUND)
             return
@@ -169,8 +169,8 @@ class _Handler(BaseHTTPRequestHandler):
             answer = {"wrong": explain(error)[1]}
         self._reply(answer)
 
-    def _admitted(self) -> list[str] | None:
-        """The address behind the token, in words; None of a request that was refused."""
+    def _admitted(self) -> tuple[Session, list[str]] | None:
+        """Whose page asks, and the address behind the token, in words; None of a request that was refused."""
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
         foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
@@ -179,7 +179,10 @@ class _Handler(BaseHTTPRequestHandler):
         elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
             self._refuse(HTTPStatus.FORBIDDEN)
         else:
-            return rest.split("/")
+            session, words = self.server.session, rest.split("/")
+            if words[0] == "linkage" and len(words) > 2 and words[1] in session.linkages:
+                session, words = session.linkages[words[1]], words[2:]
+            return session, words
         return None
 
     def _body(self) -> bytes | None:
@@ -195,9 +198,9 @@ class _Handler(BaseHTTPRequestHandler):
             return self.rfile.read(int(lengths[0]))
         return None
 
-    def _wait(self, version: int, page: str) -> None:
+    def _wait(self, session: Session, version: int, page: str) -> None:
         """Answer when the file has changed, or after a while."""
-        server, session = self.server, self.server.session
+        server = self.server
         with server.lock:
             server.waiting[page] = server.waiting.get(page, 0) + 1
         try:

@@ -14,9 +14,12 @@ import numpy as np
 
 from mechdesign.commands import COMMANDS
 from mechdesign.door.live import saving
+from mechdesign.door.live.altered import SKETCH, altered, is_entry
 from mechdesign.door.live.answers import AS_IT_WAS, PACKAGE, ChangedAnswer, staged, titled
 from mechdesign.door.live.asked import AskedError, changes_of, number_of, numbers_of, sheet_of, texts_of
-from mechdesign.door.live.drag import Drag, dragged, free_numbers, value_of
+from mechdesign.door.live.assembly import next_assembly
+from mechdesign.door.live.drag import TURNED, Drag, dragged, free_numbers, value_of
+from mechdesign.door.live.fields import number_field
 from mechdesign.door.live.turned import motion_of, turning
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.headlines import shown
@@ -29,9 +32,6 @@ from mechdesign.ground.progress import Progress
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.look import ask
 from mechdesign.study import Study
-from mechdesign.study.designs import variant
-from mechdesign.study.text.document import dotted, in_yaml, leaves, plain
-from mechdesign.study.variants import changed_data
 
 # Questions about one design, in the order in which they are asked first; the others make designs of their own.
 QUESTIONS = ("kinematics", "stiffness", "dynamics", "workspace", "reliability")
@@ -40,7 +40,6 @@ _MOST_PAGES = 16  # whose answers are kept: those that asked last
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
 _REACH = 0.6  # of a slider to both sides, as a part of the number
 _WAY = 0.3  # of a slider of a number that is zero, as a part of the mechanism's size
-_STEPS = 400  # of a slider
 
 
 class OvertakenError(Exception):
@@ -95,6 +94,10 @@ class Session:
         What is wrong with the file since it was last right; empty where it is.
     ended : bool
         Whether computations are to end, for nobody waits for them.
+    taken : bool
+        Whether its study is a linkage of a task, whose page stands two folders above.
+    linkages : dict of str to Session
+        Linkages that pages of a task have taken over, by the names in their addresses.
     """
 
     def __init__(self, study: Study, load: Callable[[], Study] | None = None) -> None:
@@ -103,6 +106,7 @@ class Session:
         self.changed = threading.Condition()
         self._computing, self._pages, self._noting = threading.Lock(), dict[str, _OpenPage](), threading.Lock()
         self._seconds = dict[str, float]()  # that each question took last
+        self.taken, self.linkages = False, dict[str, Session]()
         self._take(study)
 
     @np.errstate(all="ignore")
@@ -137,6 +141,12 @@ class Session:
             self.version += 1
             self.changed.notify_all()
 
+    @property
+    def actions(self) -> dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]]:
+        """What a page may ask, by the words of its requests."""
+        return {"move": self.move, "answer": self.answer, "pictures": self.pictures, "save": self.save,
+                "assembly": self.assembly}  # fmt: skip
+
     @np.errstate(all="ignore")
     def page(self) -> bytes:
         """The page of the study as it is in the file."""
@@ -145,14 +155,20 @@ class Session:
         questions = self._questions()
         about = {
             "version": self.version, "questions": self._quickest(), "length": study.units.label("length"),
-            "file": study.path.name if study.path is not None else "", "points": self._handles(),
-            "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake,
+            **saving.file_names(study), "points": self._handles(),
+            "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake, "entries": self._entries(),
         }  # fmt: skip
         return rendered(
-            "live.html.j2", package=PACKAGE, parts=("moving", "live"), connect="'self'", drawings=[part.drawing],
-            study=study, part=part, about=about, groups=self._groups(),
+            "live.html.j2", package=PACKAGE, parts=("moving", "hand", "live"), connect="'self'",
+            drawings=[part.drawing], study=study, part=part, about=about, groups=self._groups(), taken=self.taken,
             questions={name: COMMANDS[name].question for name in questions}, mistake=self.mistake,
         )  # fmt: skip
+
+    def _entries(self) -> dict[str, float]:
+        """Numbers of the sketch that a hand may change, by the names of their entries."""
+        points = self.study.resolved["mechanism"].get("sketch") or {}
+        names = [f"{SKETCH}.{point}.{axis}" for point in points for axis in (0, 1)]
+        return {name: value_of(self.study, name) for name in names}
 
     def _questions(self) -> list[str]:
         return [name for name in QUESTIONS if name == "kinematics" or name in self.study.questions]
@@ -180,13 +196,10 @@ class Session:
             if reach == 0.0:
                 lengths = self._unit(name) != study.units.label("angle")
                 reach = _WAY * study.mechanism.size if lengths else 180.0
-            low = value - reach if place is None or place.least is None else max(value - reach, 0.0)
-            step = 1.0 if name in study.fixed else 10.0 ** math.floor(math.log10(2 * reach / _STEPS))
-            groups.setdefault(owner, []).append({
-                "name": name, "label": self.held.get(name, name), "value": value,
-                "unit": self._unit(name), "low": low, "high": value + reach,
-                "step": step,
-            })  # fmt: skip
+            least = -math.inf if place is None or place.least is None else 0.0
+            field = number_field(name, self.held.get(name, name), value, self._unit(name), reach, least=least,
+                                 whole=name in study.fixed)  # fmt: skip
+            groups.setdefault(owner, []).append(field)
         return sorted(groups.items(), key=lambda group: (group[0] != "parameters", group[0] != GROUND))
 
     @np.errstate(all="ignore")
@@ -195,30 +208,44 @@ class Session:
         study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked)
         self._page(asked)
         names: tuple[str, ...] = ()
-        why = ""
+        why, row = "", None
         if (drag := asked.get("drag")) is not None:
             if not isinstance(drag, Mapping):
                 raise AskedError
             hand = Drag(
                 str(drag.get("point")), complex(*numbers_of(drag.get("to"), 2)), number_of(drag.get("row")),
                 texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
+                number_of(drag.get("near", 0)) / sheet.scale,
             )  # fmt: skip
             if hand.point not in study.mechanism.points:
                 raise AskedError
             done = dragged(study, changes, hand)
-            changes, names, why = dict(done.changes), done.names, done.why
+            changes, names, why, row = dict(done.changes), done.names, done.why, done.row
         count = int(number_of(asked.get("poses")))
         if not 0 < count <= _MOST_ROWS:
             raise AskedError
-        now = variant(study, changes)
+        now = altered(study, changes)
         drawing, tracks = posed(now, steps(str(asked.get("rows")), count) / ROWS, sheet, study)
-        return {"changes": changes, "names": names, "why": why, "drawing": drawing, "data": titled(tracks),
-                "set": self.overrides(changes), "words": [self._in_words(now, name) for name in names]}  # fmt: skip
+        told = [name for name in names if name != TURNED]
+        if any(map(is_entry, changes)):
+            # What is measured in the sketch changes with it, and none of it in silence.
+            told += [name for name in now.parameters.measured if not math.isclose(now.sizes[name], study.sizes[name])]
+        return {"changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
+                "set": self.overrides(changes), "words": [self._in_words(now, name) for name in told]}  # fmt: skip
+
+    @np.errstate(all="ignore")
+    def assembly(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Changes by which the sketch shows the next assembly, and its name."""
+        changes, words = next_assembly(self.shown, changes_of(asked))
+        return {"changes": changes, "words": words}
 
     def _in_words(self, study: Study, name: str) -> str:
-        return f"{name} = {shown(value_of(study, name))} {self._unit(name)}".rstrip()
+        label = name.removeprefix("mechanism.")
+        return f"{label} = {shown(value_of(study, name))} {self._unit(name)}".rstrip()
 
     def _unit(self, name: str) -> str:
+        if is_entry(name):
+            return self.study.units.label("length")
         return self.shown.unit_of(self.held.get(name, name)) or ""
 
     def _own(self, changes: Mapping[str, float]) -> dict[str, float]:
@@ -253,12 +280,12 @@ class Session:
 
     def _ask(self, question: str, changes: Mapping[str, float], progress: Progress) -> ChangedAnswer:
         """What the study with changed numbers answers, and how the study that is shown moves with them."""
-        study = moves = variant(self.study, self._own(changes))
+        study = moves = altered(self.study, self._own(changes))
         result = motion = None
         if question in study.questions or self.shown is self.study:
             result = motion = ask(study, question, progress=progress)
         if question == "kinematics" and self.shown is not self.study:
-            moves = variant(self.shown, changes)
+            moves = altered(self.shown, changes)
             motion = ask(moves, question, progress=progress)
         assert motion is not None
         return ChangedAnswer(question, study, result, moves, motion)
@@ -295,17 +322,15 @@ class Session:
 
     def overrides(self, changes: Mapping[str, float]) -> list[str]:
         """Changes as `--set` takes them, by the entries of the study."""
-        now = dict(leaves(plain(self.study.resolved)))
-        changed = leaves(changed_data(self.study, self._own(changes)))
-        return [f"{dotted(keys)}={in_yaml(value)}" for keys, value in changed if keys not in now or now[keys] != value]
+        return saving.overrides(self.study, altered(self.study, self._own(changes)))
 
     @np.errstate(all="ignore")
     def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Write the study with changed numbers into its file, or into another in its folder; see `saving.save`."""
-        name, replacing = str(asked.get("name") or ""), bool(asked.get("replace"))
-        answer = saving.save(self.study, self._own(changes_of(asked)), name, replacing=replacing)
-        path = self.study.path
-        if path is not None and answer.get("saved") == path.name and self._load is not None:
+        changed = altered(self.study, self._own(changes_of(asked)))
+        name, replacing, own = str(asked.get("name") or ""), bool(asked.get("replace")), self._load is not None
+        answer = saving.save(self.study, changed, name, own=own, replacing=replacing)
+        if own and answer.get("saved") == saving.file_names(self.study)["file"]:
             self.reload()
         return answer
 
