@@ -9,6 +9,7 @@ import sys
 import urllib.request
 
 import pytest
+from helpers.axe import violations
 from helpers.studies import COMMENTED_FOUR_BAR
 
 from mechdesign import kinematics, load
@@ -334,6 +335,21 @@ def test_a_task_opens_with_its_linkages_and_one_that_is_taken_over_is_dragged_an
     page.get_by_role("link", name="the linkages of the task").click()
     page.wait_for_selector(".moving-grid button")
     assert task.value("synthesis.body.2.x") == moved
+
+
+def test_axe_finds_no_fault_in_the_pages(live):
+    bar = live()
+    assert violations(bar.page) == []
+    bar.page.get_by_role("button", name="Save as").click()
+    assert violations(bar.page) == []
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("text", [FOUR_BAR, TASK, ARM], ids=["four-bar", "task", "arm"])
+def test_axe_finds_no_fault_in_narrow_dark_pages(live, text):
+    page = live(text, viewport={"width": 390, "height": 800}, color_scheme="dark").page
+    page.wait_for_selector("[aria-busy=true]", state="detached", timeout=60_000)
+    assert violations(page) == []
 
 
 @pytest.mark.nightly
