@@ -134,10 +134,14 @@ function openHand(about, react) {
 
     // Progress of a computation in words, until it is stopped.
     clock(state) {
+      let on = true;
       const timer = setInterval(async () => {
-        try { state.textContent = (await (await fetch(`progress/${page}`)).json()).progress || "\u2026"; } catch { clearInterval(timer); }
+        try {
+          const {progress} = await (await fetch(`progress/${page}`)).json();
+          if (on) state.textContent = progress || "\u2026";
+        } catch { clearInterval(timer); }
       }, 500);
-      return () => { clearInterval(timer); state.textContent = ""; };
+      return () => { on = false; clearInterval(timer); state.textContent = ""; };
     },
 
     begin() {

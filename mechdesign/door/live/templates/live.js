@@ -78,9 +78,9 @@
     async function ask(fit) {
       if (asking) asking.abort();
       const mine = asking = new AbortController(), number = ++turn;
+      for (const room of document.querySelectorAll(".live-answer, .live-pictures")) room.setAttribute("aria-busy", "true");
       for (const question of about.questions) {
         const part = sections.get(question), state = part.querySelector(".live-state"), room = part.querySelector(".live-answer");
-        room.setAttribute("aria-busy", "true");
         const stop = own.clock(state);
         try {
           const answer = await own.post("answer", {question, turn: number, sheet: fit === true && question === "kinematics" ? null : sheet()}, mine.signal);

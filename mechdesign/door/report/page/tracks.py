@@ -33,6 +33,7 @@ _NOTHING = "."
 _STEPS = 1000
 _SMALL, _LARGE = 1e-4, 1e7
 _EXACT = 2.0**53  # integers below it are exact as numbers of 64 bits
+_LONG = 10.0  # a number varies little whose size is so many times its range
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,10 @@ class ShownNumbers:
 
     def _digits(self, column: Column) -> tuple[int, int, str]:
         """Decimals of a column, the power of ten of which its numbers are multiples, and the unit that these have."""
-        size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
-        still = self.rounding.still(column, column.unit)
+        values = column.values[self.rows]
+        size, largest = _size(values), self.sizes.get(column.unit, 0.0)
+        still, known = self.rounding.still(column, column.unit), values[np.isfinite(values)]
+        span = float(np.ptp(known)) if len(known) else 0.0
         if size <= still:
             # A column that is constant up to rounding gets as many digits as the columns that vary.
             size = largest if largest > still else 1.0
@@ -119,7 +122,9 @@ class ShownNumbers:
         if unit.startswith("10"):
             # As key numbers: a power of ten where the number is very small or large alone.
             power, unit = (0, printed(column.unit)) if _SMALL <= size < _LARGE else (power, f"\N{MIDDLE DOT}{unit}")
-        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power, unit
+        # Of what varies little beside its size the curve is seen.
+        fine = min(size, _LONG * span) if span > still else size
+        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / fine))), power, unit
 
     def cell(self, column: Column) -> Cell:
         """The column's number in the pose drawn."""

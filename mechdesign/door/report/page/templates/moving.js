@@ -332,11 +332,11 @@
       drawing.setAttribute("aria-label", `${up.label} over ${across.label}`);
       const text = (words, looks) => { make("text", looks, drawing).textContent = words; };
       for (const value of ticks(west, east)) {
-        make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, stroke: "#dddddd"}, drawing);
+        make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, class: "moving-line"}, drawing);
         text(String(value).replace("-", "\u2212"), {x: px(value).toFixed(1), y: BOTTOM + 17, "text-anchor": "middle"});
       }
       for (const value of ticks(south, north)) {
-        make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, stroke: "#dddddd"}, drawing);
+        make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, class: "moving-line"}, drawing);
         text(String(value).replace("-", "\u2212"), {x: LEFT - 8, y: (py(value) + 3.5).toFixed(1), "text-anchor": "end"});
       }
       text(across.label, {x: (LEFT + RIGHT) / 2, y: BOTTOM + 36, "text-anchor": "middle"});
