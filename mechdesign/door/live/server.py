@@ -11,6 +11,7 @@ import re
 import secrets
 import socket
 import threading
+import time
 from contextlib import suppress
 from hmac import compare_digest
 from http import HTTPStatus
@@ -26,6 +27,8 @@ _MOST_BYTES = 1_000_000  # of a request
 _WAIT = 20.0  # seconds after which a page asks again whether the file has changed
 _END = 5.0  # seconds that a computation is waited for at the end
 _IDLE = 60.0  # seconds until a connection that says nothing is closed
+_SLOW = 10.0  # seconds in which a request has to arrive whole
+_MOST_CONNECTIONS = 64
 _POLICY = re.compile(rb'<meta http-equiv="Content-Security-Policy" content="([^"]+)">')
 _HEADERS = {
     "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
@@ -79,6 +82,22 @@ class LiveServer(ThreadingHTTPServer):
                 connection.shutdown(socket.SHUT_RDWR)
         return count
 
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Whether a connection is taken: not of one who opens them without end."""
+        return len(self.connections) < _MOST_CONNECTIONS
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own."""
+        with self.lock:
+            self.connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        with self.lock:
+            self.connections.discard(request)
+        super().shutdown_request(request)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A page that is closed while it is answered is no error."""
 
@@ -93,12 +112,8 @@ class _Handler(BaseHTTPRequestHandler):
     def setup(self) -> None:
         super().setup()
         self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        with self.server.lock:
-            self.server.connections.add(self.connection)
 
     def finish(self) -> None:
-        with self.server.lock:
-            self.server.connections.discard(self.connection)
         with suppress(OSError):
             super().finish()
 
@@ -174,6 +189,9 @@ class _Handler(BaseHTTPRequestHandler):
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
         foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
+        # Only to the page itself may something else lead: a link, the frame of a notebook.
+        arrives = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"
+        foreign |= not arrives and self.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none")
         if self.headers.get_all("Host", []) not in ([hosts[0]], [hosts[1]]):
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
         elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
@@ -195,7 +213,24 @@ class _Handler(BaseHTTPRequestHandler):
         elif len(lengths[0]) > 9 or int(lengths[0]) > _MOST_BYTES:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
         else:
-            return self.rfile.read(int(lengths[0]))
+            return self._read(int(lengths[0]))
+        return None
+
+    def _read(self, count: int) -> bytes | None:
+        """So many bytes; None where they did not come, or not in time."""
+        body, end = b"", time.monotonic() + _SLOW
+        while len(body) < count and (left := end - time.monotonic()) > 0:
+            self.connection.settimeout(left)
+            part = b""
+            with suppress(TimeoutError):
+                part = self.rfile.read1(count - len(body))
+            if not part:
+                break
+            body += part
+        self.connection.settimeout(_IDLE)
+        if len(body) == count:
+            return body
+        self._refuse(HTTPStatus.REQUEST_TIMEOUT)
         return None
 
     def _wait(self, session: Session, version: int, page: str) -> None:

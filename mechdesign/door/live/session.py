@@ -205,7 +205,7 @@ class Session:
     @np.errstate(all="ignore")
     def move(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Positions with changed numbers, or with those that a drag changes; with ``wrong`` where there are none."""
-        study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked)
+        study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked, self.shown.mechanism.size)
         self._page(asked)
         names: tuple[str, ...] = ()
         why, row = "", None
@@ -217,7 +217,7 @@ class Session:
                 texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
                 number_of(drag.get("near", 0)) / sheet.scale,
             )  # fmt: skip
-            if hand.point not in study.mechanism.points:
+            if hand.point not in study.mechanism.points or not {*hand.held} <= {*study.parameters.names()}:
                 raise AskedError
             done = dragged(study, changes, hand)
             changes, names, why, row = dict(done.changes), done.names, done.why, done.row
@@ -264,7 +264,7 @@ class Session:
         changes, question = changes_of(asked), asked.get("question")
         if question not in self._questions():
             raise AskedError
-        sheet = sheet_of(asked) if asked.get("sheet") else None
+        sheet = sheet_of(asked, self.shown.mechanism.size) if asked.get("sheet") else None
         with self._watched(asked) as (page, progress):
             begin = time.perf_counter()
             answer = page.answers[question] = self._ask(question, changes, progress)
