@@ -29,6 +29,7 @@ COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turn
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
 _TICK, _TICK_SPACING = 4.95 * cmath.exp(0.75j * math.pi), 5.5  # strokes of a hatched rail, for one along x
+_MOST_TICKS = 10_000  # of a rail; nobody sees those of a longer one
 _PROFILE = 2.8  # width of the profile of a cam, of which half shows around a disc
 _PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
 _STEEL = "#777777"
@@ -69,9 +70,11 @@ class Line:
         """The line in points, and the strokes of a rail, which a short one has not; `at` gives those of a place."""
         places = [at(place) + self.rail * size for place in self.places]
         way = places[-1] - places[0]
+        if not self.rail or abs(way) > _TICK_SPACING * _MOST_TICKS:
+            return [places]
         steps = np.arange(_TICK_SPACING, abs(way) - _TICK_SPACING * (abs(way) <= 2 * _TICK_SPACING), _TICK_SPACING)
         along = way / (abs(way) or 1.0)
-        feet = (places[0] + steps * along).tolist() if self.rail else []
+        feet = (places[0] + steps * along).tolist()
         return [places, *([foot, foot + _TICK * along] for foot in feet)]
 
 

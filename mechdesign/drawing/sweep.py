@@ -88,7 +88,7 @@ class Sweep(Shown):
         reached += [np.ravel(outline.places[self.valid]) for outline in self.scene.outlines]
         return np.concatenate(reached)
 
-    @property
+    @cached_property
     def returns(self) -> bool:
         """Whether the first and the last pose are one."""
         if self.poses.closed:

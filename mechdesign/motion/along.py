@@ -16,7 +16,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.motion.curve import Curve
 from mechdesign.motion.ends import Ends, MotionEnd
-from mechdesign.motion.functions import Functions
+from mechdesign.motion.functions import Extremes, Functions
 from mechdesign.motion.motion import GIVEN, Motion, SolvedPoses
 from mechdesign.motion.parts import within
 from mechdesign.motion.series import Evaluate
@@ -50,7 +50,7 @@ class AlongMotion:
     _means: Mapping[str, str]
     _evaluate: Evaluate
     _evaluated: Evaluate
-    _evaluated_names: frozenset[str]
+    _evaluated_names: frozenset[str] = frozenset()
     _follow: Callable[[], Functions]
 
     def __init__(self, requests: Collection[Request]) -> None:
@@ -75,6 +75,11 @@ class AlongMotion:
     def functions(self) -> Functions:
         """The functions, followed where they matter."""
         return self._follow()
+
+    @cached_property
+    def peaks(self) -> Extremes:
+        """Extremes of all columns, sought together in a part of the time that each takes by itself."""
+        return self.functions.extremes(self.columns, np.zeros((len(self.columns), self.curve.lines)))
 
     @cached_property
     def present(self) -> Floats:
@@ -145,14 +150,17 @@ class AlongMotion:
         return self._worst[key]
 
     def _worst_of(self, name: str, sign: int, absolute: bool, still: float) -> tuple[Floats, Floats]:
-        peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
-        low, high = cleared(peaks.value[:, 0], STILL * self.functions.size(name))
+        if "peaks" in vars(self) and name in self.columns and not still:
+            peaks, k = self.peaks, self.columns.index(name)
+        else:
+            peaks, k = self.functions.extremes([name], np.full((1, self.curve.lines), still)), 0
+        low, high = cleared(peaks.value[:, k], STILL * self.functions.size(name))
         # What is the same everywhere has no place.
         constant = unchanging(low, high, self.functions.size(name))
         if absolute and sign < 0:
             values, places = self.least([name], still)
             return values[0], np.where(constant, np.nan, places[0])
-        low_at, high_at = np.where(constant, np.nan, peaks.place[:, 0])
+        low_at, high_at = np.where(constant, np.nan, peaks.place[:, k])
         if not absolute:
             return (high, high_at) if sign > 0 else (low, low_at)
         upper = larger(low, high, low_at, high_at, STILL * np.maximum(high, -low))
@@ -215,7 +223,8 @@ class AlongMotion:
         pieces = self.curve.pieces
         if not len(pieces.line):
             return False
-        self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
+        if not self._evaluated_names:
+            self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
         return self._evaluated_names >= {*names}
 
     def _ends(self, names: Collection[str]) -> dict[str, int]:

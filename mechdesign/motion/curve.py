@@ -184,7 +184,8 @@ class Curve:
         dead = np.where(fold < 0, begin, end)
         at_dead = (fold != 0) & (np.abs(s - dead) <= inset)
         places = np.where((s < begin) | (s > end), np.clip(s, begin + inset, end - inset), s)
-        places[at_dead] = self._straight(line[at_dead], dead[at_dead], fold[at_dead])
+        if at_dead.any():
+            places[at_dead] = self._straight(line[at_dead], dead[at_dead], fold[at_dead])
         return places
 
     def _straight(self, line: Ints, s: Floats, fold: Ints) -> Floats:

@@ -129,8 +129,7 @@ def _ends(curve: Curve) -> Floats:
 
 def extremes_of(along: AlongMotion) -> Floats:
     """Where the columns of a motion have their extremes, in rows."""
-    curve, names = along.curve, list(along.columns)
-    places = along.functions.extremes(names, np.zeros((len(names), curve.lines))).place.ravel()
+    places = along.peaks.place.ravel()
     return along.snapped(places[np.isfinite(places)])
 
 

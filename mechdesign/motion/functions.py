@@ -269,10 +269,13 @@ class Functions(Means):
     def _poles(self, rows: Ints, sign: Floats) -> tuple[Ints, Ints, Floats, Floats]:
         """Places at which functions times a sign go to plus infinity: lane, piece, place in it, infinity."""
         poles: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
-        for k in np.flatnonzero(self._poled[rows]).tolist():
-            some = np.flatnonzero((self._divisor[rows[k]] != 1.0).any(axis=1))
-            if not len(some):
-                continue
+        poled = np.flatnonzero(self._poled[rows])
+        divisors, scale = self._divisor[rows[poled]], self._divisor_scale[rows[poled]][:, self.pieces.line]
+        # A divisor whose constant outweighs all of its other terms comes nowhere near zero.
+        terms = np.abs(chebyshev.series(divisors))
+        near = (divisors != 1.0).any(axis=2) & ~(2 * terms[..., 0] - terms.sum(axis=2) > 2 * ZERO_AT_FOLD * scale)
+        for j in np.flatnonzero(near.any(axis=1)).tolist():
+            k, some = poled[j], np.flatnonzero(near[j])
             line, fold = self.pieces.line[some], self.pieces.fold[some]
             product, divisor = (chebyshev.series(table[rows[k], some]) for table in (self._table, self._divisor))
             sizes = self._scale[rows[k], line], self._divisor_scale[rows[k], line]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from helpers.studies import of_readme
 
 import mechdesign
 from mechdesign.drawing import style
@@ -27,8 +27,7 @@ DRAWN = {
 
 @pytest.mark.parametrize("plots", [True, False], ids=["pictures", "tables"])
 def test_kinematics_of_the_study_in_the_readme(benchmark, tmp_path: Path, *, plots: bool) -> None:
-    (study,) = re.findall(r"^```yaml\n(mechanism:.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE)
-    (tmp_path / "study.yaml").write_text(study)
+    (tmp_path / "study.yaml").write_text(of_readme())
     command = [sys.executable, "-m", "mechdesign", "kinematics", "study.yaml", *(() if plots else ("--no-plots",))]
     run = benchmark.pedantic(
         subprocess.run, (command,), {"capture_output": True, "cwd": tmp_path}, rounds=5, warmup_rounds=1

@@ -9,11 +9,13 @@ import sys
 import urllib.request
 
 import pytest
+from helpers.axe import violations
 from helpers.studies import COMMENTED_FOUR_BAR
 
 from mechdesign import kinematics, load
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
+from mechdesign.door.live.task import session_of
 
 try:
     from playwright.sync_api import expect
@@ -32,7 +34,7 @@ class Live:
     """A page of a study's server."""
 
     def __init__(self, browser, path, **looks):
-        self.path, self.session = path, Session(load(path), lambda: load(path))
+        self.path, self.session = path, session_of(load(path), lambda: load(path))
         self.server = LiveServer(self.session)
         self.server.start()
         self.complaints = []
@@ -49,7 +51,7 @@ class Live:
     @staticmethod
     def answered(page):
         """Wait until every question is answered by the numbers as they are."""
-        page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
+        page.wait_for_selector(".live-answer:not([aria-busy])", timeout=30_000)
         page.wait_for_selector(".live-answer[aria-busy=true]", state="detached", timeout=30_000)
 
     def middle(self, point):
@@ -282,8 +284,72 @@ def test_a_robot_shows_its_workspace_and_follows_a_drive_that_stands_still(live)
     # The study has no such entry.
     arm.page.get_by_role("button", name="Copy as --set").click()
     assert "q2" not in arm.page.locator(".live-said").inner_text()
-    arm.drag("A", 0, -10 * arm.scale)
+    arm.drag("A", 10 * arm.scale, 0)
     assert arm.value("upper.length") != 100
+
+
+TASK = """\
+units: {length: mm, angle: deg}
+synthesis:
+  body:
+    - {x: 0, y: 0, angle: 0}
+    - {x: 19, y: 13, angle: 20}
+    - {x: 46, y: 21, angle: 45}
+    - {x: 67, y: 18, angle: 65}
+    - {x: 89, y: -2, angle: 75}
+"""
+
+
+def test_a_task_opens_with_its_linkages_and_one_that_is_taken_over_is_dragged_and_saved(live):
+    task = live(TASK)
+    page = task.page
+    page.wait_for_selector(".moving-grid button")
+    ring = page.locator(".live-handle[aria-label^='position 3']")
+    box = ring.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 4, box["y"] + box["height"] / 2, steps=3)
+    expect(page.locator(".live-hand")).to_contain_text("position 3: 4")
+    page.mouse.up()
+    page.wait_for_selector("#synthesize .live-answer[aria-busy=true]")
+    task.answered(page)
+    moved = task.value("synthesis.body.2.x")
+    assert 46 < moved < 60
+    # A key turns the body, and undo takes that back.
+    page.get_by_role("button", name="angle of position 3").press("ArrowLeft")
+    assert task.value("synthesis.body.2.angle") == 46
+    page.get_by_role("button", name="Undo").click()
+    assert task.value("synthesis.body.2.angle") == 45
+    page.wait_for_timeout(500)
+    task.answered(page)
+    page.locator(".moving-grid button").first.press("Enter")
+    page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
+    page.get_by_role("button", name="Save as").click()
+    page.get_by_label("Name of the file").fill("mine.yaml")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator(".live-said")).to_contain_text("Saved as mine.yaml")
+    # The saved linkage passes the place that the hand gave.
+    assert kinematics(load(task.path.with_name("mine.yaml"))).tables["motion"]["P.x"][2] == pytest.approx(
+        moved, abs=1e-4
+    )
+    page.get_by_role("link", name="the linkages of the task").click()
+    page.wait_for_selector(".moving-grid button")
+    assert task.value("synthesis.body.2.x") == moved
+
+
+def test_axe_finds_no_fault_in_the_pages(live):
+    bar = live()
+    assert violations(bar.page) == []
+    bar.page.get_by_role("button", name="Save as").click()
+    assert violations(bar.page) == []
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("text", [FOUR_BAR, TASK, ARM], ids=["four-bar", "task", "arm"])
+def test_axe_finds_no_fault_in_narrow_dark_pages(live, text):
+    page = live(text, viewport={"width": 390, "height": 800}, color_scheme="dark").page
+    page.wait_for_selector("[aria-busy=true]", state="detached", timeout=60_000)
+    assert violations(page) == []
 
 
 @pytest.mark.nightly
@@ -334,13 +400,9 @@ def test_what_cannot_be_live(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     links = "{ground: {O: [0, 0], D: [100, 0]}, a: [O, A, 60], b: [D, A, 80]}"
     (tmp_path / "truss.yaml").write_text(f"mechanism: {{links: {links}, sketch: {{A: [36, 48]}}, drives: []}}\n")
-    (tmp_path / "task.yaml").write_text(
-        "synthesis: {function: {input: [97, 120, 143], output: [36, 65, 87]}, frame: 100}\n"
-    )
     for words, arguments in (
         ("no file that could be saved", ["-"]),
         ("nothing is driven", ["truss.yaml"]),
-        ("only a task", ["task.yaml"]),
     ):
         done = CliRunner().invoke(app, ["live", *arguments, "--no-browser"])
         assert done.exit_code == 2

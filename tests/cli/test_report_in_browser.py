@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.axe import violations
 from helpers.pictures import figure_of
 
 from mechdesign import load
@@ -132,6 +133,15 @@ def place(page, point):
     data = page.evaluate("() => { const d = JSON.parse(document.querySelector('.moving script').textContent);"
                          " return (d.choices || [d])[0]; }")  # fmt: skip
     return data["corner"][0] + x / data["scale"], data["corner"][1] - y / data["scale"], PIXELS / data["scale"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["four_bar", *(pytest.param(name, marks=pytest.mark.nightly) for name in (
+        "five_bar", "straight_line_front", "best_case", "twin_cylinder", "five_positions"))],
+)  # fmt: skip
+def test_axe_finds_no_fault_in_a_report(opened, name):
+    assert violations(opened(name)) == []
 
 
 def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers):

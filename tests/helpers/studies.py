@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import mechdesign
 
 # A slider-crank in line, whose stroke is twice its crank `r`.
@@ -80,6 +83,13 @@ COMMENTED_FOUR_BAR = (
     .replace("  links:", "  links:                              # a point of two links is the pin between them")
     .replace("D: [100, 0]}", "D: [100, 0]}  # the pivots")
 )
+
+
+def of_readme() -> str:
+    """The study in ten lines of README.md."""
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    (study,) = re.findall(r"^```yaml\n(mechanism:\n.*?)^```", text, re.DOTALL | re.MULTILINE)
+    return str(study)
 
 
 def study_of(text: str, *overrides: str) -> mechdesign.Study:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import html
 import http.client
 import json
@@ -16,10 +17,13 @@ from pathlib import Path
 import pytest
 from helpers.studies import COMMENTED_FOUR_BAR
 
-from mechdesign import load
-from mechdesign.door.live.drag import Drag, dragged
+from mechdesign import kinematics, load
+from mechdesign.door.live.altered import altered
+from mechdesign.door.live.assembly import next_assembly
+from mechdesign.door.live.drag import TURNED, Drag, dragged
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
+from mechdesign.door.live.task import session_of
 from mechdesign.door.report.page.tracks import steps
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -59,8 +63,47 @@ def test_the_pin_of_a_rocker_follows_by_two_lengths_that_two_circles_give(study)
 
 
 def test_one_number_is_enough_where_it_leads_to_the_hand(study):
+    done = dragged(study, {}, Drag("P", pin(0j, 100 + 0j, 30.0, 90.0, 60.0, math.pi / 2), row=9, resolution=0.01))
+    assert set(done.names) == {"rod.P.x", "rod.P.y"}
     done = dragged(study, {}, Drag("A", 41j, row=9, resolution=0.01))
-    assert (done.names, done.changes) == (("crank.length",), {"crank.length": 41.0})
+    assert done.changes == {"crank.length": 41.0}
+    assert done.row == pytest.approx(9)
+
+
+def test_a_cranks_pin_turns_the_drive_along_its_circle_and_changes_the_length_across_it(study):
+    along = dragged(study, {}, Drag("A", 32 * cmath.exp(0.7j), row=9, resolution=0.01, near=3.0))
+    assert (along.changes, along.names) == ({}, (TURNED,))
+    # A row is 10 deg.
+    assert along.row == pytest.approx(math.degrees(0.7) / 10, abs=0.01)
+    across = dragged(study, {}, Drag("A", 41 * cmath.exp(0.7j), row=9, resolution=0.01, near=3.0))
+    assert across.changes == {"crank.length": 41.0}
+    assert across.row == pytest.approx(math.degrees(0.7) / 10, abs=0.01)
+    # Once the length has changed it follows the hand back to the circle.
+    again = dragged(study, {}, Drag("A", 32j, row=9, held=across.names, resolution=0.01, near=3.0))
+    assert again.changes == {"crank.length": 32.0}
+    # Locked it stays; round the end of the turn the drive goes on.
+    locked = dragged(study, {}, Drag("A", 41 * cmath.exp(-0.2j), row=1, locked=["crank.length"], resolution=0.01))
+    assert (locked.changes, locked.names) == ({}, (TURNED,))
+    assert locked.row == pytest.approx(36 - math.degrees(0.2) / 10, abs=0.01)
+
+
+def test_the_points_of_a_sketch_from_which_lengths_are_measured_are_dragged_as_its_entries():
+    links = "{ground: {O: , D: }, crank: [O, A], rod: {A: , B: , P: }, rocker: [D, B]}"
+    sketch = "{O: [0, 0], D: [100, 0], A: [0, 30], B: [75, 55], P: [40, 70]}"
+    drawn = load(text=f"mechanism: {{links: {links}, sketch: {sketch}, drives: [crank]}}")
+    # At row 18, a quarter of a turn, it is as it is drawn.
+    done = dragged(drawn, {}, Drag("B", 80 + 62j, row=18, resolution=0.01))
+    assert done.changes == pytest.approx({"mechanism.sketch.B.0": 80.0, "mechanism.sketch.B.1": 62.0}, abs=0.02)
+    assert altered(drawn, done.changes).sizes["rocker.length"] == pytest.approx(math.hypot(20, 62), abs=0.03)
+
+
+def test_the_pin_of_a_slider_moves_its_guide_across_and_a_link_along():
+    slider = load(CONFIGS / "gallery/offset_slider_crank.yaml")
+    done = dragged(slider, {}, Drag("B", 5 + 1.3j, row=3, resolution=1e-6))
+    # The offset c is the height of the guide; the crank of 1.4 in stands at 15 deg.
+    angle = math.radians(15)
+    reach = math.hypot(5 - 1.4 * math.cos(angle), 1.3 - 1.4 * math.sin(angle))
+    assert done.changes == pytest.approx({"l": reach, "c": 1.3}, abs=1e-5)
 
 
 def test_a_locked_number_stays_and_the_point_goes_as_near_as_the_other_brings_it(study):
@@ -73,7 +116,7 @@ def test_a_locked_number_stays_and_the_point_goes_as_near_as_the_other_brings_it
 
 
 def test_without_a_free_number_the_hand_is_told(study):
-    done = dragged(study, {}, Drag("A", 41j, row=9, locked=["crank.length"]))
+    done = dragged(study, {}, Drag("D", 90 + 5j, row=9, locked=["ground.D.x", "ground.D.y", "rocker.length"]))
     assert (dict(done.changes), done.names) == ({}, ())
     assert "not locked" in done.why
 
@@ -310,6 +353,53 @@ def test_every_point_of_shipped_studies_can_be_dragged_and_the_quick_questions_a
     assert moved >= len(points) / 2
     for turn, question in enumerate({"kinematics", "dynamics", "stiffness"}.intersection(session.study.questions)):
         assert session.answer({**asked, "turn": 100 + turn, "question": question})["html"]
+
+
+def test_the_other_assembly_is_one_of_the_sketch_and_the_next_is_the_studys_own_again(study):
+    # A at 30 mm above O, the other crossing of the circles of rod and rocker lies below the line from A to D.
+    changes, words = next_assembly(study, {"rocker.length": 61.0})
+    along = 100 - 30j
+    other = 30j + along * ((pin(0j, 100, 30, 90, 61, math.pi / 2) - 30j) / along).conjugate()
+    assert changes == pytest.approx({
+        "rocker.length": 61.0, "mechanism.sketch.B.0": other.real, "mechanism.sketch.B.1": other.imag,
+    }, abs=0.01)  # fmt: skip
+    assert "2 of 2" in words
+    assert next_assembly(study, changes)[0] == {"rocker.length": 61.0}
+
+
+TASK = """\
+name: Tray
+units: {length: mm, angle: deg}
+synthesis:
+  body:      # its positions
+    - {x: 0, y: 0, angle: 0}
+    - {x: 19, y: 13, angle: 20}
+    - {x: 46, y: 21, angle: 45}
+    - {x: 67, y: 18, angle: 65}
+    - {x: 89, y: -2, angle: 75}
+"""
+
+
+def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_over_and_saved(tmp_path):
+    path = tmp_path / "tray.yaml"
+    path.write_text(TASK)
+    session = session_of(load(path), lambda: load(path))
+    changes = {"synthesis.body.2.x": 47.0, "synthesis.body.2.angle": 46.0}
+    asked = {"page": "p", "turn": 1, "changes": changes}
+    answer = session.actions["answer"](asked)
+    assert answer["set"] == ["synthesis.body.2.x=47.0", "synthesis.body.2.angle=46.0"]
+    assert "four-bar" in answer["html"]
+    to = session.actions["take"]({**asked, "search": answer["search"], "row": 0})["to"]
+    taken = session.linkages[to.split("/")[1]]
+    assert b"ground.O.x" in taken.page()
+    saved = taken.save({"changes": {}, "name": "mine.yaml"})["saved"]
+    # The linkage passes the positions that were dragged.
+    moved = kinematics(load(tmp_path / saved)).tables["motion"]
+    for k, (x, angle) in enumerate([(0, 0), (19, 20), (47, 46), (67, 65), (89, 75)]):
+        assert moved["P.x"][k] == pytest.approx(x, abs=1e-5)
+        assert moved["coupler.angle"][k] == pytest.approx(angle, abs=1e-5)
+    assert session.save({"changes": changes, "name": "", "replace": True}) == {"saved": "tray.yaml", "comments": True}
+    assert path.read_text() == TASK.replace("x: 46", "x: 47.0").replace("angle: 45", "angle: 46.0")
 
 
 def test_a_notebook_shows_the_page_in_a_frame():

@@ -15,10 +15,12 @@ from mechdesign.door.cli.execution import STANDARD_INPUT, load_study
 from mechdesign.door.cli.options import Options
 from mechdesign.door.cli.watch import await_change, contents_of, files_named
 from mechdesign.door.live.server import LiveServer
-from mechdesign.door.live.session import Session
+from mechdesign.door.live.task import session_of
 from mechdesign.ground.errors import StudyError, counted
+from mechdesign.ground.work.threads import one_thread
 
 
+@one_thread()
 def live(options: Options) -> int:
     """Serve the page of a study until an interrupt, and read the study again whenever it is saved. Returns 0.
 
@@ -31,7 +33,7 @@ def live(options: Options) -> int:
     assert path is not None
     if path == STANDARD_INPUT or (path.exists() and not path.is_file()):
         raise StudyError(f"{path}: is no file that could be saved again")
-    session = Session(load_study(path, options), partial(load_study, path, options))
+    session = session_of(load_study(path, options), partial(load_study, path, options))
     session.page()
     try:
         server = LiveServer(session, options.port or 0)

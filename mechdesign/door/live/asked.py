@@ -8,6 +8,7 @@ from typing import Any
 from mechdesign.door.report.page.linkage import Canvas
 
 _LARGEST = 1e150  # number that a page may send
+_WIDEST = 1e5  # size of a sheet, and of a mechanism on it, in units of the drawing
 
 
 class AskedError(Exception):
@@ -43,9 +44,9 @@ def texts_of(values: Any) -> list[str]:
     return [str(value) for value in values or ()]
 
 
-def sheet_of(asked: Mapping[str, Any]) -> Canvas:
-    """The sheet on which the page draws: corner, scale, width and height."""
+def sheet_of(asked: Mapping[str, Any], size: float) -> Canvas:
+    """The sheet on which the page draws a mechanism of a size: corner, scale, width and height."""
     x, y, scale, width, height = numbers_of(asked.get("sheet"), 5)
-    if min(scale, width, height) <= 0:
+    if min(scale, width, height) <= 0 or max(scale * size, width, height) > _WIDEST:
         raise AskedError
     return Canvas(complex(x, y), scale, width, height)

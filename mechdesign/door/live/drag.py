@@ -5,22 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
+from mechdesign.door.live.altered import SKETCH, altered, is_entry
 from mechdesign.ground.errors import MechdesignError
+from mechdesign.ground.expressions import Number
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.elements.joints import Prismatic, Slot
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.solving import solve_rows
 from mechdesign.study import Study
-from mechdesign.study.designs import variant
 
 _MOST_STEPS = 30  # of Newton's method, halved ones among them
 _LONGEST = 0.25  # step, as a part of the mechanism's size
 _ALIKE = 0.02  # part of a way that may be missed where fewer numbers are changed for it
 _BLIND = 1e-6  # derivative of a place by a length from which on the length moves it
+_FULL = 0.05  # sine of the angle of two ways from which on they span the plane, and part of the longest that counts
+_SAME = 1e-6  # of the mechanism's size: between first and last pose of a motion that goes round
+_BESIDE = 1e-3  # of a row of the motion, and part of a number of the sketch, by which derivatives are taken
+TURNED = ""  # stands for the place of the motion among the numbers that a drag changes
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,8 @@ class Drag:
     """A point that a hand holds: its name, where the hand is, and what it may change.
 
     `row` is the pose along the motion. `held` are numbers that it has changed since the hand took the point. Values are
-    rounded to `resolution`, a length.
+    rounded to `resolution`, a length. Where the links of a point have one number for it, as those of a crank's pin,
+    the drives go with the hand as well, and alone where that brings it nearer than `near`.
     """
 
     point: str
@@ -37,13 +46,18 @@ class Drag:
     locked: Collection[str] = ()
     held: Collection[str] = ()
     resolution: float = 0.0
+    near: float = 0.0
 
 
 @dataclass(frozen=True)
 class Dragged:
-    """Numbers of a study after a drag, those that the hand changes, and why the point does not follow it, if so."""
+    """Numbers of a study after a drag, those that the hand changes, and why the point does not follow it, if so.
+
+    `row` is the pose where the drives have gone with the hand.
+    """
 
     changes: Mapping[str, float]
+    row: float
     names: tuple[str, ...] = ()
     why: str = ""
 
@@ -53,6 +67,7 @@ class _Pose:
     """A design of a study with its drives as the motion has them at one pose."""
 
     study: Study
+    row: float
     configuration: Configuration
     values: Mapping[str, float] = field(default_factory=dict)  # of the drives, in radians and lengths
 
@@ -65,11 +80,13 @@ class _Pose:
         drives = {
             name: float(np.ravel(configuration.value(mechanism.coordinate(name)))[0]) for name in mechanism.drives
         }
-        return cls(study, configuration, drives)
+        return cls(study, row, configuration, drives)
 
-    def with_values(self, original: Study, changes: Mapping[str, float]) -> _Pose:
-        """Another design of the original at the same values of the drives."""
-        study = variant(original, changes)
+    def with_values(self, original: Study, changes: Mapping[str, float], row: float | None = None) -> _Pose:
+        """Another design of the original at the same values of the drives, or at another pose of its motion."""
+        study = altered(original, changes)
+        if row is not None:
+            return self.of(study, row)
         given = [np.array([value]) for value in self.values.values()]
         return replace(self, study=study, configuration=study.mechanism.forward.solve(given, {}))
 
@@ -87,6 +104,23 @@ class _Pose:
         return complex(self.configuration.point(point)[0])
 
 
+@lru_cache(4)
+def _goes_round(study: Study) -> bool:
+    """Whether the motion ends where it begins."""
+    poses = study.motions["kinematics"]
+    if poses.closed:
+        return True
+    first, last = (_Pose.of(study, row).configuration.nodes for row in (0.0, float(poses.end)))
+    gaps = [abs(np.ravel(a)[0] - np.ravel(b)[0]) for a, b in zip(first, last, strict=True)]
+    return bool(max(gaps) <= _SAME * study.mechanism.size)
+
+
+def _place(study: Study, row: float) -> float:
+    """A place of the motion: round where it closes, else not beyond its ends."""
+    end = float(study.motions["kinematics"].end)
+    return row % end if _goes_round(study) else min(max(row, 0.0), end)
+
+
 def free_numbers(study: Study) -> list[str]:
     """Parameters and dimensions that are numbers of their own: they follow from nothing else in the study."""
     parameters, places = study.parameters, study.mechanism.description.places
@@ -98,7 +132,11 @@ def free_numbers(study: Study) -> list[str]:
 
 
 def value_of(study: Study, name: str) -> float:
-    """A parameter or dimension of a study, in its units."""
+    """A parameter, a dimension or a number of the sketch of a study, in its units."""
+    if is_entry(name):
+        point, _, axis = name.removeprefix(f"{SKETCH}.").rpartition(".")
+        place = study.mechanism.description.sketch[point]
+        return place.imag if axis == "1" else place.real
     return study.sizes[name] / study.parameters.factors.get(name, 1.0)
 
 
@@ -106,32 +144,43 @@ def value_of(study: Study, name: str) -> float:
 def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragged:
     """Change as few free numbers as bring a point to the hand, or as near as they can.
 
-    They are those of the links that have the point: its own coordinates in one of them before lengths and parameters,
-    these before places of other points. The drives stay. What cannot be assembled is not passed.
+    They are those of the links that have the point, and of the guides along which these slide: its own coordinates in
+    one of them, or in the sketch from which these are measured, before lengths and parameters, these before places of
+    other points. The drives stay, unless the numbers leave a direction to them. What cannot be assembled is not passed.
 
     Raises
     ------
     MechdesignError
         If the changes so far make no study.
     """
-    study = variant(original, changes)
-    pose = _Pose.of(study, drag.row)
+    pose = _Pose.of(altered(original, changes), drag.row)
     if not pose.valid:
-        return Dragged(changes, why=f"the pose {pose.why}")
+        return Dragged(changes, drag.row, why=f"the pose {pose.why}")
     ways = {name: way for name, way in _ways(original, pose, changes, drag) if abs(way).max() > _BLIND}
-    names = _fewest(ways, drag.target - pose.at(drag.point))
+    names: tuple[str, ...] = ()
+    if _driven(pose.study, drag.point) and not _spans(ways):
+        ways |= _turning(original, pose, drag.point, drag.row)
+        if TURNED in ways and not set(drag.held).difference([TURNED]):
+            turned = _newton(original, changes, pose, {TURNED: drag.row}, drag)[0]
+            if abs(turned.at(drag.point) - drag.target) <= drag.near:
+                return Dragged(changes, turned.row, (TURNED,))
+        far = max((abs(way[0]) for name, way in ways.items() if name != TURNED), default=0.0)
+        names = tuple(name for name, way in ways.items() if name != TURNED and abs(way[0]) >= _FULL * far)[:1]
+        names += (TURNED,) if TURNED in ways else ()
+    names = names or _fewest(ways, drag.target - pose.at(drag.point))
     if not names:
         locked = " that is not locked" if drag.locked else ""
-        return Dragged(changes, why=f"no number{locked} of its links moves {drag.point} at this pose")
-    values = {name: value_of(study, name) for name in names}
-    pose, values, why = _newton(original, changes, pose, values, drag)
+        return Dragged(changes, drag.row, why=f"no number{locked} of its links moves {drag.point} at this pose")
+    begin = {name: drag.row if name == TURNED else value_of(pose.study, name) for name in names}
+    pose, values, why = _newton(original, changes, pose, begin, drag)
+    values.pop(TURNED, None)
     rounded = {name: _rounded(original, name, value, drag.resolution) for name, value in values.items()}
     try:
         if not pose.with_values(original, {**changes, **rounded}).valid:
             rounded = values
     except MechdesignError:
         rounded = values
-    return Dragged({**changes, **rounded}, names, why)
+    return Dragged({**changes, **rounded}, pose.row, names, why)
 
 
 def _newton(
@@ -144,15 +193,20 @@ def _newton(
         missing = drag.target - pose.at(drag.point)
         if abs(missing) <= tolerance:
             return pose, values, ""
-        matrix = np.column_stack([_parts(way) for _, way in _ways(original, pose, changes, drag, values)])
+        ways = dict(_ways(original, pose, changes, drag, [name for name in values if name != TURNED]))
+        ways |= _turning(original, pose, drag.point, values[TURNED]) if TURNED in values else {}
+        if ways.keys() != values.keys():
+            break
+        matrix = np.column_stack([_parts(ways[name]) for name in values])
         step = np.linalg.lstsq(matrix, _parts(np.array([missing])), rcond=1e-6)[0]
         gone = float(np.abs(matrix @ step).max())
         if gone <= tolerance:
             break
         step *= share * min(1.0, _LONGEST * size / gone)
         tried = {name: value + change for (name, value), change in zip(values.items(), step.tolist(), strict=True)}
+        row = _place(original, tried[TURNED]) if TURNED in tried else None
         try:
-            there = pose.with_values(original, {**changes, **tried})
+            there = pose.with_values(original, {**changes, **{name: tried[name] for name in tried if name}}, row)
             why = "" if there.valid else there.why
         except MechdesignError as error:
             there, why = pose, str(error).splitlines()[0].rpartition(": ")[2]
@@ -162,41 +216,99 @@ def _newton(
                 break
             continue
         pose, values, share = there, tried, min(1.0, 2 * share)
+        if row is not None:
+            values[TURNED] = row
     return pose, values, why
 
 
 def _ways(
-    original: Study, pose: _Pose, changes: Mapping[str, float], drag: Drag, only: Collection[str] = ()
+    original: Study, pose: _Pose, changes: Mapping[str, float], drag: Drag, only: Collection[str] | None = None
 ) -> Iterator[tuple[str, Complexes]]:  # fmt: skip
-    """Where a point goes by each number of its links, per unit of the number; the preferred ones first."""
+    """Where a point goes by each number of its links and guides, per unit of the number; the preferred ones first."""
     study, mechanism = pose.study, pose.study.mechanism
-    owners = mechanism.graph.links_at(drag.point)
+    owners, guides = {*mechanism.graph.links_at(drag.point)}, dict[str, str | None]()
+    for name, joint in mechanism.description.joints.items():
+        if isinstance(joint, Prismatic | Slot) and owners & {joint.line.link, getattr(joint, "slider", "")}:
+            guides[name] = f"{joint.line.link}.{joint.line.through}"
+
+    def rank(name: str) -> int:
+        """0 of a coordinate of the point itself, 1 of lengths, what has no place and a guide's point, else 2."""
+        point, _, axis = name.rpartition(".")
+        if axis in ("x", "y") and point not in guides.values():
+            return 0 if point.rpartition(".")[2] == drag.point else 2
+        return 2 if point in guides else 1
+
     places = [
         name for name, place in mechanism.description.places.items()
-        if place.path[:1] == ("links",) and place.path[1] in owners and place.quantity in ("length", "angle")
+        if place.quantity in ("length", "angle") and (
+            (place.path[:1] == ("links",) and place.path[1] in owners)
+            or (place.path[:1] == ("joints",) and place.path[1] in guides)
+            or name.rpartition(".")[0] in guides.values()
+        )
     ]  # fmt: skip
     if not places:
         return
     node = mechanism.graph.node(drag.point)
     nodes = mechanism.linearize(pose.configuration).sensitivity(places).nodes[node]
     by_place = dict(zip(places, np.broadcast_to(nodes, (len(places), 1)), strict=True))
-
-    def rank(name: str) -> int:
-        """0 of a coordinate of the point itself, 1 of lengths and of what has no place, 2 of other coordinates."""
-        axes = name.rpartition(".")
-        return 1 if axes[2] not in ("x", "y") else 0 if axes[0].rpartition(".")[2] == drag.point else 2
-
-    kept = drag.held if len(drag.held) == 2 else ()
-    found: list[tuple[int, str, Complexes]] = []
-    for name in only or kept or free_numbers(original):
-        if name in drag.locked or name in original.fixed:
+    kept = [name for name in drag.held if name] if len(drag.held) == 2 else ()
+    ways: list[tuple[int, str, Complexes]] = []
+    drawn = _drawn(original, drag.point)
+    for name in only if only is not None else kept or [*drawn, *free_numbers(original)]:
+        if name in drag.locked or name in original.fixed or (name in study.parameters.measured and drawn):
             continue
-        slopes = study.parameters.derivatives(name)
+        slopes = _slopes(original, changes, study, name)
         moved = [place for place in slopes if place in by_place]
-        if moved or only:
+        if moved or only is not None:
             way = sum((by_place[place] * slopes[place] for place in moved), start=np.zeros(1, dtype=complex))
-            found.append((-1 if name in drag.held else min(map(rank, moved), default=2), name, way))
-    yield from ((name, way) for _, name, way in (found if only else sorted(found, key=lambda entry: entry[0])))
+            ways.append(
+                (-1 if name in drag.held else 0 if name in drawn else min(map(rank, moved), default=2), name, way)
+            )
+    yield from ((name, way) for _, name, way in (ways if only is not None else sorted(ways, key=lambda way: way[0])))
+
+
+def _drawn(study: Study, point: str) -> list[str]:
+    """The numbers of a point in the sketch, where dimensions are measured from it."""
+    owners = study.mechanism.graph.links_at(point)
+    measured = any(place.partition(".")[0] in owners for place in study.parameters.measured)
+    written = study.resolved["mechanism"].get("sketch") or {}
+    return [f"{SKETCH}.{point}.{axis}" for axis in (0, 1)] if measured and point in written else []
+
+
+def _slopes(original: Study, changes: Mapping[str, float], study: Study, name: str) -> Mapping[str, Number]:
+    """Derivative of every place that follows a number; of one of the sketch by reading the study beside."""
+    if not is_entry(name):
+        return study.parameters.derivatives(name)
+    value, beside = value_of(study, name), _BESIDE * study.mechanism.size
+    there = altered(original, {**changes, name: value + beside}).mechanism.nominal
+    return {
+        place: (there[place] - here) / beside for place, here in study.mechanism.nominal.items() if there[place] != here
+    }
+
+
+def _driven(study: Study, point: str) -> bool:
+    """Whether a point belongs to a link that a drive turns or pushes."""
+    mechanism, bodies = study.mechanism, set[str]()
+    for coordinate in map(mechanism.coordinate, mechanism.drives):
+        bodies |= {coordinate.body} if coordinate.slide < 0 else {*mechanism.graph.guides[coordinate.slide]}
+    links = {body.removesuffix(":rod") for body in bodies} - {GROUND}
+    return not links.isdisjoint(mechanism.graph.links_at(point))
+
+
+def _turning(original: Study, pose: _Pose, point: str, row: float) -> dict[str, Complexes]:
+    """Where a point goes along the motion, per row of it; nothing where that ends or stands still."""
+    ends = [_place(original, row + way * _BESIDE) for way in (-1, 1)]
+    low, high = (pose.of(pose.study, end) for end in ends)
+    # Round the end of a closed motion a row is as long as elsewhere.
+    span = 2 * _BESIDE if _goes_round(original) else ends[1] - ends[0]
+    way = (high.at(point) - low.at(point)) / span
+    return {TURNED: np.array([way])} if np.isfinite(way) and abs(way) > _BLIND else {}
+
+
+def _spans(ways: Mapping[str, Complexes]) -> bool:
+    """Whether two of the ways lead anywhere in the plane."""
+    directions = [complex(way[0]) / abs(way[0]) for way in ways.values()]
+    return any(abs((one.conjugate() * other).imag) > _FULL for one, other in combinations(directions, 2))
 
 
 def _fewest(ways: Mapping[str, Complexes], missing: complex) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from html import escape
 
 from mechdesign.door.live.server import LiveServer
-from mechdesign.door.live.session import Session
+from mechdesign.door.live.task import session_of
 from mechdesign.study import Study
 
 
@@ -14,7 +14,7 @@ class LiveFrame:
     """Shows the page of a study, which is served until `close` or the end of this process."""
 
     def __init__(self, study: Study, load: Callable[[], Study] | None, height: int) -> None:
-        self._server, self._height = LiveServer(Session(study, load), framed=True), height
+        self._server, self._height = LiveServer(session_of(study, load), framed=True), height
         self._server.start()
 
     @property

@@ -11,6 +11,7 @@ import re
 import secrets
 import socket
 import threading
+import time
 from contextlib import suppress
 from hmac import compare_digest
 from http import HTTPStatus
@@ -26,6 +27,8 @@ _MOST_BYTES = 1_000_000  # of a request
 _WAIT = 20.0  # seconds after which a page asks again whether the file has changed
 _END = 5.0  # seconds that a computation is waited for at the end
 _IDLE = 60.0  # seconds until a connection that says nothing is closed
+_SLOW = 10.0  # seconds in which a request has to arrive whole
+_MOST_CONNECTIONS = 64
 _POLICY = re.compile(rb'<meta http-equiv="Content-Security-Policy" content="([^"]+)">')
 _HEADERS = {
     "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
@@ -67,7 +70,8 @@ class LiveServer(ThreadingHTTPServer):
 
     def close(self) -> int:
         """End, and return how many pages were open; a computation is given some seconds to see that it is over."""
-        self.session.ended = True
+        for session in (self.session, *self.session.linkages.values()):
+            session.ended = True
         self.shutdown()
         self.server_close()
         with self.lock:
@@ -77,6 +81,22 @@ class LiveServer(ThreadingHTTPServer):
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
         return count
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Whether a connection is taken: not of one who opens them without end."""
+        return len(self.connections) < _MOST_CONNECTIONS
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own."""
+        with self.lock:
+            self.connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        with self.lock:
+            self.connections.discard(request)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A page that is closed while it is answered is no error."""
@@ -92,12 +112,8 @@ class _Handler(BaseHTTPRequestHandler):
     def setup(self) -> None:
         super().setup()
         self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        with self.server.lock:
-            self.server.connections.add(self.connection)
 
     def finish(self) -> None:
-        with self.server.lock:
-            self.server.connections.discard(self.connection)
         with suppress(OSError):
             super().finish()
 
@@ -112,19 +128,20 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """The page, or what a page waits for."""
-        if (words := self._admitted()) is None:
+        if (admitted := self._admitted()) is None:
             return
+        session, words = admitted
         if words == [""]:
             try:
-                page = self.server.session.page()
+                page = session.page()
             except Exception as error:
                 self._send(HTTPStatus.OK, f"{explain(error)[1]}\n".encode(), "text/plain; charset=utf-8")
                 return
             self._send(HTTPStatus.OK, page, "text/html; charset=utf-8")
         elif len(words) == 3 and words[0] == "changes" and words[1].isdigit():
-            self._wait(int(words[1][:9]), words[2][:40])
+            self._wait(session, int(words[1][:9]), words[2][:40])
         elif len(words) == 2 and words[0] == "progress":
-            self._reply({"progress": self.server.session.progress(words[1])})
+            self._reply({"progress": session.progress(words[1])})
         else:
             self._refuse(HTTPStatus.NOT_FOUND)
 
@@ -141,12 +158,10 @@ class _Handler(BaseHTTPRequestHandler):
                 server.lock.notify_all()
 
     def _do_post(self) -> None:
-        if (words := self._admitted()) is None:
+        if (admitted := self._admitted()) is None or (body := self._body()) is None:
             return
-        session = self.server.session
-        actions = {"move": session.move, "answer": session.answer, "pictures": session.pictures, "save": session.save}
-        if (body := self._body()) is None:
-            return
+        session, words = admitted
+        actions = session.actions
         if len(words) != 1 or words[0] not in actions:
             self._refuse(HTTPStatus.NOT_FOUND)
             return
@@ -169,17 +184,23 @@ class _Handler(BaseHTTPRequestHandler):
             answer = {"wrong": explain(error)[1]}
         self._reply(answer)
 
-    def _admitted(self) -> list[str] | None:
-        """The address behind the token, in words; None of a request that was refused."""
+    def _admitted(self) -> tuple[Session, list[str]] | None:
+        """Whose page asks, and the address behind the token, in words; None of a request that was refused."""
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
         foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
+        # Only to the page itself may something else lead: a link, the frame of a notebook.
+        arrives = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"
+        foreign |= not arrives and self.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none")
         if self.headers.get_all("Host", []) not in ([hosts[0]], [hosts[1]]):
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
         elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
             self._refuse(HTTPStatus.FORBIDDEN)
         else:
-            return rest.split("/")
+            session, words = self.server.session, rest.split("/")
+            if words[0] == "linkage" and len(words) > 2 and words[1] in session.linkages:
+                session, words = session.linkages[words[1]], words[2:]
+            return session, words
         return None
 
     def _body(self) -> bytes | None:
@@ -192,12 +213,29 @@ class _Handler(BaseHTTPRequestHandler):
         elif len(lengths[0]) > 9 or int(lengths[0]) > _MOST_BYTES:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
         else:
-            return self.rfile.read(int(lengths[0]))
+            return self._read(int(lengths[0]))
         return None
 
-    def _wait(self, version: int, page: str) -> None:
+    def _read(self, count: int) -> bytes | None:
+        """So many bytes; None where they did not come, or not in time."""
+        body, end = b"", time.monotonic() + _SLOW
+        while len(body) < count and (left := end - time.monotonic()) > 0:
+            self.connection.settimeout(left)
+            part = b""
+            with suppress(TimeoutError):
+                part = self.rfile.read1(count - len(body))
+            if not part:
+                break
+            body += part
+        self.connection.settimeout(_IDLE)
+        if len(body) == count:
+            return body
+        self._refuse(HTTPStatus.REQUEST_TIMEOUT)
+        return None
+
+    def _wait(self, session: Session, version: int, page: str) -> None:
         """Answer when the file has changed, or after a while."""
-        server, session = self.server, self.server.session
+        server = self.server
         with server.lock:
             server.waiting[page] = server.waiting.get(page, 0) + 1
         try:

@@ -224,8 +224,7 @@ def pictures(
             figure = make()
             drawn = {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
             if output.report:
-                alt = f"{name.replace('_', ' ')}: {vector.described(figure)}"
-                html = vector.picture(figure, f"{result.command}-{name}", alt, drawn.get(f"{name}.png"))
+                html = vector.picture_of(result.command, name, figure, drawn.get(f"{name}.png"))
                 drawn[f"{name}{INLINE}"] = html.encode()
             return drawn
 

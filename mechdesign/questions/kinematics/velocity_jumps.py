@@ -29,10 +29,12 @@ def velocity_jumps(question: MovedQuestion, bodies: Collection[str], design: int
     timed = question.section.speed is not None or poses.rule.timed
     places = distinct(np.concatenate([ends, poses.rule.corners if timed else ends]))
     places = places[(places > 0) & (places < poses.end)]
+    if not len(places):
+        return places
     sides = np.concatenate([places - BESIDE, places + BESIDE])
     there = curve.solve(np.full(len(sides), design), sides, judged=False)
     velocity = moving_at(question.section, there, study.mechanism.linearize(there.configuration)).velocity
-    if velocity is None or not len(places):
+    if velocity is None:
         return np.empty(0)
     graph, size = study.mechanism.graph, study.mechanism.size
     nodes = {graph.node(point) for body, point in graph.points if body in bodies}

@@ -46,15 +46,17 @@ def frames(drawn: DrawnPoses, table: Table, marked: Sequence[float]) -> tuple[Sw
     some = replace(drawn, shown=shown.take(evenly(len(shown.rows), MAX_POSES)))
     if along is None or along.curve.spent.any():
         return Sweep.of(some.shown), drawn.motion, table
-    finer = drawn.finer.shown.poses.numbers
-    rows = finer[finer < shown.poses.end + 1 - shown.poses.closed]
+    finer = drawn.finer
+    rows = finer.shown.poses.numbers
+    rows = rows[rows < shown.poses.end + 1 - shown.poses.closed]
     begin = together(rows if len(rows) <= MAX_POSES else some.shown.poses.numbers[some.shown.rows], np.array(marked))
     sizes = largest(drawn.vectors(drawn.motion, some.shown))
     points = [*Sweep.of(some.shown).places]
 
     def ways(places: Floats) -> Complexes:
         """Where points and tips of arrows are; `sizes` are those of the longest by their units."""
-        there, size = drawn.at(places), CHORD * along.curve.mechanism.size
+        there = finer if np.array_equal(places, finer.shown.poses.numbers) else drawn.at(places)
+        size = CHORD * along.curve.mechanism.size
         rows = [paths_of(there.shown.configuration, points) / size]
         for kind in drawn.vectors(there.motion, there.shown) if sizes else ():
             # What is zero throughout, such as forces where nothing acts, has no arrows.

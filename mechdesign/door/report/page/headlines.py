@@ -18,8 +18,10 @@ from mechdesign.ground.numerics.rounding import unchanging
 from mechdesign.ground.results import KeyNumber, Result, Table
 from mechdesign.ground.rows import choose, unit_of
 from mechdesign.ground.table_text import Rounding
+from mechdesign.motion.followed import Followed
 from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
+from mechdesign.questions.kinematics.drawn import DrawnPoses
 from mechdesign.questions.optimize.columns import OPTIMUM
 from mechdesign.questions.workspace.columns import HELD
 
@@ -234,7 +236,7 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
     if scope is None or scope.follow is None or rule.row in ("first", "each"):
         return None
     sign, absolute = -1 if rule.row in _LOWEST else 1, rule.row in _ABSOLUTE
-    courses = [*choose(result, f"{rule.table.name}.{column.name}", {}).courses.values()]
+    courses = _courses(rule, result, column)
     ends = [tuple(float(end[0]) for end in course.worst(sign, absolute=absolute)) for course in courses]
     present = [row for row, (value, _) in enumerate(ends) if np.isfinite(value)]
     if not present:
@@ -250,6 +252,16 @@ def _between(rule: KeyNumber, result: Result, column: Column) -> tuple[int, floa
         for name in ([*pose] if poses.swept is None else [poses.swept])
     ]
     return row, value, _Pose(_in_words(coordinates, 0), pose, at)
+
+
+def _courses(rule: KeyNumber, result: Result, column: Column) -> list[Followed]:
+    """A column over the motion; what the answer has followed already, but for its zeros, is not followed again."""
+    chosen = choose(result, f"{rule.table.name}.{column.name}", {})
+    along = result.drawn.along if isinstance(result.drawn, DrawnPoses) else None
+    names = [request.column for request in chosen.requests]
+    if along is None or rule.row == "least" or not {*names} <= {*along.columns} or not len(along.peaks.place):
+        return [*chosen.courses.values()]
+    return [Followed(along, name) for name in names]
 
 
 def _swept(result: Result, at: Column, row: int) -> _Pose:

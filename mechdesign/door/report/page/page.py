@@ -68,7 +68,7 @@ def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, pl
     sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
-    moving = _together({section["command"]: section["moving"] for section in sections if section["moving"]})
+    moving = together({section["command"]: section["moving"] for section in sections if section["moving"]})
     # The mechanism beside the answers moves through a motion, if there is one.
     lead = next((name for name, part in moving.items() if "given" in part["data"]), next(iter(moving), ""))
     parts = ["moving"] * bool(moving)
@@ -105,7 +105,7 @@ def report(study: Study, answers: Sequence[AnsweredQuestion], *, below: bool, pl
     )
 
 
-def _together(moving: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+def together(moving: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Mechanisms that move by their questions; of those along one motion the first alone, with what the others add."""
     firsts: dict[str, str] = {}
     parts: dict[str, Mapping[str, Any]] = {}

@@ -14,7 +14,7 @@ from mechdesign.door.report.page.vector import described, inline
 from mechdesign.drawing import style
 from mechdesign.drawing.layout import draw
 from mechdesign.drawing.pictures import View
-from mechdesign.ground.numerics.arrays import evenly
+from mechdesign.ground.numerics.arrays import Complexes, evenly
 from mechdesign.ground.results import Result
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
@@ -42,7 +42,7 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
     fits = fitting(placed)
     for row, sheet, sweep in placed[: len(fits)]:
         layer = Element("g")
-        _mark(layer, sheet, drawn)
+        mark_task(layer, sheet, drawn.places, drawn.directions)
         sketcher = Sketcher(layer, sheet, sweep.scene.some(sweep.valid[:1].tolist())[0])
         sketcher.names(sweep.scene.some(sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()), links=False)
         sketcher.ruler(study.units.label("length"))
@@ -71,11 +71,11 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
                          meanings(table), ["solutions", *(["trade"] if beside else [])])  # fmt: skip
 
 
-def _mark(layer: Element, sheet: Canvas, drawn: DrawnSolutions) -> None:
-    """The task: the places of its positions, and lines along the body there."""
-    for k, place in enumerate(drawn.places.tolist()):
+def mark_task(layer: Element, sheet: Canvas, points: Complexes, directions: Complexes) -> None:
+    """The places of a task's positions, and lines along the body there."""
+    for k, place in enumerate(points.tolist()):
         at = sheet.at(place)
-        if len(drawn.directions):
-            end = at + _AXIS * complex(drawn.directions[k]).conjugate()
+        if len(directions):
+            end = at + _AXIS * complex(directions[k]).conjugate()
             add(layer, "line", x1=at.real, y1=at.imag, x2=end.real, y2=end.imag, stroke=style.VERMILION, stroke_width=2)
         add(layer, "circle", cx=at.real, cy=at.imag, r=4, fill=style.VERMILION)

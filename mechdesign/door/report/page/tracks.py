@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,8 @@ _NOTHING = "."
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
 _SMALL, _LARGE = 1e-4, 1e7
-_COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
+_EXACT = 2.0**53  # integers below it are exact as numbers of 64 bits
+_LONG = 10.0  # a number varies little whose size is so many times its range
 
 
 @dataclass(frozen=True)
@@ -109,8 +111,10 @@ class ShownNumbers:
 
     def _digits(self, column: Column) -> tuple[int, int, str]:
         """Decimals of a column, the power of ten of which its numbers are multiples, and the unit that these have."""
-        size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
-        still = self.rounding.still(column, column.unit)
+        values = column.values[self.rows]
+        size, largest = _size(values), self.sizes.get(column.unit, 0.0)
+        still, known = self.rounding.still(column, column.unit), values[np.isfinite(values)]
+        span = float(np.ptp(known)) if len(known) else 0.0
         if size <= still:
             # A column that is constant up to rounding gets as many digits as the columns that vary.
             size = largest if largest > still else 1.0
@@ -118,7 +122,9 @@ class ShownNumbers:
         if unit.startswith("10"):
             # As key numbers: a power of ten where the number is very small or large alone.
             power, unit = (0, printed(column.unit)) if _SMALL <= size < _LARGE else (power, f"\N{MIDDLE DOT}{unit}")
-        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power, unit
+        # Of what varies little beside its size the curve is seen.
+        fine = min(size, _LONG * span) if span > still else size
+        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / fine))), power, unit
 
     def cell(self, column: Column) -> Cell:
         """The column's number in the pose drawn."""
@@ -136,9 +142,10 @@ def meanings(table: Table) -> dict[str, str]:
 
 
 def _size(values: Floats) -> float:
-    """How large the numbers of a column usually are."""
-    sizes = np.abs(values[np.isfinite(values)])
-    return float(np.quantile(sizes, _COMMON) or sizes.max()) if len(sizes) else 0.0
+    """How large the numbers of a column usually are: the median of their absolute values, but for zero."""
+    sizes = np.sort(np.abs(values[np.isfinite(values)]))
+    count = len(sizes)
+    return float(sizes[(count - 1) // 2] / 2 + sizes[count // 2] / 2 or sizes[-1]) if count else 0.0
 
 
 def deltas(values: Floats, factor: float) -> str:
@@ -147,15 +154,14 @@ def deltas(values: Floats, factor: float) -> str:
     A step s is 2 s, or -2 s - 1 where it is negative, in digits to the base 32, the lowest first; all but the last of
     them are 32 more. Where there is no value stands a point; steps of zero at the end are left out.
     """
-    letters: list[str] = []
-    last = 0
-    for value in (values * factor).tolist():
-        if math.isfinite(value):
-            step, last = round(value) - last, round(value)
-            letters.append(_letters(2 * step if step >= 0 else -2 * step - 1))
-        else:
-            letters.append(_NOTHING)
-    return "".join(letters).rstrip(_letters(0))
+    scaled = values * factor
+    finite = np.isfinite(scaled)
+    integers: Any = np.rint(scaled[finite])
+    exact = np.abs(integers).max(initial=0.0) < _EXACT
+    integers = integers.astype(np.int64) if exact else np.array([*map(int, integers.tolist())], dtype=object)
+    steps = np.diff(integers, prepend=0)
+    letters = map(_letters, np.where(steps >= 0, 2 * steps, -2 * steps - 1).tolist())
+    return "".join([next(letters) if known else _NOTHING for known in finite.tolist()]).rstrip(_letters(0))
 
 
 def steps(text: str, count: int) -> Floats:
@@ -220,6 +226,7 @@ def _values(track: str, count: int) -> Floats:
     return np.where(gone, np.nan, steps(track, count))
 
 
+@lru_cache(4096)
 def _letters(number: int) -> str:
     letters = ""
     while number >= _BASE:

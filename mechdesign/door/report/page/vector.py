@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from collections.abc import Callable, Iterator
+from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib
@@ -50,6 +51,11 @@ def described(figure: Figure) -> str:
     return "; ".join(" ".join(part.split()) for part in parts if part)
 
 
+def picture_of(command: str, name: str, figure: Figure, png: bytes | None = None) -> str:
+    """A picture of a question as it stands in a page; see `picture`."""
+    return picture(figure, f"{command}-{name}", f"{name.replace('_', ' ')}: {described(figure)}", png)
+
+
 def picture(figure: Figure, name: str, alt: str, png: bytes | None = None) -> str:
     """A figure as HTML; use inside `style.context`.
 
@@ -60,10 +66,11 @@ def picture(figure: Figure, name: str, alt: str, png: bytes | None = None) -> st
     png : bytes, optional
         The figure as it is written into a file, if it has been.
     """
-    data = png if png is not None else style.encoded(figure, "png")
-    pixels = base64.b64encode(data).decode()
     drawn = inline(figure, name, alt)
-    if len(drawn) <= max(SMALL, MAX_RATIO * len(pixels)):
+    if len(drawn) <= SMALL:
+        return drawn
+    pixels = base64.b64encode(style.encoded(figure, "png") if png is None else png).decode()
+    if len(drawn) <= MAX_RATIO * len(pixels):
         return drawn
     width, height = (round(inches * style.DPI) for inches in figure.get_size_inches())
     image = Element("img", alt=alt, width=f"{width}", height=f"{height}", src=f"data:image/png;base64,{pixels}")
@@ -72,15 +79,19 @@ def picture(figure: Figure, name: str, alt: str, png: bytes | None = None) -> st
 
 def inline(figure: Figure, name: str, alt: str) -> str:
     """A figure as an SVG element for a page, with texts as texts and without links to other files; see `picture`."""
+    haloed = dict[Text, Any]()
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         halo = _halo(text)
         if halo is not None:
             # As a path effect it would turn the letters into outlines.
+            haloed[text] = text.get_path_effects()
             text.set_path_effects([])
             text.set_gid(f"{_HALO}{halo:g}")
     with matplotlib.rc_context({"svg.fonttype": "none"}):
         root = ElementTree.fromstring(style.encoded(figure, "svg"))
+    for text, effects in haloed.items():
+        text.set_path_effects(effects)
     _clean(root, "")
     used = {
         match for element in root.iter() for value in element.attrib.values() for match in _REFERENCE.findall(value)

@@ -80,6 +80,8 @@
     const button = html("button", {type: "button", textContent: "Play"});
     let playing = 0, clock = 0;
     function frame(now) {
+      // A part of a page that was replaced moves no more.
+      if (!button.isConnected) return;
       if (!calm.matches) { advance(Math.max(0, Math.min(now - clock, 100)) / time * rate()); clock = now; }
       else if (now - clock >= SLOW_PAUSE / rate()) { advance(1 / SLOW_STEPS); clock = now; }
       playing = requestAnimationFrame(frame);
@@ -98,7 +100,7 @@
     }
     const toggle = () => playing ? stop() : play();
     button.addEventListener("click", toggle);
-    return {button, stop, play, toggle};
+    return {button, stop, play, toggle, playing: () => playing !== 0};
   }
 
   // The drawing of a mechanism: shows it at a pose, or between two. A part of a drawing, such as the mechanism before a
@@ -330,11 +332,11 @@
       drawing.setAttribute("aria-label", `${up.label} over ${across.label}`);
       const text = (words, looks) => { make("text", looks, drawing).textContent = words; };
       for (const value of ticks(west, east)) {
-        make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, stroke: "#dddddd"}, drawing);
+        make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, class: "moving-line"}, drawing);
         text(String(value).replace("-", "\u2212"), {x: px(value).toFixed(1), y: BOTTOM + 17, "text-anchor": "middle"});
       }
       for (const value of ticks(south, north)) {
-        make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, stroke: "#dddddd"}, drawing);
+        make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, class: "moving-line"}, drawing);
         text(String(value).replace("-", "\u2212"), {x: LEFT - 8, y: (py(value) + 3.5).toFixed(1), "text-anchor": "end"});
       }
       text(across.label, {x: (LEFT + RIGHT) / 2, y: BOTTOM + 36, "text-anchor": "middle"});
@@ -426,7 +428,11 @@
         slider.max = last;
         pace.textContent = data.pace;
       }
+      // Without numbers, as while a hand moves, there are no arrows: their boxes wait.
+      const waiting = numbered || !vectors ? [] : vectors.boxes;
       vectors = arrows(drawing, numbered ? data : {}, moved, chosen);
+      vectors.boxes.push(...waiting);
+      for (const box of waiting) { box.classList.add("moving-waits"); box.querySelector("input").disabled = true; }
       movable = Object.keys(moved.x).filter(point => [moved.x[point], moved.y[point]].some(values => values.some(value => isFinite(value) && value !== values[data.first])));
       const layer = (title, selector, on) => check(title, [...drawing.querySelectorAll(selector)], chosen(title, on));
       boxes.replaceChildren(layer("Paths", ".moving-trace", true), layer("Link names", ".moving-name", false),
@@ -514,7 +520,14 @@
     // stays what is marked to stay, unless `whole` is asked.
     figure.moving = {
       drawing, slider, leading, stop: player.stop,
-      go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; }, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
+      go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; },
+      // The pose at a row of the motion, between two where it is between two.
+      seek(row) {
+        const rows = decode(data.rows, data.poses, ROWS), next = rows.findIndex(own => own > row), k = (next < 0 ? rows.length : next) - 1;
+        const step = next < 0 ? rows[last] - rows[last - 1] : rows[next] - rows[k];
+        choose(k < 0 ? 0 : Math.min(k + (row - rows[k]) / step, data.returns ? data.poses - 0.01 : last));
+      },
+      words: () => words.textContent, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
       rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
       take(next, markup, entire) {
         const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
@@ -695,6 +708,7 @@
       select.value = k;
       readout.show(k);
       show(place());
+      figure.dispatchEvent(new Event("moving-chosen"));
     }
 
     const place = (at = share, {poses} = chosen, times = own) => {
@@ -759,12 +773,13 @@
     controls.append(slider, player.button, html("label", {}, grid ? "Linkage" : "Design", select), html("label", {}, paths, "Paths"),
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
+    figure.moving = {drawing, stop: player.stop, playing: player.playing, sheet: () => [...chosen.corner, chosen.scale]};
     choose(data.first);
     if (opening(figure)) player.play();
   }
 
-  function start() {
-    const figures = [...document.querySelectorAll("figure.moving")].map(figure =>
+  function start(room = document) {
+    const figures = [...room.querySelectorAll("figure.moving")].map(figure =>
       [figure, JSON.parse(figure.querySelector("script").textContent)]);
     figures.filter(([, data]) => data.front).forEach(part => front(...part));
     const motions = figures.filter(([, data]) => !data.choices).map(part => motion(...part));
@@ -772,6 +787,8 @@
     if (motions.length) maps.forEach(map => mark(motions[0], map));
   }
 
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", () => start());
   else start();
+  // A figure that a page gets later.
+  document.addEventListener("moving-new", event => start(event.target.parentNode));
 })();

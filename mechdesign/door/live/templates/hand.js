@@ -1,0 +1,264 @@
+"use strict";
+// What pages on which a hand changes a study have in common: the changes with undo, fields, saving, the file watched.
+// `react` is called when another change than a drag was made.
+function openHand(about, react) {
+  const RETRY = 2000; // milliseconds until the page asks a server that is not there again
+  const KEEP = "mechdesign-live", MOST = 500; // what outlasts a new version of the file, and gestures that it holds
+  const find = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
+  const words = find(".live-hand"), said = find(".live-said"), message = find(".live-message"), grid = find(".live-grid");
+  const dialog = find("dialog"), page = crypto.randomUUID();
+  const rows = new Map(all(".live-number").map(row => [row.dataset.name, row]));
+  const buttons = Object.fromEntries(all("[data-do]").map(button => [button.dataset.do, button]));
+  const dark = new CSSStyleSheet(), colours = new Map();
+  document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
+  let past = [], future = [], ended = false;
+
+  const text = value => String(Number(value.toPrecision(7)));
+  const base = name => rows.has(name) ? Number(rows.get(name).querySelector("input").dataset.value) : about.entries?.[name];
+
+  const own = {
+    changes: {}, set: [], held: false, rows, page, keeping: () => ({}), kept: {},
+    base,
+    value: name => own.changes[name] ?? base(name),
+
+    async post(action, asked, signal) {
+      const body = JSON.stringify({version: about.version, page, changes: own.changes, ...asked});
+      const answer = await fetch(action, {method: "POST", body, signal});
+      if (!answer.ok) throw new Error(`refused: ${answer.status} ${answer.statusText}`);
+      const content = await answer.json();
+      // Names of an older version may be gone.
+      if (content.outdated) { location.reload(); return new Promise(() => {}); }
+      return content;
+    },
+
+    // What the page says: of the server and the file above, of the hand beside it.
+    tell(text) { said.textContent = text; },
+    warn(text) { message.textContent = text; message.hidden = !text; },
+    beside(text, wrong) {
+      words.textContent = text;
+      words.hidden = !text || !own.held;
+      words.classList.toggle("wrong", wrong);
+      if (text) own.tell(text.replaceAll("\n", ", "));
+    },
+    lost(error) {
+      ended = true;
+      own.warn(`The server does not answer (${error.message}). What is here stays; start mechdesign live again and open its new address.`);
+    },
+
+    // Colours of a part of the page on a dark screen.
+    colour(part, rules) {
+      colours.set(part, rules);
+      dark.replaceSync([...colours.values()].join(""));
+    },
+
+    // Fields, sliders and buttons by the changes.
+    fill() {
+      for (const [name, row] of rows) {
+        const [field, slider] = row.querySelectorAll("input"), value = own.value(name);
+        row.classList.toggle("changed", name in own.changes);
+        if (document.activeElement !== field || Number(field.value) !== value) field.value = text(value);
+        slider.min = Math.min(slider.min, value);
+        slider.max = Math.max(slider.max, value);
+        slider.value = value;
+      }
+      const some = Object.keys(own.changes).length > 0;
+      buttons.undo.disabled = !past.length;
+      buttons.redo.disabled = !future.length;
+      buttons.reset.disabled = buttons.copy.disabled = !some;
+      buttons.save.disabled = !some || !about.file;
+    },
+
+    // Changes that are those of the file are none.
+    put(values) {
+      own.changes = {...own.changes, ...values};
+      for (const name of Object.keys(values)) if (values[name] === base(name)) delete own.changes[name];
+    },
+
+    // One entry of the history for each gesture, with the changes before it.
+    remember(before) {
+      if (JSON.stringify(before) !== JSON.stringify(own.changes)) {
+        past = [...past, before].slice(-MOST);
+        future = [];
+      }
+      own.fill();
+    },
+
+    snapped(place) {
+      const size = Number(grid.value);
+      return size > 0 ? place.map(value => Math.round(value / size) * size) : place;
+    },
+    step: event => (Number(grid.value) || about.step) * (event.shiftKey ? 10 : 1),
+
+    // A pointer holds a ring until it lets go: `moved` gets how far it is from where it took it, in pixels.
+    grasp(event, ring, moved, done) {
+      if (event.button) return;
+      event.preventDefault();
+      event.stopPropagation();
+      ring.focus({preventScroll: true});
+      ring.setPointerCapture(event.pointerId);
+      ring.classList.add("held");
+      own.held = true;
+      const before = {...own.changes};
+      const follow = move => {
+        move.stopPropagation();
+        if (move.pointerId !== event.pointerId) return;
+        words.style.left = `${Math.max(0, Math.min(move.clientX + 18, innerWidth - 220))}px`;
+        words.style.top = `${Math.max(0, Math.min(move.clientY + 18, innerHeight - 80))}px`;
+        moved(move.clientX - event.clientX, move.clientY - event.clientY);
+      };
+      const end = async move => {
+        if (move.pointerId !== event.pointerId) return;
+        for (const [kind, call] of listeners) ring.removeEventListener(kind, call);
+        ring.classList.remove("held");
+        await done();
+        own.held = false;
+        words.hidden = true;
+        own.remember(before);
+      };
+      const listeners = [["pointermove", follow], ["pointerup", end], ["pointercancel", end]];
+      for (const [kind, call] of listeners) ring.addEventListener(kind, call);
+    },
+
+    // A ring of a drawing, on which a hand, or the arrow keys, take hold of something.
+    ring(parent, label, radius) {
+      const space = "http://www.w3.org/2000/svg", ring = document.createElementNS(space, "g"), circle = document.createElementNS(space, "circle");
+      ring.setAttribute("class", "live-handle");
+      ring.setAttribute("tabindex", "0");
+      ring.setAttribute("role", "button");
+      ring.setAttribute("aria-label", `${label}: drag it, or use the arrow keys`);
+      circle.setAttribute("r", radius);
+      ring.append(circle);
+      parent.append(ring);
+      return ring;
+    },
+
+    // Progress of a computation in words, until it is stopped.
+    clock(state) {
+      let on = true;
+      const timer = setInterval(async () => {
+        try {
+          const {progress} = await (await fetch(`progress/${page}`)).json();
+          if (on) state.textContent = progress || "\u2026";
+        } catch { clearInterval(timer); }
+      }, 500);
+      return () => { on = false; clearInterval(timer); state.textContent = ""; };
+    },
+
+    begin() {
+      own.fill();
+      watch();
+    },
+  };
+
+  function restore(to) {
+    own.changes = {...to};
+    own.fill();
+    react();
+  }
+
+  // Fields and sliders: a gesture ends when the field is left or the slider let go.
+  for (const [name, part] of rows) {
+    const [field, slider] = part.querySelectorAll("input");
+    let before = null;
+    const input = value => {
+      before ??= {...own.changes};
+      if (value === "" || !isFinite(value)) return;
+      own.put({[name]: Number(value)});
+      own.fill();
+      react();
+    };
+    const done = () => { if (before) own.remember(before); before = null; own.fill(); };
+    field.addEventListener("input", () => input(field.value));
+    slider.addEventListener("input", () => input(slider.value));
+    field.addEventListener("change", done);
+    slider.addEventListener("change", done);
+  }
+  find(".live-numbers").addEventListener("submit", event => event.preventDefault());
+
+  // A question with an answer: the name of a file, "" for the study's own, or null.
+  function asked(title, name) {
+    const label = dialog.querySelector("label"), field = dialog.querySelector("input");
+    dialog.querySelector("h2").textContent = title;
+    label.hidden = name === null;
+    field.value = name ?? "";
+    dialog.returnValue = "no";
+    dialog.showModal();
+    (name === null ? dialog.querySelector("[value=no]") : field).focus();
+    return new Promise(resolve => dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes" ? field.value : null), {once: true}));
+  }
+
+  async function save(name, replace) {
+    try {
+      const answer = await own.post("save", {name, replace});
+      if (answer.exists) {
+        if (await asked(`${answer.exists} is there already. Replace it?`, null) !== null) await save(name, true);
+      } else if (answer.wrong) own.warn(answer.wrong);
+      else own.tell(`Saved as ${answer.saved}${answer.comments ? "" : "; its comments could not be kept"}.`);
+    } catch (error) { own.lost(error); }
+  }
+
+  const actions = {
+    undo() { future.push({...own.changes}); restore(past.pop()); },
+    redo() { past.push({...own.changes}); restore(future.pop()); },
+    reset() { past.push({...own.changes}); future = []; restore({}); },
+    async copy() {
+      const words = own.set.map(text => `--set '${text.replaceAll("'", "'\\''")}'`).join(" ");
+      try { await navigator.clipboard.writeText(words); own.tell(`Copied: ${words}`); } catch { own.tell(words); }
+    },
+    async saveas() {
+      const name = await asked("Save a copy of the study, in its folder", about.copy);
+      if (name) save(name, false);
+    },
+    async save() {
+      if (await asked(`Replace ${about.file} by the study as it is here?`, null) !== null) save("", true);
+    },
+  };
+  for (const name in actions) buttons[name].addEventListener("click", actions[name]);
+  document.addEventListener("keydown", event => {
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=number], input[type=text]")) return;
+    const button = buttons[event.shiftKey ? "redo" : "undo"];
+    event.preventDefault();
+    if (!button.disabled) button.click();
+  });
+
+  // Waits for a change of the file: a new version makes the page anew, a mistake is told.
+  async function watch() {
+    for (;;) {
+      try {
+        const now = await (await fetch(`changes/${about.version}/${page}`)).json();
+        if (ended) { ended = false; own.warn(about.mistake); react(); }
+        if (now.version !== about.version && !now.mistake) { location.reload(); return; }
+        if (now.version !== about.version) {
+          about.version = now.version;
+          own.warn(about.mistake = now.mistake);
+        }
+      } catch (error) {
+        own.lost(error);
+        await new Promise(resolve => setTimeout(resolve, RETRY));
+      }
+    }
+  }
+
+  // After a new version of the file what the hand has changed stays, with its history, as far as the file has it still.
+  const kept = JSON.parse(sessionStorage.getItem(KEEP) || "{}")[location.pathname];
+  if (kept) {
+    const names = Object.keys(kept.base), gone = names.filter(name => base(name) === undefined);
+    const now = entry => Object.fromEntries(names.filter(name => !gone.includes(name))
+      .map(name => [name, entry[name] ?? kept.base[name]]).filter(([name, value]) => value !== base(name)));
+    const differ = (entry, k, entries) => !k || JSON.stringify(entry) !== JSON.stringify(entries[k - 1]);
+    own.changes = now(kept.changes);
+    past = [...kept.past.map(now), own.changes].filter(differ).slice(0, -1);
+    future = [own.changes, ...kept.future.map(now).reverse()].filter(differ).slice(1).reverse();
+    own.kept = kept;
+    if (gone.length) {
+      own.tell(`Undo goes on without ${gone.join(", ")}: the file has no such number any more.`);
+      buttons.undo.title = said.textContent;
+    }
+  }
+  addEventListener("pagehide", () => {
+    const touched = [own.changes, ...past, ...future].flatMap(Object.keys), pages = JSON.parse(sessionStorage.getItem(KEEP) || "{}");
+    pages[location.pathname] = {changes: own.changes, past, future, base: Object.fromEntries(touched.map(name => [name, base(name)])), ...own.keeping()};
+    sessionStorage.setItem(KEEP, JSON.stringify(pages));
+  });
+  return own;
+}
