@@ -11,7 +11,7 @@ from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.optimize.variables import variables_of
 from mechdesign.questions.synthesize.bounds import RangeBounds
 from mechdesign.questions.synthesize.own import OwnKind
-from mechdesign.questions.synthesize.paths import Points, fits
+from mechdesign.questions.synthesize.paths import MOST_EXACT, Points, fits, starts
 from mechdesign.study import Study
 
 # Linkages that are sampled, those whose curves are polished, and the best of these with which a search begins.
@@ -45,5 +45,7 @@ def near_curves(study: Study, goals: Sequence[Goal], conditions: Sequence[Goal],
              if one.command == "kinematics" and not one.smallest and one.column in sines]  # fmt: skip
     bound = RangeBounds(kind, turning=kind.turns, least=max([0.0, *asked]) if kind.turns else 0.0)
     samples = kind.samples(np.random.default_rng(seed), _SAMPLED, 1.0, full_turn=path.closed)
-    found = fits(kind, kind.modes[0], path, samples, bound, _POLISHED).values[:_BEST]
+    (modes,), whole = kind.modes, len(path.points) <= MOST_EXACT
+    begun = starts(kind, modes, path, samples, bound, _POLISHED)
+    found = fits(kind, modes, path, begun, bound, whole=whole).values[:_BEST]
     return np.asarray((found - kind.low) / np.where(kind.high > kind.low, kind.high - kind.low, 1.0))

@@ -18,7 +18,7 @@ from mechdesign.questions.synthesize.curves import centre_points
 from mechdesign.questions.synthesize.files import judged, study_data, study_files
 from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
 from mechdesign.questions.synthesize.tasks import BodyTask, Task, task_of
-from mechdesign.questions.synthesize.words import linkage
+from mechdesign.questions.synthesize.words import faults, linkage
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
@@ -89,7 +89,9 @@ def _answer(
         name = "nearest" if missed else f"solution {number}"
         file = f"{name.replace(' ', '_')}.yaml"
         title = "Nearest to" if missed else f"Solution {number} of"
+        fault = "; ".join(faults(solution.defects, solution.elsewhere))
         heading = [f"{title} {study.name}: {words[number - 1]}", *([f"It misses: {missed}"] if missed else []),
+                   *([f"In the assembly of this file it does not move through its task: {fault}"] if fault else []),
                    f"Its report: mechdesign run {file} --report"]  # fmt: skip
         data.append(study_data(study, task, solution, f"{study.name}, {name}"))
         files |= study_files(file, solution.kind, data[-1], heading)

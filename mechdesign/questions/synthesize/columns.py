@@ -5,13 +5,17 @@ from __future__ import annotations
 from mechdesign.ground.columns import ColumnKind
 from mechdesign.ground.results import KeyNumber, TableKind
 
+# What is wrong with linkages that fulfil a task and do not move through it.
+DEFECTS = {
+    "branch": "a position needs another assembly", "circuit": "a dead centre lies between two",
+    "order": "the drive cannot pass them in their order",
+}  # fmt: skip
 SOLUTIONS = TableKind.of("solutions", "linkages that do the task, best first",
     ("solution", "number in the name of its file, such as solution_1.yaml"), ("kind", "kind of linkage"),
     ("error", "distance from the task, of a function error of its output: root mean square over the positions",
      "as the task"),
     ("max_error", "largest such distance", "as the task"),
-    ("defects", "branch: a position needs another assembly; circuit: a dead centre lies between two; order: the drive "
-     "cannot pass them in their order; empty where there is none"),
+    ("defects", f"{'; '.join(f'{name}: {text}' for name, text in DEFECTS.items())}; empty where there is none"),
     ("class", "class of its four-bar or slider-crank by the links that turn fully"),
     ("full_turn", "1 where the drive turns fully"),
     ("transmission_angle", "smallest over a turn where the drive turns fully, else on the way through the "

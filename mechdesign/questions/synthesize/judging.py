@@ -10,6 +10,7 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.derivatives import regularity
+from mechdesign.questions.synthesize.columns import DEFECTS
 from mechdesign.questions.synthesize.kinds import Kind
 
 # Poses on the way through the task; where a linkage comes nearest to a dead centre, so many more between two of them.
@@ -31,7 +32,7 @@ class Way:
     modes: tuple[int, ...]
     values: Floats
     angles: Floats  # drive at the positions, on its way: rising or falling
-    branch: Flags  # another assembly is needed at some position
+    elsewhere: Flags  # which positions need another assembly, shape (count, positions)
     circuit: Flags  # a dead centre lies between two positions
     order: Flags  # the drive cannot pass the positions in their order
     transmission: Floats  # smallest transmission angle on the way, radians
@@ -43,11 +44,8 @@ class Way:
     @cached_property
     def defects(self) -> list[str]:
         """Defects in words, empty where there are none."""
-        names = ("branch", "circuit", "order")
-        return [
-            ", ".join(name for name, flag in zip(names, flags, strict=True) if flag)
-            for flags in zip(self.branch.tolist(), self.circuit.tolist(), self.order.tolist(), strict=True)
-        ]
+        flags = np.stack([self.elsewhere.any(axis=1), self.circuit, self.order], axis=1)
+        return [", ".join(name for name, flag in zip(DEFECTS, row, strict=True) if flag) for row in flags.tolist()]
 
 
 def in_order(angles: Floats) -> tuple[Floats, Flags]:
@@ -110,9 +108,9 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
 
 
 def passed(
-    kind: Kind, modes: tuple[int, ...], values: Floats, angles: Floats, branch: Flags | None = None, *, full_turn: bool
-) -> Way:  # fmt: skip
-    """The way of linkages through a task in an assembly; `branch` tells which need another one at some position."""
+    kind: Kind, modes: tuple[int, ...], values: Floats, angles: Floats, elsewhere: Flags, *, full_turn: bool
+) -> Way:
+    """The way of linkages through a task in an assembly; `elsewhere` tells which positions need another one."""
     unwound, disorder = in_order(angles)
     if not kind.turns:
         steps = np.sign(np.diff(angles, axis=1))
@@ -128,5 +126,4 @@ def passed(
     dead, worst = whole_dead.copy(), whole_worst.copy()
     if not full_turn and len(rest):
         dead[rest], worst[rest] = along(kind, modes, values[rest], begin[rest], end[rest])
-    branch = np.zeros(len(values), dtype=bool) if branch is None else branch
-    return Way(kind, modes, values, unwound, branch, dead, disorder, worst, ~whole_dead)
+    return Way(kind, modes, values, unwound, elsewhere, dead, disorder, worst, ~whole_dead)

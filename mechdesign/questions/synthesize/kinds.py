@@ -12,6 +12,7 @@ from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.open_loops import OpenLoops
 from mechdesign.mechanism.plan import Plan
 from mechdesign.questions.synthesize.declared import BODY, MECHANISMS, POINT
 from mechdesign.study import Study
@@ -94,6 +95,10 @@ class Kind:
         if modes not in self._plans:
             self._plans[modes] = Plan(self.mechanism, self.mechanism.forward.structure, modes)
         return self._plans[modes].solve([angles], self.dimensions(values[:, None]))
+
+    def opened(self, values: Floats, poses: Floats) -> OpenLoops:
+        """Poses whose loops need not close: drive, angles and slides have shape (unknowns, count, poses)."""
+        return OpenLoops(self.mechanism.forward, self._node, [poses[0]], poses[1:], self.dimensions(values[:, None]))
 
     def shown(self, values: Floats, factor: float) -> dict[str, float]:
         """The values of one linkage as studies have them, `factor` radians being their unit of angle."""

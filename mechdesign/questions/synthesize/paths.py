@@ -80,36 +80,51 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
-    """Linkages of a kind in an assembly, best first: their values, and the crank angle at each point (radians)."""
+class Starts:
+    """Linkages of a kind, the crank angle of each at each point (radians), and the numbers of their starts, from 0."""
 
-    kind: Kind
-    modes: tuple[int, ...]
     values: Floats  # shape (count, places)
     angles: Floats  # shape (count, points)
+    numbers: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Fits(Starts):
+    """Linkages in an assembly, best first."""
+
     costs: Floats  # sum of the squared distances
-    starts: Ints  # which of the linkages that were polished each was, from 0
+
+
+def starts(
+    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: KindBounds, most: int = POLISHED
+) -> Starts:
+    """The linkages among samples, about so many, whose curves have most the form of the task; those first."""
+    samples = samples[bound.accepts(modes, samples)]
+    if bound.in_place and task.timing is None:
+        values, angles = _near(kind, modes, task, samples, 4 * most)
+    else:
+        values, angles = begun(kind, modes, task, samples, most, bound)
+    values = bound(values)
+    whole = np.isfinite(kind.points(kind.solve(values, angles, modes))).all(axis=1)
+    return Starts(values[whole], angles[whole], np.arange(np.count_nonzero(whole)))
 
 
 def fits(
-    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: KindBounds, polished: int = POLISHED
+    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: KindBounds, *, whole: bool = False
 ) -> Fits:
-    """The linkages among samples whose curves have the form of the task, polished; `bound` keeps their values."""
-    samples = samples[bound.accepts(modes, samples)]
-    if bound.in_place and task.timing is None:
-        values, angles = _near(kind, modes, task, samples, 4 * polished)
-    else:
-        values, angles = begun(kind, modes, task, samples, polished, bound)
-    if len(task.points) <= MOST_EXACT:
-        return polish(kind, modes, task, bound(values), angles, bound)
-    found = polish(kind, modes, task, bound(values), angles, bound, _KEPT)
+    """Linkages polished from starts; `bound` keeps their values, and with `whole` no start is left behind."""
+    if whole:
+        return polish(kind, modes, task, start, bound)
+    found = polish(kind, modes, task, start, bound, _KEPT)
     # The best of linkages with many dimensions still come nearer.
-    best = polish(kind, modes, task, found.values[:_BEST], found.angles[:_BEST], bound)
-    parts = [(best.values, found.values), (best.angles, found.angles), (best.costs, found.costs)]
-    values, angles, costs = (np.concatenate([one, rest[_BEST:]]) for one, rest in parts)
+    first = Starts(found.values[:_BEST], found.angles[:_BEST], found.numbers[:_BEST])
+    best = polish(kind, modes, task, first, bound)
+    values, angles, numbers, costs = (
+        np.concatenate([getattr(best, name), getattr(found, name)[_BEST:]])
+        for name in ("values", "angles", "numbers", "costs")
+    )
     order = np.argsort(costs, kind="stable")
-    starts = np.concatenate([found.starts[best.starts], found.starts[_BEST:]])
-    return Fits(kind, modes, values[order], angles[order], costs[order], starts[order])
+    return Fits(values[order], angles[order], numbers[order], costs[order])
 
 
 def _interpolated(wanted: Floats, rising: Floats) -> Floats:
@@ -221,7 +236,7 @@ def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints
 
 
 def polish(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, bound: KindBounds,
+    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: KindBounds,
     kept: Mapping[int, int] = MappingProxyType({}),
 ) -> Fits:  # fmt: skip
     """All linkages at once by Levenberg and Marquardt's method; `kept` are how many go on after so many rounds."""
@@ -231,13 +246,13 @@ def polish(
         return np.asarray(np.nan_to_num((np.abs(gaps) ** 2).sum(axis=1), nan=np.inf, posinf=np.inf))
 
     (begin, span), count = kind.course, len(kind.places)
-    largest = _LARGEST_STEP * span
-    costs, damping, starts = cost(values, angles), np.full(len(values), 1e-3), np.arange(len(values))
-    for number in range(ROUNDS):
-        best = np.argsort(costs, kind="stable")[: kept.get(number, len(costs))]
+    largest, values, angles, numbers = _LARGEST_STEP * span, start.values, start.angles, start.numbers
+    costs, damping = cost(values, angles), np.full(len(values), 1e-3)
+    for turn in range(ROUNDS):
+        best = np.argsort(costs, kind="stable")[: kept.get(turn, len(costs))]
         best = best[np.isfinite(costs[best])]
-        values, angles, costs, damping, starts = (
-            values[best], angles[best], costs[best], damping[best], starts[best],
+        values, angles, costs, damping, numbers = (
+            values[best], angles[best], costs[best], damping[best], numbers[best],
         )  # fmt: skip
         if not (costs > (_CONVERGED * task.size) ** 2).any():
             break
@@ -274,4 +289,4 @@ def polish(
         values, angles = np.where(better[:, None], moved, values), np.where(better[:, None], turned, angles)
         costs, damping = np.where(better, new, costs), np.where(better, np.maximum(damping / 4, 1e-12), 5 * damping)
     best = np.argsort(costs, kind="stable")
-    return Fits(kind, modes, values[best], angles[best], costs[best], starts[best])
+    return Fits(values[best], angles[best], numbers[best], costs[best])

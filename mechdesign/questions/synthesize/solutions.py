@@ -52,7 +52,7 @@ class Pool:
         way = self.way
         return Solution(
             way.kind, way.modes, way.values[row], way.angles[row], self.errors[row], way.defects[row],
-            float(way.transmission[row]), bool(way.full_turn[row]),
+            float(way.transmission[row]), bool(way.full_turn[row]), (np.flatnonzero(way.elsewhere[row]) + 1).tolist(),
         )  # fmt: skip
 
 
@@ -80,6 +80,7 @@ class Solution:
     defects: str
     transmission: float  # radians
     full_turn: bool
+    elsewhere: Sequence[int]  # positions, from 1, that need another assembly
     made: Worth = _UNJUDGED
 
     @property

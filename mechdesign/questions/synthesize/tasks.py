@@ -15,6 +15,7 @@ from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.bounds import KindBounds, RangeBounds
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT, in_words
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
+from mechdesign.questions.synthesize.exact import passing
 from mechdesign.questions.synthesize.judging import in_order, passed
 from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.own import OwnKind, own_kind
@@ -67,6 +68,16 @@ class _Task:
         """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
         return 1.0
 
+    @property
+    def points(self) -> Complexes:
+        """Places that the point P shall pass; none of a function."""
+        return np.empty(0, dtype=complex)
+
+    def gaps(self, part: Candidates) -> list[Floats]:
+        """Distance of the point P from its place at each position, of each assembly; shape (count, positions)."""
+        return [np.abs(part.kind.points(part.kind.solve(part.values, part.angles, modes)) - self.points)
+                for modes in part.kind.modes]  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class BodyTask(_Task):
@@ -118,13 +129,6 @@ class BodyTask(_Task):
         turns = np.unwrap(np.angle(self.positions.rotations)) / self.factor
         return POINT, {POINT: self.positions.places.tolist(), f"{BODY}.angle": turns.tolist()}
 
-    def gaps(self, part: Candidates) -> list[Floats]:
-        """Distance of the body's origin from each position, of each assembly; shape (count, positions)."""
-        return [
-            np.abs(part.kind.points(part.kind.solve(part.values, part.angles, modes)) - self.positions.places)
-            for modes in part.kind.modes
-        ]
-
 
 @dataclass(frozen=True, eq=False)
 class FunctionTask(_Task):
@@ -168,17 +172,12 @@ class FunctionTask(_Task):
         )
         if len(links):
             part = self._linkage(links)
-            yield from assembled(part, self.gaps(part, links), conditions, self.size if self.slides else 1.0)
+            yield from assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)
 
     @property
     def error_factor(self) -> float:
         """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
         return 1.0 if self.slides else self.factor
-
-    @property
-    def points(self) -> Complexes:
-        """Places that the point P shall pass; none of a function."""
-        return np.empty(0, dtype=complex)
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what it should be at each position, in the study's units."""
@@ -206,7 +205,7 @@ class FunctionTask(_Task):
             values[:, kind[name]] = number
         return Candidates(kind, values, self.inputs + np.angle(links.pivot)[:, None])
 
-    def gaps(self, part: Candidates, links: Dyads) -> list[Floats]:
+    def errors(self, part: Candidates, links: Dyads) -> list[Floats]:
         """Errors of the output at each input, of each assembly."""
         gaps = []
         for modes in part.kind.modes:
@@ -251,53 +250,76 @@ class PathTask(_Task):
         if len(self.path.points) < self.given:
             conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
         for kind in self.kinds:
-            exact = []
-            for modes in kind.modes:
-                fits = self._fits(kind, modes, random)
-                exact.append(_exact(fits, self.size))
+            bound, ways = self._bound(kind), len(kind.modes)
+            starts = [self._starts(kind, modes, bound, random) for modes in kind.modes]
+            starts = [replace(part, numbers=part.numbers * ways + k) for k, part in enumerate(starts)]
+            count, exact = sum(len(part.numbers) for part in starts), list[paths.Starts]()
+            few = len(self.path.points) <= paths.MOST_EXACT
+            # Where the points leave no choice, linkages that pass them may need an assembly at each.
+            alone = few and ways > 1 and self._leaves_none(kind, bound)
+            if alone and count:
+                exact.append(_distinct([passing(kind, self.path, starts, bound)], self.size))
+                part = Candidates(kind, exact[0].values, exact[0].angles)
+                if len(part.values):
+                    yield from assembled(part, self.gaps(part), conditions, self.size)
+            for modes, start in zip(kind.modes, starts, strict=True):
+                fits = paths.fits(kind, modes, self.path, start, bound, whole=few and not alone)
+                passes = fits.costs <= (EXACT * self.size) ** 2 * len(self.path.points)
+                exact.append(paths.Starts(fits.values[passes], fits.angles[passes], fits.numbers[passes]))
                 if not len(fits.costs):
                     continue
                 rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
                 values, angles = fits.values[rows], fits.angles[rows]
                 gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
-                yield Pool(passed(kind, modes, values, angles, full_turn=self.section.needs_turn), gaps)
-            if not any(starts for _, _, starts in exact):
+                none = np.zeros(gaps.shape, dtype=bool)
+                yield Pool(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
+            if not count:
                 conditions.told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
-            elif len(self.path.points) <= paths.MOST_EXACT:
-                whole, last, starts = sum(one[0] for one in exact), *(max(one[k] for one in exact) for k in (1, 2))
-                words = f"{whole} exact, the last new one at start {last} of {starts}" if whole else \
-                    f"none exact of {starts} starts"  # fmt: skip
+            elif few:
+                numbers = _distinct(exact, self.size).numbers
+                words = f"{len(numbers)} exact, the last new one at start {numbers[-1] + 1} of {count}" \
+                    if len(numbers) else f"none exact of {count} starts"  # fmt: skip
                 conditions.told.append(f"{in_words(kind.name)}: {words}")
 
-    def _fits(self, kind: Kind, modes: tuple[int, ...], random: np.random.Generator) -> paths.Fits:
-        """Linkages of a kind in an assembly, from samples of it."""
+    def _bound(self, kind: Kind) -> KindBounds:
+        """What keeps linkages of a kind within the limits."""
         section = self.section
         if isinstance(kind, OwnKind):
-            bound: KindBounds = RangeBounds(kind, turning=section.needs_turn, least=section.least_sine(self.factor))
-        else:
-            bound = KindBounds(kind, section, self.centre, self.size, self.factor)
+            return RangeBounds(kind, turning=section.needs_turn, least=section.least_sine(self.factor))
+        return KindBounds(kind, section, self.centre, self.size, self.factor)
+
+    def _starts(
+        self, kind: Kind, modes: tuple[int, ...], bound: KindBounds, random: np.random.Generator
+    ) -> paths.Starts:
+        """Linkages of a kind in an assembly from which exact ones and near ones are looked for."""
+        section = self.section
         ratio = min(section.bounds.ratio, _SAMPLED) if bound.in_place else section.bounds.ratio
         count = section.evaluations or (PATHS if self.path.closed else OPEN_PATHS)
         samples = kind.samples(random, count, ratio, full_turn=section.needs_turn)
         if bound.in_place:
             samples = bound.placed(samples)
         most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
-        return paths.fits(kind, modes, self.path, samples, bound, most)
+        return paths.starts(kind, modes, self.path, samples, bound, most)
+
+    def _leaves_none(self, kind: Kind, bound: KindBounds) -> bool:
+        """Whether the points leave no choice of a kind's dimensions; along its slides a rail may begin anywhere."""
+        conditions = len(self.path.points) if self.free else 2 * len(self.path.points) - 1
+        return bool(conditions >= np.count_nonzero(~bound.fixed) - len(kind.directions))
 
 
 Task = BodyTask | FunctionTask | PathTask
 
 
-def _exact(fits: paths.Fits, size: float) -> tuple[int, int, int]:
-    """How many linkages pass all points, the start (from 1) that gave the last new one, and the number of starts."""
-    kept: list[Floats] = []
-    last, limit = 0, (EXACT * size) ** 2 * fits.angles.shape[1]
-    for row in np.flatnonzero(fits.costs <= limit)[np.argsort(fits.starts[fits.costs <= limit])].tolist():
-        values = fits.values[row]
-        if not kept or (np.abs(np.array(kept) - values) / (np.abs(values) + size)).max(axis=1).min() > _DISTINCT:
-            kept.append(values)
-            last = int(fits.starts[row]) + 1
-    return len(kept), last, int(fits.starts.max(initial=-1)) + 1
+def _distinct(parts: Sequence[paths.Starts], size: float) -> paths.Starts:
+    """Exact linkages, each once, by the first start that led to it."""
+    values, angles, numbers = (np.concatenate([getattr(part, name) for part in parts])
+                               for name in ("values", "angles", "numbers"))  # fmt: skip
+    kept = list[int]()
+    for row in np.argsort(numbers, kind="stable").tolist():
+        gaps = np.abs(values[kept] - values[row]) / (np.abs(values[row]) + size)
+        if gaps.max(axis=1, initial=0.0).min(initial=np.inf) > _DISTINCT:
+            kept.append(row)
+    return paths.Starts(values[kept], angles[kept], numbers[kept])
 
 
 def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
@@ -316,7 +338,7 @@ def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, 
         some = np.flatnonzero((first == number) & whole)
         if len(some):
             other = stack[number, some] > nearest[some] + _OTHER * size
-            way = passed(part.kind, modes, part.values[some], part.angles[some], other.any(axis=1),
+            way = passed(part.kind, modes, part.values[some], part.angles[some], other,
                          full_turn=conditions.section.needs_turn)  # fmt: skip
             yield Pool(way, nearest[some])
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from mechdesign.ground.errors import counted
 from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
+from mechdesign.questions.synthesize.columns import DEFECTS
 from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, in_words
 from mechdesign.questions.synthesize.schema import RATIO, REACH
 from mechdesign.study import Study
@@ -36,6 +37,12 @@ def linkage(table: Table, row: int, error: float) -> list[str]:
         words.append(f"peak effort {with_unit('peak_effort', float(table['peak_effort'][row]))}")
     defects = str(table["defects"][row])
     return [*words, f"defect: {defects}" if defects else "no defect"]
+
+
+def faults(defects: str, elsewhere: Sequence[int]) -> Iterator[str]:
+    """What keeps a linkage from moving through its task; `elsewhere` are positions, from 1, of another assembly."""
+    for name in filter(None, defects.split(", ")):
+        yield DEFECTS[name] + (f" ({', '.join(map(str, elsewhere))})" if name == "branch" else "")
 
 
 def task(study: Study) -> Iterator[str]:
