@@ -40,6 +40,7 @@ def test_bash_completes_what_is_typed(folder):
         ("watch", "slider.yaml", "k"): ["kinematics"],
         ("new", "f"): ["five_bar", "four_bar"],
         ("docs", "comp"): ["compare"],
+        ("synthesize", "--set", "synthesis.judge.t"): ["synthesis.judge.tolerance"],
     }
     lines = [
         f"COMP_WORDS=(mechdesign {' '.join(words)}); COMP_CWORD={len(words)}; "

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from mechdesign.door.reference import below, entries, find, near, place
-from mechdesign.door.reference.keys import Key, keys
+from mechdesign.door.reference.keys import Key, continued, keys
 from mechdesign.ground.indices import INDEX_NAMES
 from mechdesign.questions.reliability import task
 from mechdesign.questions.workspace import quadrature, question
@@ -23,6 +23,19 @@ EXAMPLES = [(key, example) for key in keys() for example in key.model.said(key.n
 
 def words(name: str) -> list[str]:
     return [entry.word for entry in find(ENTRIES, name)]
+
+
+def test_a_path_that_is_typed_goes_on_to_keys_of_the_format_and_names_of_the_study():
+    """What a Tab completes behind --set and --vary."""
+    data = {"mechanism": {"parameters": {"r": 40}, "links": {"crank": ["O", "A", "r"]}}, "synthesis": {"body": [{}]}}
+    assert continued("synthesis.j", None)[:3] == [
+        "synthesis.judge", "synthesis.judge.tolerance", "synthesis.judge.dimensions"
+    ]  # fmt: skip
+    assert continued("synthesis.judge.w", None) == ["synthesis.judge.within"]
+    assert continued("mechanism.parameters.", data) == ["mechanism.parameters.r"]
+    assert "mechanism.links.crank.length" in continued("mechanism.links.crank", data)
+    assert continued("synthesis.body.0.a", data) == ["synthesis.body.0.angle"]
+    assert continued("nowhere.", data) == continued("synthesis.judge.within=", data) == []
 
 
 @pytest.mark.slow

@@ -168,9 +168,13 @@ def test_what_cannot_be_judged_is_said_before_anything_is_looked_for(judge: str,
 
 def test_where_nothing_passes_the_nearest_is_a_study_and_the_exit_code_3(tmp_path: Path) -> None:
     study = f"{FIVE}  kinds: four_bar\n  keep_out: {{x: [-999, 999], y: [-999, 999]}}\n"
-    done = ask("synthesize", "-", "--no-plots", "--out", tmp_path, study=study)
+    done = ask("synthesize", "-", "--no-plots", "--report", "--out", tmp_path, study=study)
     assert done.exit_code == 3
-    first, second, *_ = done.stderr.splitlines()
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("no linkage does it; the nearest is in nearest.yaml") == 1
+    assert "its smallest transmission angle" in page
+    report, first, second, *_ = done.stderr.splitlines()
+    assert report.endswith("report.html")
     assert first.endswith("no linkage does it; the nearest is in nearest.yaml: a pivot lies where none may (keep_out)")
     assert second.startswith("nearest: four-bar (triple-rocker), error 0 mm")
     near = mechdesign.load(tmp_path / "nearest.yaml")

@@ -22,7 +22,6 @@ from mechdesign.door.cli.execution import (
     HERE,
     answer,
     drawing_ahead,
-    interrupted,
     load_source,
     source,
     tell,
@@ -36,7 +35,7 @@ from mechdesign.door.report import manifest
 from mechdesign.door.report.page import pages
 from mechdesign.door.report.requirements import command_of, number_of
 from mechdesign.ground.cautions import Caution, fails
-from mechdesign.ground.errors import StudyError
+from mechdesign.ground.errors import Interrupted, StudyError
 from mechdesign.ground.files import owned
 from mechdesign.ground.work import interrupts, shards
 from mechdesign.ground.work.chunks import worker_count
@@ -315,7 +314,8 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
                 if outcome.exit_code and options.fail_fast:
                     break
         except KeyboardInterrupt as error:
-            outcomes.append(interrupted(study, command, directory, error))
+            code, said = Interrupted.exit_code, str(error) or "interrupted"
+            outcomes.append(Outcome.unanswered(study.label, command, directory, code, error, said))
             ended = End(interrupted=True)
         try:
             ended = replace(ended, entry=_page(study, task, outcomes, several=several), exit_code=_stale(study, task))

@@ -236,4 +236,4 @@ def failure(label: str, command: str, directory: Path, error: Exception, study: 
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))
-    return Outcome(label, command, directory, code, 0, failed=message)
+    return Outcome.unanswered(label, command, directory, code, error, message)

@@ -145,8 +145,10 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         raise
     except AssemblyError as error:
         if error.result is not None:
-            plain = dataclasses.replace(output, plots=False, animate=False, report=False)
-            writer.write(directory, study, error.result, (), plain)
+            # What comes nearest is shown where the question has pictures of it.
+            if error.result.drawn is None:
+                output = dataclasses.replace(output, plots=False, animate=False, report=False)
+            writer.write(directory, study, error.result, (), output, options.jobs, progress)
         raise
     try:
         with progress:
@@ -345,13 +347,6 @@ def write_report(
     return [number for answer in answers if answer.section is not None for number in answer.section["headlines"]]
 
 
-def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:
-    """The outcome of an interrupted question, which may have a partial result."""
-    code = Interrupted.exit_code
-    words = str(error) or "interrupted"
-    return Outcome(study.label, command, directory, code, 0, failed=words, written=isinstance(error, Interrupted))
-
-
 def drawing_ahead(options: Options) -> AbstractContextManager[None]:
     """Context of the answers to one study, in which pictures are drawn by a process that imports Matplotlib at once.
 
@@ -377,9 +372,10 @@ def ask(options: Options) -> Outcome:
         with owned(directory):
             try:
                 outcome = answer(study, command, directory, options, Bar(study.label, command, quiet=options.quiet))
-            except Interrupted as error:
+            except (Interrupted, AssemblyError) as error:
                 if options.report:
-                    write_report(directory, study, [interrupted(study, command, directory, error)], options)
+                    outcome = Outcome.unanswered(study.label, command, directory, error.exit_code, error, str(error))
+                    write_report(directory, study, [outcome], options)
                 raise
             if options.report:
                 write_report(directory, study, [outcome], options)

@@ -1,6 +1,7 @@
 """What commands take: every argument and option, said once. Annotations are read at start, so they are no texts."""
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import Parameter
@@ -37,6 +38,21 @@ def _studies(incomplete: str) -> list[str]:
     except OSError:
         return []
     return [f"{folder}{slash}{name}" for name in names if name.startswith(start)]
+
+
+def _paths(incomplete: str) -> list[str]:
+    """Entries of a study that complete a word: keys of the format, and names of the study that is typed."""
+    from mechdesign.door.reference.keys import continued
+    from mechdesign.study.text.document import read
+
+    # What is typed, as bash gives it, or another shell.
+    line = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS", "")
+    study = next((word for word in line.split() if word.endswith((".yaml", ".yml"))), "study.yaml")
+    try:
+        data = read(Path(study).read_bytes(), study).data
+    except (OSError, StudyError):
+        data = None
+    return continued(incomplete, data)
 
 
 def _templates(incomplete: str) -> list[str]:
@@ -113,7 +129,7 @@ class Options:
     """Absolute tolerance, which is added. Default: what rounding leaves, 1e-12 of the largest number of the same unit
     in the table.
     """
-    vary: Annotated[list[str] | None, _option("A.B.C=VALUES")] = None
+    vary: Annotated[list[str] | None, _option("A.B.C=VALUES", autocompletion=_paths)] = None
     """An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of
     a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.
     """
@@ -135,7 +151,7 @@ class Options:
     """Results that are to be small, likewise."""
     sort: bool = False
     """The best case is the first row of the table."""
-    overrides: Annotated[list[str] | None, _option("A.B.C=VALUE")] = None
+    overrides: Annotated[list[str] | None, _option("A.B.C=VALUE", autocompletion=_paths)] = None
     """Change one entry of the study before it is checked, e.g. mechanism.parameters.r=42. Repeatable."""
     seed: Annotated[int | None, _option("N", min=0)] = None
     """Seed of the random numbers. Default: the study's, else 0."""

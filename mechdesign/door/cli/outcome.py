@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from mechdesign.door.report import manifest
 from mechdesign.door.report.requirements import Verdict
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import OUTCOMES
 from mechdesign.ground.files import FORMATS
-from mechdesign.ground.results import Table
+from mechdesign.ground.results import Result, Table
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,15 @@ class Outcome:
     shard: str = ""  # what became of the shard, with --shard
     left: bool = False  # whether the run ended before this question
     reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
+
+    @classmethod
+    def unanswered(
+        cls, study: str, command: str, directory: Path, exit_code: int, error: BaseException, words: str
+    ) -> Self:
+        """That of a question which ended with an error; a part of an answer, or the nearest one, may be written."""
+        result: Result | None = getattr(error, "result", None)
+        words = (result.failed if result is not None else "") or words
+        return cls(study, command, directory, exit_code, 0, failed=words, written=result is not None)
 
     @property
     def picture(self) -> Path | None:

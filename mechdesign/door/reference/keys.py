@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin
@@ -16,6 +16,7 @@ from mechdesign.ground.indices import INDEX_NAMES
 from mechdesign.study import Units
 from mechdesign.study.schema.study_file import model_of, schema
 from mechdesign.study.text import fields
+from mechdesign.study.text.document import value_at
 from mechdesign.study.text.fields import Model, Read, meaning
 from mechdesign.study.text.forms import properties
 
@@ -52,6 +53,24 @@ def _models(annotation: Any) -> Iterator[tuple[type[Model], str]]:
     for part in get_args(annotation):
         for model, stars in _models(part):
             yield model, star + stars
+
+
+def continued(start: str, data: Any) -> list[str]:
+    """The paths by which the start of one may go on, to its next key: those of the format, and of a study's data."""
+    *above, last = start.split(".")
+    paths = [key.path.split(".") for key in keys()]
+
+    def below(above: Sequence[str]) -> list[str]:
+        own = value_at(data, tuple(int(name) if name.isdecimal() else name for name in above))
+        inner = [path[len(above)] for path in paths
+                 if len(path) > len(above) and all(map(fnmatchcase, above, path))]  # fmt: skip
+        names = [*own] if isinstance(own, Mapping) else range(len(own)) if isinstance(own, list) else ()
+        return [*dict.fromkeys(map(str, (*names, *(name for name in inner if name != "*"))))]
+
+    names = [name for name in below(above) if name.startswith(last)]
+    found = [".".join((*above, name)) for name in names]
+    # A shell goes on behind a word that others begin with.
+    return found if len(names) != 1 else found + [f"{found[0]}.{name}" for name in below((*above, *names))]
 
 
 def entries() -> Iterator[Entry]:

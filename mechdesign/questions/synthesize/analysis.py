@@ -126,8 +126,8 @@ def _none(
     )
     missed = "; ".join(reasons)
     result = _answer(study, task, [solution], [np.nan], told, missed)
-    message = "\n".join((f"no linkage does it; the nearest is in nearest.yaml: {missed}", *result.notes))
-    return AssemblyError(message, replace(result, failed=message))
+    message = f"no linkage does it; the nearest is in nearest.yaml: {missed}"
+    return AssemblyError("\n".join((message, *result.notes)), replace(result, failed=message))
 
 
 def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], scores: Sequence[float]) -> Table:

@@ -46,10 +46,11 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
         sketcher = Sketcher(layer, sheet, sweep.scene.some(sweep.valid[:1].tolist())[0])
         sketcher.names(sweep.scene.some(sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()), links=False)
         sketcher.ruler(study.units.label("length"))
+        label = "nearest" if result.failed else f"solution {row + 1}"
         kind, *words = linkage(table, row, float(drawn.errors[row]))
         choices.append(fits[row] | {
             "drawing": fits[row]["drawing"] + "".join(tostring(part, encoding="unicode") for part in layer),
-            "view": f"0 0 {sheet.width:g} {sheet.height:.1f}", "title": f"solution {row + 1}, {kind}",
+            "view": f"0 0 {sheet.width:g} {sheet.height:.1f}", "title": f"{label}, {kind}",
             "number": row + 1, "mark": kind, "words": [f"{row + 1}: {kind}", *words],
         })  # fmt: skip
     rows = np.array([row for row, _, _ in placed[: len(choices)]])
