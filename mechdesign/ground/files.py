@@ -12,10 +12,11 @@ import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
-from mechdesign.ground.errors import OutputError, StudyError
+from mechdesign.ground.errors import OutputError, StudyError, printable
 
 try:
     import fcntl
@@ -27,6 +28,9 @@ FORMATS = ("png", "svg", "pdf")
 # In a folder of results: the lock of the process that writes there, and the names of files that are being replaced.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
+# What Windows has no file for: letters, and names of devices, whatever their ending.
+_UNFIT = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
+_DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9\u00b9\u00b2\u00b3])(\..*)?", re.IGNORECASE)
 
 
 def formats_of(listed: str | None, option: str) -> str:
@@ -61,27 +65,45 @@ def replace(path: Path, blocks: Iterable[bytes]) -> str:
     return digest
 
 
+@contextmanager
+def giving_way(path: Path) -> Iterator[None]:
+    """Inside, a file is replaced or removed; where the system refuses it, the error says what to do.
+
+    Raises
+    ------
+    PermissionError
+        On Windows where another program has the file open.
+    """
+    try:
+        yield
+    except PermissionError as error:
+        words = f"{path.name} cannot be replaced: it is open in another program, or write-protected; close it there"
+        raise PermissionError(error.errno, f"{words}, and run the command again") from error
+
+
 class Transaction:
     """Files of a folder, all written under temporary names before the first gets its own name.
 
-    A failed write leaves the folder unchanged. Used as a context, which removes the temporary files.
+    A failed write leaves the folder unchanged, and so does a file that cannot be replaced. Used as a context, which
+    removes the temporary files.
     """
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self._staged: dict[str, Path] = {}
+        self._aside: dict[str, Path] = {}  # files that are replaced or removed
 
     def __enter__(self) -> Transaction:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for temporary in self._staged.values():
+        for temporary in (*self._staged.values(), *self._aside.values()):
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
     def stage(self, name: str, blocks: Iterable[bytes]) -> str:
         """Write a file under a temporary name, and return its SHA-256."""
-        temporary = self._staged[name] = self.directory / f".mechdesign.{name}.{os.getpid()}.tmp"
+        temporary = self._staged[name] = self._temporary(name)
         digest = hashlib.sha256()
         with temporary.open("wb") as stream:
             for block in blocks:
@@ -98,17 +120,46 @@ class Transaction:
         ------
         StudyError
             If a file would be replaced that is not one of the folder's own; then nothing has changed.
+        OSError
+            If a file cannot be replaced or removed, as it is open elsewhere; then nothing has changed, either.
         """
-        if voucher is not None:
-            check_own(self.directory, self._staged, own)
-            replace(self.directory / _UNSETTLED, [json.dumps(sorted({*own, *self._staged})).encode()])
-            for name in (voucher, *(set(own) - self._staged.keys() - set(kept))):
-                if not (self.directory / name).is_dir():
-                    (self.directory / name).unlink(missing_ok=True)
-        for name in sorted(self._staged, key=lambda name: name == voucher):
-            os.replace(self._staged[name], self.directory / name)
-        if voucher is not None:
+        if voucher is None:
+            self._place()
+            return
+        check_own(self.directory, self._staged, own)
+        replace(self.directory / _UNSETTLED, [json.dumps(sorted({*own, *self._staged})).encode()])
+        try:
+            for name in (voucher, *sorted({*own, *self._staged} - {voucher, *(set(kept) - self._staged.keys())})):
+                self._set_aside(name)
+            self._place(voucher)
+        except OSError:
+            self._put_back()
             settle(self.directory)
+            raise
+        settle(self.directory)
+
+    def _temporary(self, name: str) -> Path:
+        return self.directory / f".mechdesign.{name}.{os.getpid()}.tmp"
+
+    def _set_aside(self, name: str) -> None:
+        """Rename a file, which an open one refuses before any has been replaced."""
+        path, aside = self.directory / name, self._temporary(f"{name}.old")
+        if path.is_file():
+            with giving_way(path):
+                os.replace(path, aside)
+            self._aside[name] = aside
+
+    def _place(self, voucher: str | None = None) -> None:
+        for name in sorted(self._staged, key=lambda name: name == voucher):
+            with giving_way(self.directory / name):
+                os.replace(self._staged[name], self.directory / name)
+
+    def _put_back(self) -> None:
+        for name, temporary in self._staged.items():
+            if not temporary.exists():
+                (self.directory / name).unlink(missing_ok=True)
+        for name, aside in reversed(self._aside.items()):
+            os.replace(aside, self.directory / name)
 
 
 def unsettled(directory: Path) -> set[str]:
@@ -127,7 +178,21 @@ def settle(directory: Path) -> None:
 
 def proper(name: object) -> bool:
     """Whether a text is a plain file name, not a path to elsewhere."""
-    return isinstance(name, str) and name not in {"", ".", ".."} and not {"/", os.sep, "\0"}.intersection(name)
+    return isinstance(name, str) and name not in {"", ".", ".."} and not _UNFIT.search(name)
+
+
+def portable(name: str) -> str:
+    """The name of a folder that every system takes, the same on all of them."""
+    name = _UNFIT.sub("_", printable(name, lambda _: "'_'")).rstrip(". ")
+    return f"_{name}" if not name or _DEVICES.fullmatch(name) else name
+
+
+def way(path: Path, start: Path) -> str:
+    """The way to a path from a folder; the whole path where there is none, as from one drive of Windows to another."""
+    try:
+        return Path(os.path.relpath(path, start)).as_posix()
+    except ValueError:
+        return Path(os.path.abspath(path)).as_posix()
 
 
 def file_names(directory: Path) -> list[str]:
@@ -150,10 +215,17 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
     """
     patterns, read = [*names, *map(glob.escape, own)], [*read]
     for name in file_names(directory):
-        if any(fnmatchcase(name, pattern) for pattern in patterns):
+        if any(map(partial(fnmatchcase, name), patterns)) or _taken_for(directory / name, patterns):
             check_unread(directory / name, read)
             if name not in own or (directory / name).is_symlink():
                 raise foreign(directory / name)
+
+
+def _taken_for(path: Path, patterns: Iterable[str]) -> bool:
+    """Whether a file of another case is taken for one of these names, as on Windows and macOS."""
+    name, other = path.name.casefold(), path.with_name(path.name.swapcase())
+    alike = any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
+    return alike and other.exists() and other.samefile(path)
 
 
 def check_unread(path: Path, read: Iterable[Path]) -> None:
@@ -276,6 +348,12 @@ def lock(stream: TextIO, *, wait: bool) -> None:
         fcntl.lockf(stream, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
 
 
+def let_go(stream: TextIO) -> None:
+    """Close a file before it is replaced or removed where files cannot be locked: Windows does so with no open one."""
+    if fcntl is None:
+        stream.close()
+
+
 def unlinked(path: str, flags: int) -> int:
     """Opener of a file that follows no link."""
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
@@ -290,9 +368,7 @@ def _held(stream: TextIO, path: Path) -> Iterator[None]:
             os.write(stream.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
         yield
     finally:
-        if fcntl is None:
-            # Windows removes no open file.
-            stream.close()
+        let_go(stream)
         with suppress(PermissionError):
             path.unlink(missing_ok=True)
         stream.close()

@@ -14,6 +14,12 @@ _PLAIN = 5e-3, 2e4
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
 _LOWERED = {raised: ord(digit) for digit, raised in zip("0123456789-", _RAISED.values(), strict=True)}
 _TEN = re.compile(rf"(\N{{MIDDLE DOT}})?10([{''.join(map(chr, _LOWERED))}]+)")
+# Of letters that an encoding lacks; raised digits follow.
+_PLAIN_LETTERS = {
+    "\N{EN DASH}": "-", "\N{MINUS SIGN}": "-", "\N{INFINITY}": "inf", "\N{MIDDLE DOT}": "*", "\N{MICRO SIGN}": "u",
+    "\N{GREEK SMALL LETTER MU}": "u", "\N{DEGREE SIGN}": "deg", "\N{HORIZONTAL ELLIPSIS}": "...",
+    "\N{NO-BREAK SPACE}": " ",
+} | {chr(letter): f"^{chr(digit)}" for letter, digit in _LOWERED.items()}  # fmt: skip
 _MICROMETRES = re.compile(r"\bum\b")
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
 _PREFIXES = {"n": -9, "u": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9}
@@ -41,6 +47,13 @@ def writable(encoding: str) -> bool:
 def plain_powers(text: str) -> str:
     """A text with powers of ten in letters that every encoding has: ``2.5*10^-6``."""
     return _TEN.sub(lambda power: f"{'*' * bool(power[1])}10^{power[2].translate(_LOWERED)}", text)
+
+
+def plain_letters(error: UnicodeError) -> tuple[str, int]:
+    """What stands for letters that an encoding lacks, of unknown ones ``?``: a handler of `codecs.register_error`."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_PLAIN_LETTERS.get(letter, "?") for letter in error.object[error.start : error.end]), error.end
 
 
 def printed(unit: str) -> str:

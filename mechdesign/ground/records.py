@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.files import check_unread, digest, flowing, foreign, lock, replace, unlinked
+from mechdesign.ground.files import check_unread, digest, flowing, foreign, giving_way, let_go, lock, replace, unlinked
 
 _RECORD = ".mechdesign.json"  # in each folder with such files: their digests by their names
 
@@ -68,7 +68,8 @@ def remove_recorded(path: Path) -> None:
     """
     with suppress(StudyError):
         if _is_listed(path, _entries(path.parent)):
-            path.unlink()
+            with giving_way(path):
+                path.unlink()
             with _record(path.parent) as listed:
                 listed.pop(path.name, None)
 
@@ -117,6 +118,7 @@ def _record(directory: Path) -> Iterator[dict[str, list[str]]]:
             stream.seek(0)
             # Whoever opens it a second time and closes it loses the lock.
             listed = _entries(directory, stream.read())
+            let_go(stream)
             yield listed
             if listed:
                 content = {"tool": "mechdesign", "files": listed}

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from mechdesign.commands import COMMANDS, SECTIONS
 from mechdesign.ground.cautions import ALL, Caution
-from mechdesign.ground.errors import Problem, StudyError, printable
+from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.files import portable
 from mechdesign.mechanism import Mechanism
 from mechdesign.motion.motion import Motion
 from mechdesign.motion.rows import Poses
@@ -170,7 +171,7 @@ class Study:
     @property
     def label(self) -> str:
         """The name of its folder of results, that of its file or else its own."""
-        return printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or UNNAMED
+        return folder_name(self.path, self.name)
 
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"
@@ -212,3 +213,9 @@ class Study:
         document = read(self.text, str(self.path or TEXT))
         override(document, self.overrides)
         return document
+
+
+def folder_name(path: pathlib.Path | None, name: str = "") -> str:
+    """What a study's results are called, by its file or else its name: a folder that every system takes."""
+    stem = path.stem if path is not None else _UNFIT.sub("_", name).strip("._")
+    return portable(stem or UNNAMED)

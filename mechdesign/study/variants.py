@@ -21,7 +21,7 @@ from mechdesign.study.loading import adapter, context_of, load_document, same_sk
 from mechdesign.study.schema.conditions import Requirement
 from mechdesign.study.schema.entries import number_at
 from mechdesign.study.schema.study_file import entry, kinds_of, override
-from mechdesign.study.text.document import Document, KeyPath, dotted, in_yaml, leaves, plain, read
+from mechdesign.study.text.document import Document, KeyPath, decoded, dotted, in_yaml, leaves, plain, read
 from mechdesign.study.text.reporter import Reporter
 
 Changes = Sequence[tuple[str, Any]]
@@ -234,7 +234,8 @@ def edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return None
     if any(override.startswith("units") for override in study.overrides):
         return None
-    text, document = study.text.decode("utf-8-sig"), read(study.text, "")
+    text, document = decoded(study.text), read(study.text, "")
+    ending = "\r\n" if "\r\n" in text else "\n"
     written = document.data
     target = {key: value for key, value in data.items() if key in written or key not in study.resolved}
     # The loader fills in all units; the text may name only some.
@@ -261,6 +262,7 @@ def edited(study: Study, data: Mapping[str, Any]) -> str | None:
     if "seed" not in written and data["seed"]:
         target["seed"] = data["seed"]
         text = f"seed: {data['seed']}\n{text}"
+    text = text.replace("\r\n", "\n").replace("\n", ending)
     try:
         return text if read(text.encode(), "").data == target else None
     except StudyError:

@@ -1,4 +1,4 @@
-"""The command line where processes are not forked and signals are few, as on Windows and macOS: the same bytes.
+"""The command line where processes are not forked, signals are few and open files stay, as on Windows: the same bytes.
 
 What such systems lack is taken from Python in every process of a command, those that it starts, too.
 """
@@ -19,15 +19,49 @@ from .conftest import SLIDER
 psutil = pytest.importorskip("psutil")
 
 LACKING = """
-import ctypes, multiprocessing, os, signal, sys
+import builtins, ctypes, io, multiprocessing, os, re, signal, sys
 
 for module, names in {
-    os: ("fork", "O_NOFOLLOW", "sched_getaffinity"),
+    os: ("fork", "forkpty", "O_NOFOLLOW", "O_NONBLOCK", "sched_getaffinity", "sysconf", "getuid", "geteuid", "killpg"),
     signal: ("SIGHUP", "SIGALRM", "setitimer", "pthread_sigmask", "pthread_kill"),
 }.items():
     for name in names:
         delattr(module, name)
-sys.modules["fcntl"] = None
+for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+    sys.modules[name] = None
+FORBIDDEN = re.compile(r'(?i)(con|prn|aux|nul|com\\d|lpt\\d)(\\..*)?|.*[<>:"|?*\\\\].*|.*[. ]')
+
+
+def is_open(path):
+    for number in os.listdir("/proc/self/fd"):
+        try:
+            if os.path.samestat(os.fstat(int(number)), os.stat(path)):
+                return True
+        except OSError:
+            pass
+    return False
+
+
+# An open file is neither replaced nor removed, and some names are none.
+def careful(call, count):
+    def inner(*paths, **further):
+        if any(isinstance(path, (str, os.PathLike)) and is_open(path) for path in paths[:count]):
+            raise PermissionError(13, "The process cannot access the file", str(paths[0]))
+        return named(call, count - 1)(*paths, **further)
+    return inner
+
+
+def named(call, number=0):
+    def inner(*given, **further):
+        if isinstance(given[number], (str, os.PathLike)) and FORBIDDEN.fullmatch(os.path.basename(given[number])):
+            raise OSError(22, "The filename, directory name, or volume label syntax is incorrect", str(given[number]))
+        return call(*given, **further)
+    return inner
+
+
+os.replace, os.unlink, os.remove = careful(os.replace, 2), careful(os.unlink, 1), careful(os.remove, 1)
+os.mkdir, io.open = named(os.mkdir), named(io.open)
+builtins.open = io.open
 
 
 class Library(ctypes.CDLL):
@@ -120,7 +154,7 @@ def contents(folder):
 @pytest.mark.parametrize(
     "command",
     [
-        ("kinematics", "slider.yaml"),
+        ("kinematics", "slider.yaml", "--report"),
         pytest.param(("reliability", "arm.yaml", "--no-plots"), marks=pytest.mark.nightly),
         ("optimize", "arm.yaml", "--no-plots"),
         pytest.param(("sweep", "arm.yaml", "--no-plots"), marks=pytest.mark.nightly),

@@ -185,9 +185,9 @@ def test_names_cannot_spoil_junit_or_summary(studies, analysis, invoke):
     (studies / "wrong.yaml").write_text(WRONG.replace("q]", '"\\x01\\ufffe]]>"]'))
     done = invoke("run", *names, "wrong.yaml", "--no-plots", "--junit", "report.xml")
     assert [suite.name for suite in JUnitXml.fromfile("report.xml")][:2] == [
-        r"=1+1\n\x1b]0;x\x07", r"\u202e<b>&",
+        "=1+1__]0;x_", "__b_&",
     ]  # fmt: skip
-    assert [row[0] for row in summary(done)] == [r"'=1+1\n\x1b]0;x\x07", r"\u202e<b>&", "wrong"]
+    assert [row[0] for row in summary(done)] == ["'=1+1__]0;x_", "__b_&", "wrong"]
     assert all(line.isprintable() for line in (*done.stderr.splitlines(), *done.stdout.splitlines()))
 
 
@@ -201,7 +201,7 @@ def test_names_cannot_spoil_json_pages_or_annotations(studies, analysis, invoke,
     head = f"name: {json.dumps(hostile, ensure_ascii=False)}\n".replace("\U000e0041", "\\U000e0041")
     (studies / file).write_text(head + SLIDER.partition("\n")[2] + gate)
     done = invoke("run", file, "wrong.yaml", "--report", "--json", "--no-plots")
-    assert {row["study"] for row in json.loads(done.stdout)} == {r"x\n::error::\u202ey", "wrong"}
+    assert {row["study"] for row in json.loads(done.stdout)} == {"x___error___y", "wrong"}
     told = [*done.stderr.splitlines(), *done.stdout.splitlines()]
     assert all(line.isprintable() and not line.startswith("::error::") for line in told)
     assert sum(line.startswith("::error file=") for line in told) == 2

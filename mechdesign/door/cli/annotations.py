@@ -35,7 +35,7 @@ def _in_repository(file: str) -> str:
     """Path of a file from the root of the repository, whatever the working directory."""
     top = os.environ.get("GITHUB_WORKSPACE", "")
     path = Path(os.path.abspath(file))
-    return str(path.relative_to(top)) if file and top and path.is_relative_to(top) else file
+    return path.relative_to(top).as_posix() if file and top and path.is_relative_to(top) else file
 
 
 def of_error(error: Exception, message: str, study: Study | None = None) -> Sequence[Problem]:

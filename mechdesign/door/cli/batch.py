@@ -16,7 +16,7 @@ from pathlib import Path
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.door.cli import places, terminal
 from mechdesign.door.cli.annotations import annotate, of_warnings
-from mechdesign.door.cli.batch_record import BatchRecord, End, Said, Task, failure, name_of
+from mechdesign.door.cli.batch_record import BatchRecord, End, Said, Task, failure
 from mechdesign.door.cli.docs import explained
 from mechdesign.door.cli.execution import (
     HERE,
@@ -44,7 +44,7 @@ from mechdesign.ground.work.processes import TaskProcess, Tell, Work
 from mechdesign.ground.work.start import inherit
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.study import Study
-from mechdesign.study.loaded import StudySource
+from mechdesign.study.loaded import StudySource, folder_name
 
 _SUFFIXES = (".yaml", ".yml")  # of study files in a folder
 _NUMBERS = 4  # key numbers of a study in the index
@@ -138,7 +138,7 @@ def _read(
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
         interrupts.check()
-        label, study = name_of(path), None
+        label, study = folder_name(path), None
         try:
             origin = source_of(path, options)
             study = load_source(origin, options)

@@ -19,11 +19,11 @@ from mechdesign.door.cli.places import RESULTS, SUMMARY
 from mechdesign.door.report.page import pages
 from mechdesign.door.report.tables import to_csv
 from mechdesign.door.report.writer import write_file
-from mechdesign.ground.errors import Interrupted, MechdesignError, counted, printable
+from mechdesign.ground.errors import Interrupted, MechdesignError, counted
 from mechdesign.ground.records import check_replaceable
 from mechdesign.ground.work.pool import LostWorkerError
 from mechdesign.study import Study
-from mechdesign.study.loaded import StudySource
+from mechdesign.study.loaded import StudySource, folder_name
 
 _LOST = "run"  # in place of the commands of a study whose process was killed
 _LEFT = "the run ended before it"
@@ -195,7 +195,7 @@ class BatchRecord:
         """The page of all studies, also of those that the run did not come to."""
         from mechdesign.door.report.page.page import index
 
-        labels = {number: name_of(path) for number, path in enumerate(self._studies)}
+        labels = {number: folder_name(path) for number, path in enumerate(self._studies)}
         labels |= {task.number: task.label for task in self._tasks}
         return index([
             self._entries.get(number) or pages.IndexEntry(label, label, failed=_LEFT, outcome="not answered")
@@ -212,7 +212,7 @@ class BatchRecord:
                 left = [command for command, _ in task.questions if not {command, _LOST} & answered]
             else:
                 left = [] if outcomes else ["check"]
-            label = name_of(path) if task is None else task.label
+            label = folder_name(path) if task is None else task.label
             yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
 
     def _file(self, path: Path, data: bytes) -> bool:
@@ -224,11 +224,6 @@ class BatchRecord:
             self._exit_code = max(self._exit_code, explained(error)[0])
             return False
         return True
-
-
-def name_of(path: Path | None) -> str:
-    """Name of a study by its file."""
-    return printable(path.stem) if path else "study"
 
 
 def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:

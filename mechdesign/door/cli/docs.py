@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +9,7 @@ from typing import Any
 
 import typer
 
-from mechdesign.door.cli.terminal import emit_words
+from mechdesign.door.cli.terminal import colours, emit_words
 from mechdesign.door.reference import Entry, below, entries, find, holding, near, pages, place
 from mechdesign.ground.errors import AssemblyError, StudyError, explain
 from mechdesign.mechanism.configuration import REASONS
@@ -94,7 +93,7 @@ def _lines(index: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
     for hit in hits:
         alike.setdefault(replace(hit, word=""), []).append(hit)
     for entry, same in alike.items():
-        bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+        bold = colours(sys.stdout)
         for word in dict.fromkeys(twin.word for twin in same):
             yield f"{typer.style(word, bold=True) if bold else word} ({entry.kind})"
         yield from (_INDENT + line for line in _body(entry, same[0].last))

@@ -32,12 +32,13 @@ _FLAGS = {"overrides": "--set", "formats": "--format"}
 
 def _studies(incomplete: str) -> list[str]:
     """Study files that complete a word; where there are none the shell completes names of folders."""
-    folder, slash, start = incomplete.rpartition("/")
+    end = max(incomplete.rfind(slash) for slash in ("/", os.sep)) + 1
+    folder, start = incomplete[:end], incomplete[end:]
     try:
-        names = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
+        names = sorted(path.name for path in Path(folder).glob("*.yaml"))
     except OSError:
         return []
-    return [f"{folder}{slash}{name}" for name in names if name.startswith(start)]
+    return [folder + name for name in names if name.startswith(start)]
 
 
 def _paths(incomplete: str) -> list[str]:

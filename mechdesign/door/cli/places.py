@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from unicodedata import normalize
 
 from mechdesign.commands import MERGE, SWEEP
 from mechdesign.door.cli.options import PDF, STYLES, Options
@@ -45,9 +46,11 @@ def claim(owners: dict[str, Path | None], study: Study) -> None:
     StudyError
         If another file of that name has it.
     """
-    if study.label in _SHARED:
+    # Windows and macOS take names for one that differ in case, or in how an accent is written.
+    name = normalize("NFC", study.label).casefold()
+    if name in _SHARED:
         raise StudyError(f"{study.path}: its folder of results would have the name of a file of all; rename the study")
-    owner = owners.setdefault(study.label, study.path)
+    owner = owners.setdefault(name, study.path)
     if owner != study.path:
         raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
 

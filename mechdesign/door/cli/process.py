@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gc
 import io
 import logging
@@ -12,10 +13,11 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from mechdesign.ground.numerals import plain_powers, writable
+from mechdesign.ground.numerals import plain_letters, plain_powers, writable
 from mechdesign.ground.work.interrupts import Signals
 
 _NOT_WRITTEN = 4  # exit code where results could not be written
+_LACKING = "mechdesign.plain"  # how letters are written that a stream lacks
 _BY_SIGNAL = 128  # exit code of a process that a signal ended, less the signal's number
 
 
@@ -106,10 +108,17 @@ def _open_streams() -> _Unfailing:
 
 def _stream(raw: _Unfailing, old: TextIO | None) -> TextIO:
     encoding = old.encoding if old is not None else "utf-8"
+    codecs.register_error(_LACKING, plain_letters)
+    whole = getattr(old, "buffer", None)
+    if isinstance(old, io.TextIOWrapper) and not isinstance(getattr(whole, "raw", whole), io.FileIO):
+        # The console of Windows takes letters, not the bytes of a file.
+        old.reconfigure(errors=_LACKING)
+        return old
     buffer = io.BufferedWriter(raw)
     at_once = raw.fileno() == 2 or buffer.isatty()
     kind = io.TextIOWrapper if writable(encoding) else _PlainPowers
-    return kind(buffer, encoding, errors="replace", line_buffering=at_once)
+    # Lines end as in the files, whatever the system.
+    return kind(buffer, encoding, errors=_LACKING, newline="\n", line_buffering=at_once)
 
 
 class _PlainPowers(io.TextIOWrapper):

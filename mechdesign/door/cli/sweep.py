@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mechdesign.door.cli.batch_record import failure, name_of
+from mechdesign.door.cli.batch_record import failure
 from mechdesign.door.cli.execution import ask
 from mechdesign.door.cli.options import Options
 from mechdesign.door.cli.outcome import Outcome
@@ -17,7 +17,9 @@ from mechdesign.door.cli.summary import junit
 from mechdesign.door.report.writer import write_file
 from mechdesign.experiments.schema.matrix import RANGE
 from mechdesign.ground.errors import Interrupted, Problem, StudyError
+from mechdesign.ground.files import way
 from mechdesign.ground.records import check_replaceable
+from mechdesign.study.loaded import folder_name
 from mechdesign.study.text.document import in_yaml, read
 
 
@@ -47,7 +49,7 @@ def _overrides(options: Options) -> Iterator[str]:
         here = study is not None or Path("study.yaml").exists()
         beside = study.parent if study is not None else Path()
         # The built-in study lies elsewhere.
-        file = os.path.relpath(cases, beside) if here else os.path.abspath(cases)
+        file = way(cases, beside) if here else os.path.abspath(cases)
         yield f"matrix.cases={in_yaml(file)}"
     if options.maximize or options.minimize:
         yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
@@ -84,7 +86,7 @@ def _as_typed(error: StudyError) -> StudyError:
 
 def sweep(options: Options) -> int:
     """Answer the cases that a study and options make; returns the highest exit code of them."""
-    outcome, label = None, name_of(options.path)
+    outcome, label = None, folder_name(options.path)
     if options.junit is not None:
         check_replaceable(options.junit)
     try:

@@ -61,9 +61,14 @@ def _fold(text: str, width: int, further: int = _INDENT) -> str:
 
 def coloured(text: str, stream: TextIO) -> str:
     """A text, with its verdicts in colour where the stream is a terminal with colours and ``NO_COLOR`` is not set."""
-    if not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM", "dumb") == "dumb":
+    if not colours(stream):
         return text
     return _VERDICT.sub(lambda match: f"{match[1]}{_GREEN if match[2] == 'met' else _RED}{match[2]}{_PLAIN}", text)
+
+
+def colours(stream: TextIO) -> bool:
+    """Whether a stream is a terminal with colours, and ``NO_COLOR`` is not set; the console of Windows tells none."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
 
 
 def is_terminal() -> bool:
@@ -74,7 +79,7 @@ def is_terminal() -> bool:
 def suggest(path: Path | None, *, quiet: bool) -> None:
     """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
     if path is not None and is_terminal():
-        line = f"open {shlex.quote(str(path))}"
+        line = f'explorer "{path}"' if sys.platform == "win32" else f"open {shlex.quote(str(path))}"
         if not quiet:
             print(printable_lines(line), file=sys.stderr, flush=True)
 

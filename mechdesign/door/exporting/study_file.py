@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from typing import Any
 
 from mechdesign.door.exporting.exports import Content, export
 from mechdesign.door.exporting.view import PosedStudy
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.files import way
 
 _NOT_IN_YAML = re.compile(r"[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
@@ -25,7 +25,7 @@ def study_json(view: PosedStudy) -> Content:
         drawn = {point: complex(study.mechanism.sketch_configuration.point(point)) for point in sketch}
         places = {point: [place.real, place.imag] for point, place in drawn.items()}
         data["mechanism"] = {**data["mechanism"], "sketch": places}
-    files = list(dict.fromkeys(os.path.relpath(path, study.folder.path) for _, path, _ in study.inputs()))
+    files = list(dict.fromkeys(way(path, study.folder.path) for _, path, _ in study.inputs()))
     named = f"it names files that are not in it ({', '.join(files)}): keep them beside it"
     # Characters that YAML has no place for, or that end its lines, are written as escapes.
     text = json.dumps(data, indent=2, ensure_ascii=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,7 +18,7 @@ from mechdesign.door.report.page import pages
 from mechdesign.door.report.requirements import Verdict
 from mechdesign.door.report.tables import json_text, plain
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.files import check_own, check_writable, digest, file_names, proper, unsettled
+from mechdesign.ground.files import check_own, check_writable, digest, file_names, proper, unsettled, way
 from mechdesign.ground.results import Result
 from mechdesign.ground.versions import VERSION, installed
 from mechdesign.study import Study
@@ -78,8 +77,7 @@ def _versions() -> dict[str, dict[str, str]]:
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
     files = {
-        Path(os.path.relpath(file, study.folder.path)).as_posix(): hashlib.sha256(text.encode()).hexdigest()
-        for _, file, text in study.inputs()
+        way(file, study.folder.path): hashlib.sha256(text.encode()).hexdigest() for _, file, text in study.inputs()
     }
     return {
         **_versions(),
@@ -106,7 +104,7 @@ def _way_to_inputs(study: Study, directory: Path) -> dict[str, str]:
     """The folder of a study that names files, as seen from its results: `inputs_in`, by which they are found again."""
     if not any(True for _ in study.inputs()):
         return {}
-    return {_INPUTS_IN: Path(os.path.relpath(study.folder.path, directory)).as_posix()}
+    return {_INPUTS_IN: way(study.folder.path, directory)}
 
 
 def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
@@ -210,7 +208,7 @@ def check_folder(directory: Path, command: str, output: Extras, read: Iterable[P
     check_writable(directory)
     ours, suffixes = own(directory), tuple(f".{kind}" for kind in output.formats.split(","))
     # Pictures are named only where one of them may replace a file of others: that imports Matplotlib.
-    others = output.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
+    others = output.plots and any(name.lower().endswith(suffixes) for name in file_names(directory) if name not in ours)
     written = [NAME, *names(command, output.formats if others else "", animate=output.animate)]
     check_own(directory, [*written, pages.SECTION] if output.report else written, ours, read)
 

@@ -7,6 +7,7 @@ on other machines. Its values do not depend on where they are computed.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
@@ -15,6 +16,9 @@ from typing import TypeVar
 
 from mechdesign.commands import MAX_JOBS
 from mechdesign.ground.work.pool import ChunkMap, Pool
+
+# An executor of Windows has no more processes.
+_MOST = 61 if sys.platform == "win32" else MAX_JOBS
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
@@ -31,10 +35,11 @@ def worker_count(jobs: int | None) -> int:
         If `jobs` is less than 1 or more than `MAX_JOBS`.
     """
     if jobs is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return min(available, _MOST)
     if not 1 <= jobs <= MAX_JOBS:
         raise ValueError(f"jobs must be from 1 to {MAX_JOBS}, not {jobs}")
-    return jobs
+    return min(jobs, _MOST)
 
 
 def map_chunks(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -32,7 +33,7 @@ def keep_freed_memory() -> None:
     A chunk's temporaries are of some hundred kilobytes. By default every one of them is mapped anew and returned on
     release, so that each of its pages faults in its first write: that took half the time of a Monte Carlo run.
     """
-    if platform.libc_ver()[0] != "glibc":
+    if sys.platform != "linux" or platform.libc_ver()[0] != "glibc":
         return
     mallopt = ctypes.CDLL(None).mallopt
     mallopt(_MMAP_THRESHOLD, 64 * _MEBIBYTE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import json
 import os
 import re
@@ -13,6 +12,7 @@ from typing import Any
 
 from mechdesign.ground.errors import StudyError, cut
 from mechdesign.study.importing.sketch import FileSketch
+from mechdesign.study.text.document import decoded
 from mechdesign.study.text.inputs import Folder
 
 # Most characters of a source.
@@ -81,9 +81,8 @@ class ImportedText:
 def _read(path: Path) -> str:
     """The text of a file in UTF-8 or UTF-16, else in the code page of Windows, as older drawings are."""
     content = Folder(anywhere=True).content(path)
-    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        return _bounded(content.decode("utf-16" if wide else "utf-8-sig"), str(path))
+        return _bounded(decoded(content), str(path))
     except UnicodeDecodeError:
         return _bounded(content.decode("cp1252", errors="replace"), str(path))
 

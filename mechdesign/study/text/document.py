@@ -6,6 +6,7 @@ Nesting is bounded before anything is built, the expanded size of aliases while 
 
 from __future__ import annotations
 
+import codecs
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -133,9 +134,9 @@ def read(content: bytes, name: str) -> Document:
     if len(content) > MAX_BYTES:
         raise TextPlace(name).failure(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")
     try:
-        text = content.decode("utf-8-sig")
+        text = decoded(content)
     except UnicodeDecodeError:
-        raise TextPlace(name).failure("is not a text file in UTF-8: not a study file") from None
+        raise TextPlace(name).failure("is not a text file in UTF-8; an editor saves a study in that encoding") from None
     try:
         _check_events(text, name)
         builder = _Builder(name)
@@ -146,6 +147,18 @@ def read(content: bytes, name: str) -> Document:
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
         raise TextPlace(name).failure(f"is not a text in YAML: {first}") from None
+
+
+def decoded(content: bytes) -> str:
+    """The text of a file in UTF-8, or in UTF-16 as PowerShell writes what a command prints.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        If it is neither.
+    """
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return content.decode("utf-16" if wide else "utf-8-sig")
 
 
 def in_yaml(value: Any) -> str:

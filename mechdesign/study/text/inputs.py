@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.document import KeyPath, decoded
 
 # Endings of the names of files with a table.
 FILES = (".csv", ".txt", ".dat")
@@ -46,7 +46,7 @@ class Folder:
 
     def _text(self, file: Path) -> str:
         try:
-            return self.content(file).decode("utf-8-sig")
+            return decoded(self.content(file))
         except UnicodeDecodeError:
             raise StudyError(f"{file} cannot be read: not a text file; save the table as CSV in UTF-8") from None
 

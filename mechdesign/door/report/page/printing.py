@@ -55,7 +55,7 @@ def pdf(page: Path) -> bytes:
     program = browser()
     # A browser refuses to run as the superuser with its sandbox.
     free = ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
-    with TemporaryDirectory(prefix="mechdesign-") as folder:
+    with TemporaryDirectory(prefix="mechdesign-", ignore_cleanup_errors=True) as folder:
         printed = Path(folder) / "report.pdf"
         # A page that moves is printed as it opens.
         still = ["--force-prefers-reduced-motion", "--no-pdf-header-footer"]
