@@ -24,6 +24,8 @@ from numpy.typing import ArrayLike
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 LINK, SLIDE, GUIDE = "link", "slide", "guide"
+# Positions, and wishes in their place, that leave a link no choice.
+EXACTLY = 5
 # A vector, or the weight w, is zero below this part of the greatest unknown.
 NOTHING = 1e-9
 # Rows are dependent where a singular value is below this part of the greatest.
