@@ -108,8 +108,8 @@ class Candidates:
 def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], list[int]]:
     """Dyads through all positions of a body, those of each kind, and how many wishes these leave to links.
 
-    What positions leave free is sampled in the sites of frame and body, which dyads may miss. What is too much is met by
-    least squares. A single given point is that of one dyad, so that there are two numbers of wishes.
+    What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is
+    met by least squares. A single given point is that of one dyad, so that there are two numbers of wishes.
     """
     centre, size = task.centre, task.size
     scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
@@ -159,6 +159,11 @@ def _exact(task: Positions, sites: tuple[Site, Site], random: np.random.Generato
                       for side, share, site in zip((dyads.FRAME, dyads.BODY), shares, sites, strict=True)]  # fmt: skip
             rows = np.concatenate([np.broadcast_to(known, (some, *known.shape)), *wishes], axis=1)
             parts += dyads.dyads(rows).values()
+        # That the one point of a slide lies on a line is no linear wish.
+        side, site = (dyads.FRAME, sites[0]) if kind == GUIDE else (dyads.BODY, sites[1])
+        if kind != LINK and freedom == 1 and sum(needs) == 1 == sum(site.fixed):
+            normal, place = site.normals(random, 1), site.samples(random, 1)
+            parts += dyads.sliding(side, known, normal[0], place[0]).values()
     return parts
 
 

@@ -115,8 +115,8 @@ class BodyTask(_Task):
         if not parts:
             # The nearest is one of the others.
             frame, pins = (Site(site.centre, site.size, site.reach) for site in sites)
-            section = section.model_copy(update={"kinds": (), "slide": False})
-            parts = [*body.pairs(self.positions, found, (frame, pins), {}, section, random, most)]
+            for wished in (section, section.model_copy(update={"kinds": (), "slide": False})):
+                parts = parts or [*body.pairs(self.positions, found, (frame, pins), {}, wished, random, most)]
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
