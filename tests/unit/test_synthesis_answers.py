@@ -91,6 +91,19 @@ def test_all_linkages_are_shown_with_kind_error_transmission_angle_and_defects(f
 
 
 @pytest.mark.slow
+def test_linkages_without_an_error_trade_their_size_for_transmission(five: Any) -> None:
+    (axes,) = five.figure("trade").axes
+    assert axes.get_ylabel().startswith("size")
+    table = five.main
+    drawn = np.concatenate([line.get_xydata() for line in axes.lines if line.get_marker() == "o"])
+    assert {*np.round(drawn[:, 1], 6)} == {*np.round(table["size"], 6)}
+    # Of the two without a defect the one has the larger angle, and the other is smaller.
+    best, other = (table.take(table["defects"] == "")[name] for name in ("transmission_angle", "size"))
+    assert (best[0] > best[1], other[0] > other[1]) == (True, True)
+    assert sum("front" in str(line.get_label()) for line in axes.lines) == 1
+
+
+@pytest.mark.slow
 def test_what_a_synthesis_says_stands_in_terminal_manifest_report_and_notebook(five: Any, tmp_path: Path) -> None:
     words = ("best: four-bar", "4 real dyads of at most 4", "2 without a defect", "seed 7")
     done = ask("synthesize", "-", "--seed", 7, "--report", "--no-plots", "--out", tmp_path, study=FIVE)
