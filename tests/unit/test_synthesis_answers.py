@@ -91,6 +91,19 @@ def test_all_linkages_are_shown_with_kind_error_transmission_angle_and_defects(f
 
 
 @pytest.mark.slow
+def test_linkages_without_an_error_trade_their_size_for_transmission(five: Any) -> None:
+    (axes,) = five.figure("trade").axes
+    assert axes.get_ylabel().startswith("size")
+    table = five.main
+    drawn = np.concatenate([line.get_xydata() for line in axes.lines if line.get_marker() == "o"])
+    assert {*np.round(drawn[:, 1], 6)} == {*np.round(table["size"], 6)}
+    # Of the two without a defect the one has the larger angle, and the other is smaller.
+    best, other = (table.take(table["defects"] == "")[name] for name in ("transmission_angle", "size"))
+    assert (best[0] > best[1], other[0] > other[1]) == (True, True)
+    assert sum("front" in str(line.get_label()) for line in axes.lines) == 1
+
+
+@pytest.mark.slow
 def test_what_a_synthesis_says_stands_in_terminal_manifest_report_and_notebook(five: Any, tmp_path: Path) -> None:
     words = ("best: four-bar", "4 real dyads of at most 4", "2 without a defect", "seed 7")
     done = ask("synthesize", "-", "--seed", 7, "--report", "--no-plots", "--out", tmp_path, study=FIVE)
@@ -130,6 +143,33 @@ def test_words_and_table_have_the_same_error() -> None:
     text = f"synthesis: {{function: {task}, frame: 50, zeros: free, limits: {{ratio: 100}}}}"
     answer = mechdesign.synthesize(mechdesign.load(text=text))
     assert f"error {answer.main['error'][0]:.4g} deg" in answer.notes[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pairs", "more", "task", "words"),
+    [
+        (3, "", "3 pairs exactly", "1 real linkage of at most 1"),
+        (3, "zeros: free", "3 pairs exactly", "from 240 samples of each choice"),
+        (4, "", "4 pairs by least squares", "4 pairs with fixed zeros are met by least squares"),
+        (5, "zeros: free", "5 pairs exactly", "1 real linkage of at most 3"),
+        (6, "zeros: free", "6 pairs by least squares", "6 pairs are met by least squares"),
+    ],
+)
+def test_how_complete_a_list_is_is_told_of_linkages_through_pairs(pairs: int, more: str, task: str, words: str) -> None:
+    """Three pairs of links' own angles are three linear equations (Freudenstein); of four dyads one is the frame."""
+    function = f"{{input: {[97, 108, 120, 131, 143, 150][:pairs]}, output: {[36, 50, 65, 76, 87, 92][:pairs]}}}"
+    text = f"synthesis:\n  function: {function}\n  limits: {{ratio: 1000}}\n  frame: 100\n  {more}\n"
+    assert task in checked(text)[1]
+    notes = mechdesign.synthesize(mechdesign.load(text=text)).notes
+    assert any(words in note for note in notes), notes
+    assert not [note for note in notes if "dyad" in note]
+
+
+def test_of_five_positions_without_a_slide_the_nearest_is_a_four_bar_and_misses_it() -> None:
+    for key, missed in (("slide: true", "no side of the body is a slide"), ("kinds: trammel", "it is of another kind")):
+        with pytest.raises(mechdesign.AssemblyError, match=f"the nearest is in nearest.yaml: {missed}"):
+            mechdesign.synthesize(mechdesign.load(text=f"{FIVE}  {key}\n"))
 
 
 def test_a_task_may_follow_parameters() -> None:

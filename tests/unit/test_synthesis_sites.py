@@ -110,3 +110,37 @@ def test_of_more_than_five_positions_the_given_pivots_stay() -> None:
     table = table_of({"body": six, "pivots": [[0, 3], [-1, 4]], "kinds": "four_bar", "limits": {"ratio": 100}})
     assert {*np.round(points(table, "ground.O"), 9).tolist()} <= {3j, -1 + 4j}
     assert table["error"].min() > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("task", "name", "kind"),
+    [
+        ({"pivots": {"y": 4}}, "ground", "inverted_trammel"),
+        ({"pivots": {"through": [0, 4], "direction": 20}}, "ground", "inverted_slider_crank"),
+        ({"pivots": {"y": 4}}, "ground", "conchoid"),
+        ({"pins": {"x": -0.5}}, "coupler", "trammel"),
+        ({"pins": {"x": -0.5}}, "coupler", "slider_crank"),
+    ],
+)
+def test_of_three_positions_slides_have_their_points_where_a_line_meets_a_circle(
+    task: Any, name: str, kind: str
+) -> None:
+    """A slide of the body runs through a pivot whose three places in the body are in line, and the other way round."""
+    ((key, region),) = task.items()
+    through = complex(*region.get("through", (region.get("x", 0), region.get("y", 0))))
+    along = np.exp(1j * np.radians(region.get("direction", 90 if "x" in region else 0)))
+
+    def bend(way: float) -> float:
+        place = through + way * along
+        seen = (place - PLACES) / TURNS if key == "pivots" else PLACES + TURNS * place
+        return float(((seen[1] - seen[0]) * np.conj(seen[2] - seen[0])).imag)
+
+    ways = np.roots(np.polyfit([-1, 0, 1], [bend(way) for way in (-1, 0, 1)], 2)).real
+    points_of_slides = through + ways * along
+    table = table_of({"body": THREE, **task, "kinds": kind, "limits": {"reach": 10, "ratio": 1000}})
+    ends = {"ground": "OD", "coupler": "AB"}[name]
+    sliding = ends if kind.endswith("trammel") else ends[1]
+    places = np.concatenate([points(table, f"{name}.{end}") for end in sliding])
+    assert np.abs(places[:, None] - points_of_slides).min(axis=1).max() < 1e-9
+    assert table["max_error"].max() < 1e-9

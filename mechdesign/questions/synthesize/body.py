@@ -105,10 +105,11 @@ class Candidates:
     angles: Floats  # shape (count, positions)
 
 
-def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], str]:
-    """Dyads through all positions of a body, one of each kind, and what is said of them.
+def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], list[int]]:
+    """Dyads through all positions of a body, those of each kind, and how many wishes these leave to links.
 
-    What positions leave free is sampled in the sites of frame and body, which dyads may miss.
+    What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is
+    met by least squares. A single given point is that of one dyad, so that there are two numbers of wishes.
     """
     centre, size = task.centre, task.size
     scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
@@ -117,18 +118,17 @@ def choices(task: Positions, frame: Site, body: Site, random: np.random.Generato
         spare.append(_known(LINK, scaled)[1] - sum(_needs(LINK, sites)))
         parts += _least_squares(scaled, sites, random) if spare[-1] < 0 else _exact(scaled, sites, random, WISHES)
     found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
-    real = sum(map(len, found))
-    words = (
-        f"{len(task.places)} positions are met by least squares{' beside what is given' * (len(task.places) < 6)}"
-        if min(spare) < 0 else
-        f"{real} dyads from {WISHES} samples of each choice" if max(spare) > 0 else
-        f"{real} real dyads, all through the given places" if len(frame.given) + len(body.given) else
-        f"{real} real dyads of at most 4"
-    )  # fmt: skip
     return [
         replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size)
         for part in found
-    ], words
+    ], spare
+
+
+def told(what: str, spare: Sequence[int], real: str, most: str) -> str:
+    """How complete a list is: `what` is met, `real` says how many there are, and `most` how many there can be."""
+    if min(spare) < 0:
+        return f"{what} are met by least squares"
+    return f"{real} from {WISHES} samples of each choice" if max(spare) > 0 else f"{real} {most}"
 
 
 def _known(kind: str, task: Positions) -> tuple[Floats, int]:
@@ -137,7 +137,7 @@ def _known(kind: str, task: Positions) -> tuple[Floats, int]:
     if kind != LINK:
         return known, 7 - len(known)
     # A body that only shifts has links where its places lie on a circle.
-    return known, -1 if task.shifts and len(known) > 3 else 5 - len(known)
+    return known, -1 if task.shifts and len(known) > 3 else dyads.EXACTLY - len(known)
 
 
 def _needs(kind: str, sites: tuple[Site, Site]) -> tuple[int, int]:
@@ -159,6 +159,11 @@ def _exact(task: Positions, sites: tuple[Site, Site], random: np.random.Generato
                       for side, share, site in zip((dyads.FRAME, dyads.BODY), shares, sites, strict=True)]  # fmt: skip
             rows = np.concatenate([np.broadcast_to(known, (some, *known.shape)), *wishes], axis=1)
             parts += dyads.dyads(rows).values()
+        # That the one point of a slide lies on a line is no linear wish.
+        side, site = (dyads.FRAME, sites[0]) if kind == GUIDE else (dyads.BODY, sites[1])
+        if kind != LINK and freedom == 1 and sum(needs) == 1 == sum(site.fixed):
+            normal, place = site.normals(random, 1), site.samples(random, 1)
+            parts += dyads.sliding(side, known, normal[0], place[0]).values()
     return parts
 
 
@@ -187,7 +192,7 @@ def _joined(parts: Sequence[Dyads]) -> Dyads:
 def _least_squares(task: Positions, sites: tuple[Site, Site], random: np.random.Generator) -> list[Dyads]:
     """Dyads with the least squares of their errors, from those of subsets of the positions."""
     count = len(task.places)
-    size = min(count, 3 if task.shifts else 5 - sum(_needs(LINK, sites)))
+    size = min(count, 3 if task.shifts else dyads.EXACTLY - sum(_needs(LINK, sites)))
     every = list(combinations(range(count), size)) if count < 12 else [
         tuple(random.choice(count, size, replace=False)) for _ in range(_SUBSETS)
     ]  # fmt: skip

@@ -24,6 +24,8 @@ from numpy.typing import ArrayLike
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 
 LINK, SLIDE, GUIDE = "link", "slide", "guide"
+# Positions, and wishes in their place, that leave a link no choice.
+EXACTLY = 5
 # A vector, or the weight w, is zero below this part of the greatest unknown.
 NOTHING = 1e-9
 # Rows are dependent where a singular value is below this part of the greatest.
@@ -205,9 +207,32 @@ def links(w: Floats) -> Dyads:
     return Dyads(LINK, pivot, pin, np.ones(len(pin), dtype=complex), length)
 
 
+def sliding(side: int, equations: Floats, normal: complex, place: complex) -> dict[str, Dyads]:
+    """The slides that fulfil six rows, and whose point of the frame, or of the body, lies on a line: two at most.
+
+    With the normal x of the slide the point is q x / |x|^2, or conj(q) x / |x|^2 of the frame: a quadratic equation.
+    """
+    free = np.linalg.svd(equations)[2][len(equations) :]
+    x, q = _complex(free, BODY + FRAME - side), _complex(free, 6)
+    form = np.outer(np.conj(normal) * (np.conj(q) if side == FRAME else q), x).real
+    form -= (np.conj(normal) * place).real * np.outer(x, np.conj(x)).real
+    # Unknowns are the first times cos t and the second times sin t: a sine of 2 t is given.
+    middle, wide, skew = (form[0, 0] + form[1, 1]) / 2, (form[0, 0] - form[1, 1]) / 2, (form[0, 1] + form[1, 0]) / 2
+    size = np.hypot(wide, skew)
+    if not size > abs(middle):
+        return dyads_of(np.empty((0, 8)))
+    t = (np.arctan2(skew, wide) + np.array([1.0, -1.0]) * np.arccos(-middle / size)) / 2
+    w = np.cos(t)[:, None] * free[0] + np.sin(t)[:, None] * free[1]
+    return dyads_of(w / np.abs(w).max(axis=1, keepdims=True))
+
+
 def dyads(equations: Floats) -> dict[str, Dyads]:
     """All dyads that fulfil rows of equations, shape (..., rows, 8); by their kinds."""
-    w = unknowns(equations)
+    return dyads_of(unknowns(equations))
+
+
+def dyads_of(w: Floats) -> dict[str, Dyads]:
+    """The dyads of unknowns, shape (count, 8); by their kinds."""
     weight, x, a, q = w[:, 0], _complex(w, 2), _complex(w, 4), _complex(w, 6)
     link = np.abs(weight) > NOTHING
     slide = ~link & (np.abs(x) <= np.sqrt(NOTHING)) & (np.abs(a) > np.sqrt(NOTHING))

@@ -134,6 +134,7 @@ class Conditions:
         if not kept.any():
             misses = np.sum([~good for _, good in judged], axis=0)
             return order[[int(misses[order].argmin())]]
+        self.dropped["linkage", f"only {most} of a kind and assembly are followed"] += max(int(kept.sum()) - most, 0)
         return np.asarray(order[kept[order]][:most])
 
     def kept(self, pool: Pool) -> Flags:
@@ -201,6 +202,11 @@ class Conditions:
 
     def _of_dimensions(self, kind: Kind, values: Floats) -> Iterator[tuple[str, Flags]]:
         section, links = self.section, kind.links(values)
+        every = np.ones(len(values), dtype=bool)
+        if section.kinds and kind.name not in section.kinds:
+            yield "it is of another kind (kinds)", ~every
+        if section.slide and kind.name == FOUR_BAR:
+            yield "no side of the body is a slide (slide)", ~every
         yield from self._of_pivots(kind.frame(values))
         if section.pins is not None:
             x, y = (np.stack([values[:, kind[f"{BODY}.{pin}.{way}"]] for pin in "AB"], axis=1) for way in "xy")

@@ -102,15 +102,21 @@ class BodyTask(_Task):
         conditions.told += filter(None, [self.positions.remark])
         if self.positions.straight:
             return
-        found, words = body.choices(self.positions, *sites, random)
+        found, spare = body.choices(self.positions, *sites, random)
+        given = any(map(any, (site.fixed for site in sites)))
+        what, real = f"{len(self.positions.places)} positions", f"{sum(map(len, found))} real dyads"
+        words = body.told(f"{what} and what is given" if given else what, spare, real,
+                          "that keep what is given" if given else "of at most 4")  # fmt: skip
         placed = [conditions.placed(part) for part in found]
         most = section.evaluations or PAIRS
         parts = [*body.pairs(self.positions, placed, sites, section.lengths, section, random, most)]
-        conditions.told.append(f"{words}, {counted(sum(pairs for _, pairs in parts), 'pair')}")
+        drawn = f", of which {most} of each kind are drawn" * any(len(part.values) >= most for part, _ in parts)
+        conditions.told.append(f"{words}, {counted(sum(pairs for _, pairs in parts), 'pair')}{drawn}")
         if not parts:
             # The nearest is one of the others.
             frame, pins = (Site(site.centre, site.size, site.reach) for site in sites)
-            parts = [*body.pairs(self.positions, found, (frame, pins), {}, section, random, most)]
+            for wished in (section, section.model_copy(update={"kinds": (), "slide": False})):
+                parts = parts or [*body.pairs(self.positions, found, (frame, pins), {}, wished, random, most)]
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
@@ -163,13 +169,17 @@ class FunctionTask(_Task):
             # Pins lie on the x axes of the links, that of a slider on its y axis.
             frame = replace(frame, ends=((-np.inf, np.inf), (0.0, 0.0)))
             output = replace(frame, axis=1j) if self.slides else frame
-        found, words = body.choices(seen, frame, output, random)
-        conditions.told.append(words)
+        found, spare = body.choices(seen, frame, output, random)
         links = next(part for part in found if part.kind == LINK)
         # The frame itself is a dyad between the links.
         links = links.take(
             (np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size))
         )
+        # Of the four dyads of five pairs the frame is one; with fixed zeros three pairs have one coupler.
+        fixed, what = any(frame.fixed), f"{len(self.inputs)} pairs"
+        words = body.told(f"{what} with fixed zeros" if fixed else what, spare,
+                          counted(len(links), "real linkage"), f"of at most {1 if fixed else 3}")  # fmt: skip
+        conditions.told.append(words)
         if len(links):
             part = self._linkage(links)
             yield from assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)

@@ -10,15 +10,15 @@ from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
 from mechdesign.questions.synthesize.columns import DEFECTS
 from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, in_words
+from mechdesign.questions.synthesize.dyads import EXACTLY
 from mechdesign.questions.synthesize.schema import RATIO, REACH
+from mechdesign.questions.synthesize.sites import Site
 from mechdesign.study import Study
 from mechdesign.study.schema.variable import plainly
 from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.variants import in_one_line
 
 _DIGITS = 4
-# Most positions that a dyad passes exactly.
-_EXACT = 5
 
 
 def linkage(table: Table, row: int, error: float) -> list[str]:
@@ -57,11 +57,12 @@ def task(study: Study) -> Iterator[str]:
         return f"{name} {numeral(ordered[0], _DIGITS)} to {numeral(ordered[-1], _DIGITS)} {printed(unit)}".rstrip()
 
     if section.body is not None:
-        what = f"a body through {_exactly(len(section.body), 'position')}"
+        given = (Site.of(places, 0j, 1.0, REACH, 1.0) for places in (section.pivots, section.pins))
+        what = f"a body through {_exactly(len(section.body), 'position', sum(sum(site.fixed) for site in given))}"
         ways = [extent(name, (getattr(part, name) for part in section.body), unit)
                 for name, unit in (("x", length), ("y", length), ("angle", angle))]  # fmt: skip
     elif section.function is not None:
-        what = f"a function through {_exactly(len(section.function.input), 'pair')}"
+        what = f"a function through {_exactly(len(section.function.input), 'pair', 2 * (section.zeros == 'fixed'))}"
         unit = angle if section.output_kind == FOUR_BAR else length
         ways = [extent("input", section.function.input, angle), extent("output", section.function.output, unit)]
     else:
@@ -81,5 +82,5 @@ def task(study: Study) -> Iterator[str]:
             yield in_one_line(key, value)
 
 
-def _exactly(count: int, noun: str) -> str:
-    return f"{counted(count, noun)} {'exactly' if count <= _EXACT else 'by least squares'}"
+def _exactly(count: int, noun: str, wishes: int) -> str:
+    return f"{counted(count, noun)} {'exactly' if count + wishes <= EXACTLY else 'by least squares'}"

@@ -18,7 +18,7 @@ from mechdesign.ground.numerics.arrays import Complexes, evenly
 from mechdesign.ground.results import Result
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
-from mechdesign.questions.synthesize.figures.solutions import trade
+from mechdesign.questions.synthesize.figures.solutions import costs, trade
 from mechdesign.questions.synthesize.words import linkage
 from mechdesign.study import Study
 
@@ -64,7 +64,7 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
     if figure is not None:
         page = draw(figure)
         beside = inline(page, name, described(page))
-        data["front"] = points(page, [table["transmission_angle"][rows] + 1j * drawn.errors[rows]])
+        data["front"] = points(page, [table["transmission_angle"][rows] + 1j * costs(result)[1][rows]])
     _, sheet, sweep = placed[0]
     root = sheet.root("a linkage that does the task")
     chosen(add(root, "g", **{"class": "moving-design"}), sheet, sweep)

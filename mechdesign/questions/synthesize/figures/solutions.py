@@ -1,4 +1,4 @@
-"""The linkages of a synthesis with their paths and the task, and error against transmission angle."""
+"""The linkages of a synthesis with their paths and the task, and error or size against transmission angle."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.errors import MechdesignError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.ground.numerics.fronts import front
+from mechdesign.ground.results import Result
 from mechdesign.questions.poses import solve_shown
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.declared import in_words
@@ -74,27 +75,34 @@ def _course(study: Study, point: str) -> tuple[Still, Complexes]:
     return first, path
 
 
+def costs(result: Result) -> tuple[str, Floats]:
+    """What a larger transmission angle costs, a column of the solutions, and its values: error, of exact ones size."""
+    errors = DrawnSolutions.of(result).errors
+    return ("error", errors) if errors.any() else ("size", np.asarray(result.tables["solutions"]["size"]))
+
+
 def trade(view: View) -> Picture | None:
-    """Error against the smallest transmission angle; the front is those that none surpasses in both."""
-    table, errors = view.result.tables["solutions"], DrawnSolutions.of(view.result).errors
+    """Error, or size, against the smallest transmission angle; the front is those that none surpasses in both."""
+    table, (cost, values) = view.result.tables["solutions"], costs(view.result)
     angles, faulty = np.asarray(table["transmission_angle"]), np.asarray(table["defects"]) != ""
     if len(table) < 2:
         return None
     whole = np.flatnonzero(~faulty)
-    best = whole[front(np.column_stack([errors[whole], -angles[whole]]))]
+    best = whole[front(np.column_stack([values[whole], -angles[whole]]))]
     order = best[np.argsort(angles[best])]
+    line = Trace(angles[order], values[order], label="front: no other without a defect is better in both",
+                 look={"color": style.BLUE, "drawstyle": "steps-pre", "linewidth": 1.2})  # fmt: skip
     marks: list[PanelMark] = [
-        Trace(angles[order], errors[order], label="front: no other without a defect is better in both",
-              look={"color": style.BLUE, "drawstyle": "steps-pre", "linewidth": 1.2}),
-        Dots(angles[~faulty], errors[~faulty], label="linkages", look={"color": style.VERMILION, "markersize": 5}),
+        *[line] * (len(order) > 1),
+        Dots(angles[~faulty], values[~faulty], label="linkages", look={"color": style.VERMILION, "markersize": 5}),
     ]  # fmt: skip
     if faulty.any():
         hollow = {"color": style.VERMILION, "markersize": 5, "markerfacecolor": "white"}
-        marks.append(Dots(angles[faulty], errors[faulty], label="with a defect", look=hollow))
-    marks += [Words(angles[k], errors[k], f"{k + 1}", (4.0, 3.0)) for k in _spread(order, angles, errors)]
+        marks.append(Dots(angles[faulty], values[faulty], label="with a defect", look=hollow))
+    marks += [Words(angles[k], values[k], f"{k + 1}", (4.0, 3.0)) for k in _spread(order, angles, values)]
     across = Axis("smallest transmission angle, more is better", table.column("transmission_angle").unit)
-    up = Axis("error, less is better", table.column("error").unit, ends=(None if errors.any() else 0.0, None))
-    return Picture("What error costs in transmission", [Panel(marks, across, up)])
+    up = Axis(f"{cost}, less is better", table.column(cost).unit)
+    return Picture(f"What less {cost} costs in transmission", [Panel(marks, across, up)])
 
 
 def _spread(rows: Ints, x: Floats, y: Floats) -> list[int]:
