@@ -52,6 +52,32 @@ def test_bash_completes_what_is_typed(folder):
     assert [line.split() for line in told] == list(typed.values())
 
 
+@pytest.mark.parametrize(
+    ("shell", "told"),
+    [
+        ("powershell", "slider.yaml:::"),
+        pytest.param("zsh", '"slider.yaml"', marks=pytest.mark.nightly),
+        pytest.param("fish", "slider.yaml", marks=pytest.mark.nightly),
+        pytest.param("bash", "slider.yaml", marks=pytest.mark.nightly),
+    ],
+)
+def test_every_shell_is_told_studies(folder, shell, told):
+    """By the variables that the script of each sets; it names the variable that says which shell asks."""
+    settings = {
+        "_TYPER_COMPLETE_ARGS": "mechdesign run s", "_TYPER_COMPLETE_WORD_TO_COMPLETE": "s",
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args", "COMP_WORDS": "mechdesign run s", "COMP_CWORD": "2",
+    }  # fmt: skip
+
+    def asked(what):
+        environment = os.environ | settings | {"_MECHDESIGN_COMPLETE": f"{what}_{shell}"}
+        code = "import sys; sys.argv[0] = 'mechdesign'; from mechdesign.__main__ import main; main()"
+        command = [sys.executable, "-c", code]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+    assert told in asked("complete")
+    assert f"complete_{shell}" in asked("source")
+
+
 def test_completion_imports_nothing_heavy(folder):
     code = (
         "import sys\nfrom mechdesign.__main__ import main\n"

@@ -55,5 +55,17 @@ def test_help_imports_nothing_heavy(arguments):
     assert done.returncode == 0, done.stderr
 
 
-def test_no_command_shows_the_help(invoke):
-    assert "kinematics" in invoke().output
+def test_no_command_shows_the_help_and_where_no_study_is_how_to_begin(tmp_path, monkeypatch, invoke):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "compose.yaml").write_text("services: {}\n")
+    alone = invoke()
+    assert "kinematics" in alone.output
+    _, steps = alone.output.split("There is no study in this folder. To begin:\n")
+    assert "mechdesign new > study.yaml " in steps
+    assert "There is no study" not in invoke("--help").output
+    # The steps are commands that there are.
+    assert {line.split()[1] for line in steps.splitlines() if line.startswith("  mechdesign")} <= {*GROUP.commands}
+    (tmp_path / "mine.yml").write_text(invoke("new").stdout)
+    beside = invoke()
+    assert "kinematics" in beside.output
+    assert "There is no study" not in beside.output

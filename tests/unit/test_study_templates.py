@@ -45,6 +45,18 @@ def test_unknown_template():
     assert "no template 'five_bra'; did you mean 'five_bar'?; there are " + ", ".join(TEMPLATES) in done.stderr
 
 
+def test_shipped_studies_and_pages_are_printed_where_there_is_no_checkout():
+    """As the reference names them: a study by its place or its name, of which a template goes first."""
+    root = Path(__file__).parents[2]
+    told = command_line.ask("docs", "dwell", study="").stdout
+    for command, place in (("new", "configs/gallery/cam_dwell.yaml"), ("docs", "docs/howto/gears_and_cams.md")):
+        assert f"(mechdesign {command} {place} prints the " in told
+        assert command_line.ask(command, place, study="").stdout == (root / place).read_text(encoding="utf-8")
+    assert template("cam_dwell") == (root / "configs/gallery/cam_dwell.yaml").read_text(encoding="utf-8")
+    assert template("four_bar") != template("configs/gallery/four_bar.yaml")
+    assert template("four_bar").startswith("# The shortest study")
+
+
 def test_the_built_in_arm_has_the_dimensions_of_its_source():
     study = mechdesign.load(text=template("two_link_arm"))
     assert study.parameters.nominal == {"r1": 10.0, "r2": 8.0}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from copy import copy
 from importlib import import_module
 from inspect import Signature
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -40,10 +42,25 @@ def _usage() -> Iterator[None]:
         raise typer.Exit(2) from None
 
 
+# A line of a study that says what it is about.
+_STUDY = re.compile(rb"^(mechanism|synthesis):", re.MULTILINE)
+# Where there is none yet.
+_FIRST_STEPS = (
+    ("mechdesign new > study.yaml", "writes a commented linkage to change"),
+    ("mechdesign run study.yaml --report", "answers it: open results/study/report.html"),
+    ("mechdesign live study.yaml", "opens a page in which it is dragged"),
+    ("mechdesign import FILE", "makes a study of another tool's file"),
+    ("mechdesign docs WORD", "says what a word means, and which studies show it"),
+)
+
+
 class _Group(TyperGroup):
     """All commands."""
 
+    alone = False  # whether it is called without arguments where there is no study
+
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        self.alone = not args and not _is_study_here()
         # Without arguments there is the help.
         with _usage() if args else nullcontext():
             if "" in args:
@@ -53,6 +70,20 @@ class _Group(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         with _usage():
             return super().invoke(ctx)
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        super().format_epilog(ctx, formatter)
+        if self.alone:
+            with formatter.section("There is no study in this folder. To begin"):
+                formatter.write_dl(_FIRST_STEPS, col_max=34)
+
+
+def _is_study_here() -> bool:
+    for file in (*Path().glob("*.yaml"), *Path().glob("*.yml")):
+        with suppress(OSError):
+            if file.is_file() and _STUDY.search(file.read_bytes()):
+                return True
+    return False
 
 
 app = typer.Typer(

@@ -89,7 +89,7 @@ def source_of(path: Path | None, options: Options) -> StudySource:
         Also if it is a folder or pattern without studies, or no study is named and none is here.
     """
     if path is None and not HERE.exists():
-        raise StudyError(f"no study is named, and there is no {HERE} here")
+        raise StudyError(f"no study is named, and there is no {HERE} here; 'mechdesign new > {HERE}' writes one")
     if path is not None and (path.is_dir() or (glob.has_magic(str(path)) and not path.exists())):
         raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
     return source(path, options)

@@ -9,8 +9,8 @@ from typing import Any
 
 import typer
 
-from mechdesign.door.cli.terminal import colours, emit_words
-from mechdesign.door.reference import Entry, below, entries, find, holding, near, pages, place
+from mechdesign.door.cli.terminal import colours, emit, emit_words
+from mechdesign.door.reference import PAGE, SHIPPED, Entry, below, entries, find, holding, near, pages, place, text_of
 from mechdesign.ground.errors import AssemblyError, StudyError, explain
 from mechdesign.mechanism.configuration import REASONS
 
@@ -32,6 +32,9 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
     StudyError
         If a word is not known; the message names the nearest.
     """
+    if len(words) == 1 and words[0].endswith((".md", ".yaml")) and (text := text_of(words[0])) is not None:
+        emit(text)
+        return
     index = entries(commands(group))
     phrase = " ".join(words)
     # Words of one term of the field are not explained apart.
@@ -43,7 +46,15 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
             cure = f"; did you mean {close!r}?" if close else "; 'mechdesign docs' lists what there is"
             raise StudyError(f"the reference has no {word!r}{cure}")
     texts = [_lines(index, hits) for _, hits in matches] or [_overview(index)]
+    texts += [_printing([hit for _, hits in matches for hit in hits])]
     emit_words("\n".join(line for text in texts for line in text).rstrip("\n") + "\n")
+
+
+def _printing(hits: Sequence[Entry]) -> Iterator[str]:
+    """How pages and studies among the entries are read where there is nothing but the package."""
+    for kind, command in ((PAGE, "docs"), (SHIPPED, "new")):
+        if first := next((hit.word for hit in hits if hit.kind == kind), ""):
+            yield f"(mechdesign {command} {first} prints the {kind})"
 
 
 def _found(index: Sequence[Entry], word: str) -> list[Entry]:

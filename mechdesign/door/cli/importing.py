@@ -6,15 +6,19 @@ import os
 
 from mechdesign.door.cli.options import Options
 from mechdesign.door.cli.terminal import emit, emit_words, say
+from mechdesign.door.reference import text_of
 from mechdesign.ground.errors import OutputError, StudyError
 from mechdesign.ground.files import replace
 from mechdesign.study import template
 from mechdesign.study.importing.conversion import conversion
+from mechdesign.study.templates import BUILT_IN, templates
 
 
 def new(options: Options) -> int:
-    """Print a commented study to start from."""
-    emit(template(options.template) if options.template else template())
+    """Print a commented study to start from, or one that is shipped."""
+    name = options.template or BUILT_IN
+    shipped = None if name in templates() else text_of(name)
+    emit(template(name) if shipped is None else shipped)
     return 0
 
 

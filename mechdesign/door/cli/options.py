@@ -101,7 +101,7 @@ class Options:
     commands: Annotated[list[str] | None, _argument("[COMMAND]...", autocompletion=_one_of(QUESTIONS))] = None
     """Questions; left out: all that the study asks."""
     template: Annotated[str | None, _argument("[TEMPLATE]", autocompletion=_templates)] = None
-    """Name of a template; a wrong name lists them."""
+    """Name of a template, or of a shipped study such as cam_dwell; a wrong name lists the templates."""
     source: Annotated[str, _argument("SOURCE")] = ""
     """A share address of PMKS+ (in quotes), a file, or a folder with joints.csv and links.csv."""
     old: Annotated[Path, _argument("OLD")] = Path()

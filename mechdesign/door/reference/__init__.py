@@ -3,8 +3,21 @@
 from mechdesign.door.reference.entries import Entry
 from mechdesign.door.reference.keys import place
 from mechdesign.door.reference.lookup import below, find, holding, near
-from mechdesign.door.reference.pages import pages
+from mechdesign.door.reference.pages import PAGE, SHIPPED, pages, text_of
 from mechdesign.door.reference.sources import entries
 from mechdesign.door.reference.tables import tables
 
-__all__ = ["Entry", "below", "entries", "find", "holding", "near", "pages", "place", "tables"]
+__all__ = [
+    "PAGE",
+    "SHIPPED",
+    "Entry",
+    "below",
+    "entries",
+    "find",
+    "holding",
+    "near",
+    "pages",
+    "place",
+    "tables",
+    "text_of",
+]

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 from mechdesign.door.reference.entries import Entry
 
+PAGE, SHIPPED = "page", "shipped study"  # kinds of entries
 # Beside the package in a checkout, in it where it is installed.
 _PACKAGE = Path(__file__).parents[2]
 _ROOTS = (_PACKAGE / "pages", _PACKAGE.parent)
 _FOLDERS = ("docs/howto", "docs/tutorials", "docs/theory", "configs")
+_PAGE, _STUDY = ".md", ".yaml"
 _MOST = 4  # pages of a word
 _LONG = 220  # letters of the sentence that is shown
 _MARKUP = re.compile(r"\[([^\]]*)\]\([^)]*\)|\{[a-z]+\}|^- |[`*$]")
@@ -28,16 +30,24 @@ class _Page(NamedTuple):
 
 
 @cache
-def _pages() -> tuple[_Page, ...]:
-    """Every page and study; none where the package stands alone."""
-    root = next((root for root in _ROOTS if (root / _FOLDERS[0]).is_dir()), None)
-    if root is None:
-        return ()
+def _files() -> dict[str, Path]:
+    """The files of pages and studies by their places; none where the package stands alone."""
+    root = next((root for root in _ROOTS if (root / _FOLDERS[0]).is_dir()), Path())
     paths = (path for folder in _FOLDERS for path in sorted((root / folder).rglob("*")))
-    return tuple(
-        {".md": _of_page, ".yaml": _of_study}[path.suffix](path.relative_to(root).as_posix(), path.read_text("utf-8"))
-        for path in paths if path.suffix in (".md", ".yaml")
-    )  # fmt: skip
+    return {path.relative_to(root).as_posix(): path for path in paths if path.suffix in (_PAGE, _STUDY)}
+
+
+@cache
+def _pages() -> tuple[_Page, ...]:
+    kinds = {_PAGE: _of_page, _STUDY: _of_study}
+    return tuple(kinds[path.suffix](place, path.read_text("utf-8")) for place, path in _files().items())
+
+
+def text_of(name: str) -> str | None:
+    """The text of a page or a shipped study by its place, or of a study by its name; None where there is none."""
+    studies = {path.stem: path for path in _files().values() if path.suffix == _STUDY}
+    path = _files().get(name, studies.get(name))
+    return None if path is None else path.read_text("utf-8")
 
 
 def _of_page(place: str, text: str) -> _Page:
@@ -77,7 +87,7 @@ def pages(word: str, *, subjects: bool = False) -> Iterator[Entry]:
         patterns = [beginning(_ENDING.sub("", part)) for part in word.split()]
         ranked = _ranked(patterns)
     for page in ranked[:_MOST]:
-        kind = "page" if page.place.endswith(".md") else "shipped study"
+        kind = PAGE if page.place.endswith(_PAGE) else SHIPPED
         yield Entry(page.place, kind, f"{page.title}: {_sentence(page, patterns)}")
 
 
