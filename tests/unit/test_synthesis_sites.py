@@ -144,3 +144,27 @@ def test_of_three_positions_slides_have_their_points_where_a_line_meets_a_circle
     places = np.concatenate([points(table, f"{name}.{end}") for end in sliding])
     assert np.abs(places[:, None] - points_of_slides).min(axis=1).max() < 1e-9
     assert table["max_error"].max() < 1e-9
+
+
+PATH = {"points": [[55, 60], [45, 75], [25, 75], [10, 55], [15, 35], [40, 40]], "closed": True}
+SLOPE = np.exp(1j * np.radians(30))
+
+
+@pytest.mark.slow
+def test_both_pivots_of_a_path_lie_on_a_line() -> None:
+    table = table_of(
+        {"path": PATH, "pivots": {"through": [0, -20], "direction": 30}, "evaluations": 300, "solutions": 5}
+    )
+    for name in "OD":
+        assert np.abs(((points(table, f"ground.{name}") + 20j) / SLOPE).imag).max() < 1e-4
+    assert table["error"].min() < 1e-9
+
+
+@pytest.mark.nightly
+def test_a_single_given_point_has_a_pivot_of_each_linkage_of_a_path() -> None:
+    table = table_of({"path": PATH, "pivots": [[0, 0]], "evaluations": 1500})
+    assert (np.minimum(*(np.abs(points(table, f"ground.{name}")) for name in "OD")) < 1e-4).all()
+    assert table["error"].min() < 1e-9
+    # That of a slider-crank is where its crank turns, not on its rail.
+    table = table_of({"path": PATH, "kinds": "slider_crank", "pivots": [[0, 0]], "evaluations": 1500})
+    assert np.abs(points(table, "ground.O")).max() < 1e-4

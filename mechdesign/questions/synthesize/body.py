@@ -185,8 +185,8 @@ def _joined(parts: Sequence[Dyads]) -> Dyads:
     whole = Dyads(parts[0].kind, *(np.concatenate([getattr(part, name) for part in parts])
                                    for name in ("pivot", "pin", "normal", "length")))  # fmt: skip
     keys = np.stack([whole.pivot.real, whole.pivot.imag, whole.pin.real, whole.pin.imag], axis=1)
-    _, first = np.unique(np.round(keys / _SAME), axis=0, return_index=True)
-    return whole.take(np.sort(first))
+    rows = [*enumerate(map(tuple, np.round(keys / _SAME).tolist()))]
+    return whole.take(sorted({key: row for row, key in reversed(rows)}.values()))
 
 
 def _least_squares(task: Positions, sites: tuple[Site, Site], random: np.random.Generator) -> list[Dyads]:

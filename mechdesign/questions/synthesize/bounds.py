@@ -2,88 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from abc import ABC, abstractmethod
+from typing import TypeVar
 
 import numpy as np
 
-from mechdesign.ground.numerics.arrays import Flags, Floats
+from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.questions.synthesize.judging import sines
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.own import OwnKind
-from mechdesign.questions.synthesize.schema import Region, SynthesisSection
+from mechdesign.questions.synthesize.schema import SynthesisSection
+from mechdesign.questions.synthesize.sites import Site
 
+Slopes = TypeVar("Slopes", Floats, Complexes)
 # Poses of a turn at which transmission angles are looked at in a polish, of so many linkages at once.
 _AROUND, _AT_ONCE = 32, 1000
 # By this part their sines are kept larger than what is asked, as they are not followed between these poses.
 _SURE = 1e-3
 
 
-class KindBounds:
-    """Keeps the values of linkages of a kind within the section's limits, as far as each by itself can.
+class Bounds(ABC):
+    """Keeps linkages of a family within limits, as far as each value by itself can.
 
-    Attributes
+    Parameters
     ----------
-    fixed : ndarray of bool, shape (places,)
-        Which values are given.
-    in_place : bool
-        Whether samples are where they must be, so that only their forms are free.
     turning : bool
         Whether drives must turn fully.
     least : float
         Sine of the transmission angle that they keep then.
+    in_place : bool
+        Whether samples are put where they must be, so that only their forms are free.
     """
 
-    def __init__(self, kind: Kind, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
-        self.kind, self.section, self.centre, self.size = kind, section, centre, size
-        self.turning, self.fixed = section.needs_turn, np.zeros(len(kind.places), dtype=bool)
-        self.least = section.least_sine(factor)
-        self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
-        self.ends = {
-            kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
-        }
-        self.ground = section.lengths.get("ground", (0.0, np.inf))
-        pivots = section.pivots
-        self.given = None if pivots is None or isinstance(pivots, Region) else np.array([complex(*p) for p in pivots])
-        self.box = pivots if isinstance(pivots, Region) and pivots.through is None else None
-        self.in_place = self.given is not None and len(self.given) >= len(kind.pivots)
-        if self.in_place:
-            self.fixed[[column for pair in kind.pivots for column in pair]] = True
+    def __init__(self, kind: Kind, *, turning: bool, least: float, in_place: bool) -> None:
+        self.kind, self.turning, self.least, self.in_place = kind, turning, least, in_place
 
+    @abstractmethod
     def placed(self, values: Floats) -> Floats:
-        """Linkages turned, scaled and shifted to the first two of the given pivots."""
-        assert self.given is not None
-        first, second, *_ = self.kind.frame(values).T
-        turned = (self.given[1] - self.given[0]) / (second - first)
-        return self(self.kind.moved(values, turned, self.given[0] - turned * first))
+        """Samples where they must be, if `in_place`."""
 
+    @abstractmethod
     def __call__(self, values: Floats) -> Floats:
         """The nearest values within the limits of each."""
-        values, limits = values.copy(), self.section.bounds
-        for number, (x, y) in enumerate(self.kind.pivots):
-            place = values[:, x] + 1j * values[:, y]
-            if self.given is not None and self.in_place:
-                place = np.full(len(values), self.given[number])
-            away = place - self.centre
-            far = np.maximum(np.abs(away) / (limits.reach * self.size), 1.0)
-            place = self.centre + away / far
-            if self.box is not None:
-                place = np.clip(place.real, *_ends(self.box.x)) + 1j * np.clip(place.imag, *_ends(self.box.y))
-            values[:, x], values[:, y] = place.real, place.imag
-        # The shortest gives way to the ratio; a negative length is one to the other side.
-        own = np.abs(values[:, self.links])
-        values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
-        for column, (low, high) in self.ends.items():
-            values[:, column] = np.clip(values[:, column], low, high)
-        if not self.in_place and self.links:
-            # The frame keeps the ratio by its second pivot.
-            (x, y), (u, v), *_ = self.kind.pivots
-            own, frame = values[:, self.links], values[:, u] - values[:, x] + 1j * (values[:, v] - values[:, y])
-            length = np.maximum(np.abs(frame), np.finfo(float).tiny)
-            low, high = self.ground
-            least = np.maximum(own.max(axis=1) / limits.ratio, low)
-            moved = frame * np.clip(length, least, np.minimum(own.min(axis=1) * limits.ratio, high)) / length
-            values[:, u], values[:, v] = values[:, x] + moved.real, values[:, y] + moved.imag
-        return values
+
+    @property
+    def freedom(self) -> int:
+        """How many values are left to choose."""
+        return len(self.kind.places)
+
+    def left(self, values: Floats, slopes: Slopes) -> Slopes:
+        """Derivatives by values, shape (places, count, ...), without those by what is held."""
+        return slopes
 
     def accepts(self, modes: tuple[int, ...], values: Floats) -> Flags:
         """Which linkages have the transmission angle that is asked for over a turn of the crank."""
@@ -102,12 +71,87 @@ class KindBounds:
         return good
 
 
-class RangeBounds(KindBounds):
-    """Keeps the parameters of a study's own mechanism within their ranges; it is where they say."""
+class KindBounds(Bounds):
+    """Those of a declared kind by the section's limits: pivots in their site, lengths in their ranges."""
+
+    def __init__(self, kind: Kind, section: SynthesisSection, site: Site, factor: float) -> None:
+        held = len(site.given) >= len(kind.pivots)
+        super().__init__(kind, turning=section.needs_turn, least=section.least_sine(factor), in_place=held)
+        self.section, self.site = section, site
+        self.links = [k for k, place in enumerate(kind.places) if place.endswith(".length")]
+        self.ends = {
+            kind[f"{name}.length"]: ends for name, ends in section.lengths.items() if f"{name}.length" in kind.places
+        }
+        self.ground = section.lengths.get("ground", (0.0, np.inf))
+
+    def placed(self, values: Floats) -> Floats:
+        """Linkages turned, scaled and shifted to the first two of the given pivots."""
+        first, second, *_ = self.kind.frame(values).T
+        turned = (self.site.given[1] - self.site.given[0]) / (second - first)
+        return self(self.kind.moved(values, turned, self.site.given[0] - turned * first))
+
+    @property
+    def freedom(self) -> int:
+        """How many dimensions are left to choose; where a rail is told by any of its points, that is no dimension."""
+        (along, across), pivots = self.site.fixed, len(self.kind.pivots)
+        if len(self.site.given):
+            return len(self.kind.places) - 2 * min(pivots, len(self.site.given))
+        held = along + across
+        return len(self.kind.places) - held * pivots - (len(self.kind.rails) if not held else 0)
+
+    def __call__(self, values: Floats) -> Floats:
+        values, limits, site = values.copy(), self.section.bounds, self.site
+        # The shortest gives way to the ratio; a negative length is one to the other side.
+        own = np.abs(values[:, self.links])
+        values[:, self.links] = own = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
+        for column, (low, high) in self.ends.items():
+            values[:, column] = np.clip(values[:, column], low, high)
+        away = self.kind.frame(values) - site.centre
+        places = site.centre + away / np.maximum(np.abs(away) / (site.reach * site.size), 1.0)
+        if not self.in_place and self.links:
+            # The frame keeps the ratio by its second pivot.
+            own, frame = values[:, self.links], places[:, 1] - places[:, 0]
+            length = np.maximum(np.abs(frame), np.finfo(float).tiny)
+            least = np.maximum(own.max(axis=1) / limits.ratio, self.ground[0])
+            most = np.minimum(own.min(axis=1) * limits.ratio, self.ground[1])
+            places[:, 1] = places[:, 0] + frame * np.clip(length, least, most) / length
+        for pivot, column in self.kind.rails.items():
+            # A rail is told by that of its points that is in place, and nearest to the middle.
+            places[:, pivot] = site.crossed(places[:, pivot], 1j * np.exp(1j * values[:, column]))
+        places = np.where(self._held(places), site.nearest(places), places)
+        for (x, y), place in zip(self.kind.pivots, places.T, strict=True):
+            values[:, x], values[:, y] = place.real, place.imag
+        return values
+
+    def _held(self, places: Complexes) -> Flags:
+        """Which pivots the site holds, shape (count, pivots): all, or of fewer given points the nearest to each.
+
+        Rails have given points only where there are more than other pivots.
+        """
+        held, given = np.full(places.shape, self.in_place or not len(self.site.given)), self.site.given
+        rails = [*self.kind.rails] if len(given) + len(self.kind.rails) <= places.shape[1] else []
+        for point in [] if self.in_place else given:
+            gaps = np.where(held, np.inf, np.abs(places - point))
+            gaps[:, rails] = np.inf
+            held[np.arange(len(places)), gaps.argmin(axis=1)] = True
+        return held
+
+    def left(self, values: Floats, slopes: Slopes) -> Slopes:
+        slopes, axis, (along, across) = slopes.copy(), self.site.axis, self.site.fixed
+        held = self._held(self.kind.frame(values)).T.reshape(-1, len(values), *(1,) * (slopes.ndim - 2))
+        for (x, y), rows in zip(self.kind.pivots, held, strict=True):
+            way = slopes[x] * axis.real + slopes[y] * axis.imag
+            off = slopes[y] * axis.real - slopes[x] * axis.imag
+            way, off = np.where(rows & along, 0.0, way), np.where(rows & across, 0.0, off)
+            slopes[x], slopes[y] = way * axis.real - off * axis.imag, way * axis.imag + off * axis.real
+        return slopes
+
+
+class RangeBounds(Bounds):
+    """Those of a study's own mechanism by the ranges of its parameters; it is where they say."""
 
     def __init__(self, kind: OwnKind, *, turning: bool, least: float = 0.0) -> None:
-        self.kind, self.turning, self.least = kind, turning, least
-        self.in_place, self.fixed = True, np.zeros(len(kind.places), dtype=bool)
+        super().__init__(kind, turning=turning, least=least, in_place=True)
         self.low, self.high = kind.low, kind.high
 
     def placed(self, values: Floats) -> Floats:
@@ -115,7 +159,3 @@ class RangeBounds(KindBounds):
 
     def __call__(self, values: Floats) -> Floats:
         return np.clip(values, self.low, self.high)
-
-
-def _ends(ends: Any) -> tuple[float, float]:
-    return ends if isinstance(ends, tuple) else (-np.inf, np.inf) if ends is None else (ends, ends)

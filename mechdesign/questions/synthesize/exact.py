@@ -12,7 +12,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.open_loops import OpenLoops
-from mechdesign.questions.synthesize.bounds import KindBounds
+from mechdesign.questions.synthesize.bounds import Bounds
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.paths import Points, Starts
 
@@ -25,20 +25,21 @@ _CLOSED = 1e-13
 _LEAST = 1e-9
 
 
-def passing(kind: Kind, task: Points, starts: Sequence[Starts], bound: KindBounds) -> Starts:
+def passing(kind: Kind, task: Points, starts: Sequence[Starts], bound: Bounds) -> Starts:
     """The linkages to which starts in each of the assemblies lead."""
     values, numbers = (np.concatenate([getattr(part, name) for part in starts]) for name in ("values", "numbers"))
-    poses = np.concatenate([_poses(kind, modes, part) for modes, part in zip(kind.modes, starts, strict=True)], axis=1)
-    free, closed = np.flatnonzero(~bound.fixed), np.zeros(len(values), dtype=bool)
-    open_ = np.arange(len(values))
+    poses = np.concatenate([_poses(kind, modes, part) for modes, part in zip(kind.begun, starts, strict=True)], axis=1)
+    open_, closed, count = np.arange(len(values)), np.zeros(len(values), dtype=bool), values.shape[1]
     for _ in range(_ROUNDS):
         missed, by_pose, by_value = _equations(kind, task, values[open_], poses[:, open_])
         gap = np.abs(missed).max(axis=(1, 2), initial=0.0)
         closed[open_] = gap <= _CLOSED * task.size
         going = np.isfinite(gap) & (gap > _CLOSED * task.size)
-        open_, missed, by_pose, by_value = (part[going] for part in (open_, missed, by_pose, by_value[..., free]))
+        open_, missed, by_pose, by_value = (part[going] for part in (open_, missed, by_pose, by_value))
         if not len(open_):
             break
+        now = values[open_]
+        by_value = np.moveaxis(bound.left(now, np.moveaxis(by_value, -1, 0)), 0, -1)
         if task.timing is not None:
             # The drive turns by the same at all points.
             by_value = np.concatenate([by_value, by_pose[..., :1]], axis=-1)
@@ -48,12 +49,10 @@ def passing(kind: Kind, task: Points, starts: Sequence[Starts], bound: KindBound
         left = np.einsum("npek,npe->npk", across, missed).reshape(len(open_), -1)
         matrix = np.einsum("npek,npei->npki", across, by_value).reshape(*left.shape, -1)
         step = _least(matrix, left)
-        now = values[open_]
-        part = np.abs(step[:, : len(free)]) / kind.scale(now, _SMALL * task.size)[:, free]
+        part = np.abs(step[:, :count]) / kind.scale(now, _SMALL * task.size)
         step *= np.minimum(1.0, _LARGEST / np.maximum(part.max(axis=1), np.finfo(float).tiny))[:, None]
-        values[open_[:, None], free] += step[:, : len(free)]
-        values[open_] = bound(values[open_])
-        step[:, : len(free)] = (values[open_] - now)[:, free]
+        values[open_] = bound(now + step[:, :count])
+        step[:, :count] = values[open_] - now
         turned = _least(by_pose, missed + np.einsum("npei,ni->npe", by_value, step))
         if task.timing is not None:
             turned = np.concatenate([np.broadcast_to(step[:, None, -1:], (*turned.shape[:2], 1)), turned], axis=-1)

@@ -20,6 +20,8 @@ _AT_ONCE = 100
 _TURN = 2 * np.pi
 # Cosine of the turn of a link between two poses, from which on it is swift.
 _SLOW = 0.97
+# Sines that differ by less than this part are the same.
+_SAME = 1e-9
 # Below this sine of the transmission angle a linkage is at a dead centre, which the finest poses miss by less.
 _DEAD = 1e-5
 
@@ -80,9 +82,11 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
     poses = kind.solve(values, begin[:, None] + parts * (end - begin)[:, None], modes)
     sine = sines(kind, poses)
     worst, dead = sine.min(axis=1), np.asarray(~poses.valid.all(axis=1))
-    # Between poses it is lowest beside the lowest of them, or where a link turns swiftly, as beside a pivot.
+    # Between poses it is lowest beside the lowest of them, or where a link turns swiftly, as beside a pivot. Where it
+    # stays the same, as between two slides, there is nothing to look for.
     around = np.pad(sine, ((0, 0), (1, 1)), constant_values=np.inf)
-    lowest = (sine <= around[:, :-2]) & (sine <= around[:, 2:])
+    left, right = around[:, :-2], around[:, 2:]
+    lowest = (sine <= left) & (sine <= right) & (np.maximum(left, right) > sine * (1 + _SAME))
     swift = np.zeros((len(values), POSES - 1), dtype=bool)
     for rotation in poses.rotations:
         turned = np.broadcast_to(rotation, poses.shape)

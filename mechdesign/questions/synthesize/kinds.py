@@ -65,17 +65,33 @@ class Kind:
             every = [(*modes, sign) for modes in every for sign in ((1, -1) if mode else (0,))]
         return every
 
+    @property
+    def begun(self) -> list[tuple[int, ...]]:
+        """Those in which its linkages are sampled: with the opposite direction of a rail another one is the same."""
+        groups = self.mechanism.forward.structure.groups
+        return [
+            modes
+            for modes in self.modes
+            if all(mode > 0 or group.form != "angle and fixed slide" for mode, group in zip(modes, groups, strict=True))
+        ]
+
     @cached_property
     def pivots(self) -> tuple[tuple[int, int], ...]:
         """Columns of x and y of the points O, D and F of the frame."""
         return tuple(self._pair(f"ground.{name}") for name in "ODF" if f"ground.{name}.x" in self.places)
 
     @cached_property
+    def rails(self) -> dict[int, int]:
+        """By the number of the pivot through which a slide of the frame runs, the column of its direction."""
+        joints = self.study.resolved["mechanism"].get("joints", {})
+        names = [name for name in "ODF" if f"ground.{name}.x" in self.places]
+        return {names.index(joint["through"]): self[f"{name}.direction"]
+                for name, joint in joints.items() if joint["slot"] == "ground"}  # fmt: skip
+
+    @property
     def directions(self) -> tuple[int, ...]:
         """Columns of the directions of slides of the frame."""
-        joints = self.study.resolved["mechanism"].get("joints", {})
-        rails = [name for name, joint in joints.items() if joint["slot"] == "ground"]
-        return tuple(self[f"{name}.direction"] for name in rails)
+        return tuple(self.rails.values())
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:

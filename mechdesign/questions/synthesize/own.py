@@ -56,6 +56,11 @@ class OwnKind(Kind):
         """The assembly of its sketch."""
         return [self.mechanism.forward.modes]
 
+    @property
+    def begun(self) -> list[tuple[int, ...]]:
+        """The same."""
+        return self.modes
+
     def scale(self, values: Floats, size: float) -> Floats:
         return np.asarray(self.high - self.low)
 

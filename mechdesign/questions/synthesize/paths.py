@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.questions.synthesize.bounds import KindBounds
+from mechdesign.questions.synthesize.bounds import Bounds
 from mechdesign.questions.synthesize.kinds import Kind
 
 _Numbers = TypeVar("_Numbers", Floats, Complexes)
@@ -96,7 +96,7 @@ class Fits(Starts):
 
 
 def starts(
-    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: KindBounds, most: int = POLISHED
+    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: Bounds, most: int = POLISHED
 ) -> Starts:
     """The linkages among samples, about so many, whose curves have most the form of the task; those first."""
     samples = samples[bound.accepts(modes, samples)]
@@ -110,7 +110,7 @@ def starts(
 
 
 def fits(
-    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: KindBounds, *, whole: bool = False
+    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: Bounds, *, whole: bool = False
 ) -> Fits:
     """Linkages polished from starts; `bound` keeps their values, and with `whole` no start is left behind."""
     if whole:
@@ -155,7 +155,7 @@ def _centred(curves: Complexes) -> tuple[Complexes, Complexes, Floats]:
 
 
 def begun(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int, bound: KindBounds
+    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int, bound: Bounds
 ) -> tuple[Floats, Floats]:
     """The linkages with a curve that comes nearest to the task, and the drive at its points.
 
@@ -236,7 +236,7 @@ def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints
 
 
 def polish(
-    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: KindBounds,
+    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: Bounds,
     kept: Mapping[int, int] = MappingProxyType({}),
 ) -> Fits:  # fmt: skip
     """All linkages at once by Levenberg and Marquardt's method; `kept` are how many go on after so many rounds."""
@@ -259,7 +259,7 @@ def polish(
         poses = kind.solve(values, angles, modes)
         gaps = kind.points(poses) - task.points
         by_place, by_drive = kind.derivatives(values, poses)
-        by_place = np.where(bound.fixed[:, None, None], 0.0, by_place)
+        by_place = bound.left(values, by_place)
         speed = np.maximum(np.abs(by_drive), np.finfo(float).tiny)
         along = by_drive / speed
         if task.timing is None:

@@ -12,7 +12,7 @@ from mechdesign.ground.errors import StudyError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
-from mechdesign.questions.synthesize.bounds import KindBounds, RangeBounds
+from mechdesign.questions.synthesize.bounds import Bounds, KindBounds, RangeBounds
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR, POINT, in_words
 from mechdesign.questions.synthesize.dyads import LINK, Dyads
 from mechdesign.questions.synthesize.exact import passing
@@ -260,21 +260,26 @@ class PathTask(_Task):
         if len(self.path.points) < self.given:
             conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
         for kind in self.kinds:
-            bound, ways = self._bound(kind), len(kind.modes)
-            starts = [self._starts(kind, modes, bound, random) for modes in kind.modes]
-            starts = [replace(part, numbers=part.numbers * ways + k) for k, part in enumerate(starts)]
-            count, exact = sum(len(part.numbers) for part in starts), list[paths.Starts]()
-            few = len(self.path.points) <= paths.MOST_EXACT
+            bound, ways = self._bound(kind, conditions.sites[0]), len(kind.begun)
+            starts = [self._starts(kind, modes, bound, random) for modes in kind.begun]
+            # They are counted in turn.
+            turns = [part.numbers * ways + k for k, part in enumerate(starts)]
+            every = np.sort(np.concatenate(turns))
+            starts = [replace(part, numbers=np.searchsorted(every, turn))
+                      for part, turn in zip(starts, turns, strict=True)]  # fmt: skip
+            count, exact = len(every), list[paths.Starts]()
+            points = len(self.path.points)
+            few = points <= paths.MOST_EXACT
             # Where the points leave no choice, linkages that pass them may need an assembly at each.
-            alone = few and ways > 1 and self._leaves_none(kind, bound)
+            alone = few and len(kind.modes) > 1 and (points if self.free else 2 * points - 1) >= bound.freedom
             if alone and count:
                 exact.append(_distinct([passing(kind, self.path, starts, bound)], self.size))
                 part = Candidates(kind, exact[0].values, exact[0].angles)
                 if len(part.values):
                     yield from assembled(part, self.gaps(part), conditions, self.size)
-            for modes, start in zip(kind.modes, starts, strict=True):
+            for modes, start in zip(kind.begun, starts, strict=True):
                 fits = paths.fits(kind, modes, self.path, start, bound, whole=few and not alone)
-                passes = fits.costs <= (EXACT * self.size) ** 2 * len(self.path.points)
+                passes = fits.costs <= (EXACT * self.size) ** 2 * points
                 exact.append(paths.Starts(fits.values[passes], fits.angles[passes], fits.numbers[passes]))
                 if not len(fits.costs):
                     continue
@@ -291,16 +296,14 @@ class PathTask(_Task):
                     if len(numbers) else f"none exact of {count} starts"  # fmt: skip
                 conditions.told.append(f"{in_words(kind.name)}: {words}")
 
-    def _bound(self, kind: Kind) -> KindBounds:
+    def _bound(self, kind: Kind, site: Site) -> Bounds:
         """What keeps linkages of a kind within the limits."""
         section = self.section
         if isinstance(kind, OwnKind):
             return RangeBounds(kind, turning=section.needs_turn, least=section.least_sine(self.factor))
-        return KindBounds(kind, section, self.centre, self.size, self.factor)
+        return KindBounds(kind, section, site, self.factor)
 
-    def _starts(
-        self, kind: Kind, modes: tuple[int, ...], bound: KindBounds, random: np.random.Generator
-    ) -> paths.Starts:
+    def _starts(self, kind: Kind, modes: tuple[int, ...], bound: Bounds, random: np.random.Generator) -> paths.Starts:
         """Linkages of a kind in an assembly from which exact ones and near ones are looked for."""
         section = self.section
         ratio = min(section.bounds.ratio, _SAMPLED) if bound.in_place else section.bounds.ratio
@@ -310,11 +313,6 @@ class PathTask(_Task):
             samples = bound.placed(samples)
         most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
         return paths.starts(kind, modes, self.path, samples, bound, most)
-
-    def _leaves_none(self, kind: Kind, bound: KindBounds) -> bool:
-        """Whether the points leave no choice of a kind's dimensions; along its slides a rail may begin anywhere."""
-        conditions = len(self.path.points) if self.free else 2 * len(self.path.points) - 1
-        return bool(conditions >= np.count_nonzero(~bound.fixed) - len(kind.directions))
 
 
 Task = BodyTask | FunctionTask | PathTask
