@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.door.live import saving
 from mechdesign.door.live.altered import SKETCH, altered, is_entry
 from mechdesign.door.live.answers import AS_IT_WAS, PACKAGE, ChangedAnswer, staged, titled
@@ -33,8 +33,8 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.look import ask
 from mechdesign.study import Study
 
-# Questions about one design, in the order in which they are asked first; the others make designs of their own.
-QUESTIONS = ("kinematics", "stiffness", "dynamics", "workspace", "reliability")
+# In the order in which they are asked first; the last make designs of their own, and take longest.
+_ORDER = ("kinematics", "stiffness", "dynamics", "workspace", "reliability", "sensitivities", "sweep", "optimize")
 _MOST_ROWS = 20_000  # poses that a page draws
 _MOST_PAGES = 16  # whose answers are kept: those that asked last
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
@@ -161,7 +161,7 @@ class Session:
         return rendered(
             "live.html.j2", package=PACKAGE, parts=("moving", "hand", "live"), connect="'self'",
             drawings=[part.drawing], study=study, part=part, about=about, groups=self._groups(), taken=self.taken,
-            questions={name: COMMANDS[name].question for name in questions}, mistake=self.mistake,
+            questions={name: QUESTIONS[name].question for name in questions}, mistake=self.mistake,
         )  # fmt: skip
 
     def _entries(self) -> dict[str, float]:
@@ -171,7 +171,8 @@ class Session:
         return {name: value_of(self.study, name) for name in names}
 
     def _questions(self) -> list[str]:
-        return [name for name in QUESTIONS if name == "kinematics" or name in self.study.questions]
+        asked = self.study.sections
+        return [name for name in _ORDER if name == "kinematics" or asked.get(QUESTIONS[name].key) is not None]
 
     def _quickest(self) -> list[str]:
         """The questions by the time that each took last; then those that were not asked yet."""
@@ -282,7 +283,7 @@ class Session:
         """What the study with changed numbers answers, and how the study that is shown moves with them."""
         study = moves = altered(self.study, self._own(changes))
         result = motion = None
-        if question in study.questions or self.shown is self.study:
+        if question != "kinematics" or study.kinematics is not None or self.shown is self.study:
             result = motion = ask(study, question, progress=progress)
         if question == "kinematics" and self.shown is not self.study:
             moves = altered(self.shown, changes)

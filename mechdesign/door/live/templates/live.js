@@ -56,14 +56,14 @@
           }
           own.set = answer.set;
           moving.take(answer.data, answer.drawing);
-          if (job.drag && answer.row !== gesture.row) {
+          if (job.drag && answer.names.includes("")) {
             gesture.row = answer.row;
             moving.seek(answer.row);
             answer.words.push(moving.words());
           }
           own.fill();
           const lost = answer.data.gaps.reduce((sum, [first, end]) => sum + end - first + 1, 0);
-          const gaps = lost ? `${answer.data.gaps[0][2]} at ${lost} of ${poses} poses` : "";
+          const gaps = lost ? `${lost} of ${poses} poses: ${answer.data.gaps[0][2].replace(" here", "")}` : "";
           own.beside([...answer.words, answer.why, gaps].filter(Boolean).join("\n"), Boolean(answer.why));
         } catch (error) {
           own.lost(error);
@@ -71,7 +71,7 @@
         }
       }
       running = false;
-      timer = setTimeout(ask, REST);
+      timer = setTimeout(() => ask(!gesture && outside()), REST);
     }
 
     // All questions, one after the other, as long as no newer change comes.
@@ -127,6 +127,12 @@
       for (const part of room.children) if (part !== dead) moving.leading(part);
       // Dead centres are marked along the motion.
       if (question === "kinematics") marks.replaceChildren(...places.map(place => Object.assign(document.createElement("option"), {value: Math.round(place)})));
+    }
+
+    // Whether a hand has brought a point out of the drawing.
+    function outside() {
+      const {x, y} = moving.points(), k = moving.row(), {width, height} = drawing.viewBox.baseVal;
+      return about.points.some(point => x[point][k] < 0 || y[point][k] < 0 || x[point][k] > width || y[point][k] > height);
     }
 
     const here = point => {

@@ -175,6 +175,8 @@
     const size = drawing.viewBox.baseVal, paths = [], boxes = [];
     (data.arrows || []).forEach(({key: [length, words], layers}, row) => {
       const y = size.height - 10 - 24 * row, group = make("g", {"stroke-width": 2}, drawing);
+      // Below the handles of a hand.
+      drawing.querySelector(".moving-stays")?.before(group);
       const key = make("g", {stroke: "#222222"}, group);
       make("path", {d: `M${size.width - 14 - length} ${y}h${length}m-8 -4l8 4l-8 4`}, key);
       make("text", {x: size.width - 14, y: y - 8, "text-anchor": "end", "font-size": 10, fill: "#222222", stroke: "white",
