@@ -53,7 +53,11 @@ def overrides(changes: Changes) -> tuple[str, ...]:
 
 
 def with_entries(
-    study: Study, changes: Changes, parameters: Mapping[str, Any] | None = None, *, without: Collection[str] = _OF_OTHERS
+    study: Study,
+    changes: Changes,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    without: Collection[str] = _OF_OTHERS,
 ) -> Study:
     """The study with changed entries, and perhaps more parameters, `without` sections that make other studies of it.
 

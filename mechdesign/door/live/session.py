@@ -33,8 +33,11 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.look import ask
 from mechdesign.study import Study
 
-# In the order in which they are asked first; the last make designs of their own, and take longest.
-_ORDER = ("kinematics", "stiffness", "dynamics", "workspace", "reliability", "sensitivities", "sweep", "optimize")
+# In the order in which they are asked first, and those that make designs of their own, which are asked last.
+_ORDER, _LONG = (
+    ("kinematics", "stiffness", "dynamics", "workspace", "reliability"),
+    ("sensitivities", "sweep", "optimize"),
+)
 _MOST_ROWS = 20_000  # poses that a page draws
 _MOST_PAGES = 16  # whose answers are kept: those that asked last
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
@@ -154,8 +157,8 @@ class Session:
         assert part is not None
         questions = self._questions()
         about = {
-            "version": self.version, "questions": self._quickest(), "length": study.units.label("length"),
-            **saving.file_names(study), "points": self._handles(),
+            "version": self.version, "questions": self._quickest(), "long": _LONG,
+            "length": study.units.label("length"), **saving.file_names(study), "points": self._handles(),
             "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake, "entries": self._entries(),
         }  # fmt: skip
         return rendered(
@@ -171,8 +174,8 @@ class Session:
         return {name: value_of(self.study, name) for name in names}
 
     def _questions(self) -> list[str]:
-        asked = self.study.sections
-        return [name for name in _ORDER if name == "kinematics" or asked.get(QUESTIONS[name].key) is not None]
+        asked, names = self.study.sections, (*_ORDER, *_LONG)
+        return [name for name in names if name == "kinematics" or asked.get(QUESTIONS[name].key) is not None]
 
     def _quickest(self) -> list[str]:
         """The questions by the time that each took last; then those that were not asked yet."""

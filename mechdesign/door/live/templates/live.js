@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const REST = 150; // milliseconds after which a hand rests
+  const LONG = 1000; // until questions are asked that make designs of their own
   const RING = 13; // radius of a handle in the drawing
   const NEAR = 6; // units of the drawing beside a crank's circle within which a hand turns the crank alone
 
@@ -74,43 +75,47 @@
       timer = setTimeout(() => ask(!gesture && outside()), REST);
     }
 
-    // All questions, one after the other, as long as no newer change comes.
+    // All questions, one after the other, and their pictures, as long as no newer change comes; those that make designs
+    // of their own when the hand rests longer.
     async function ask(fit) {
       if (asking) asking.abort();
-      const mine = asking = new AbortController(), number = ++turn;
+      const mine = asking = new AbortController(), number = ++turn, goes = () => !mine.signal.aborted;
       for (const room of document.querySelectorAll(".live-answer, .live-pictures")) room.setAttribute("aria-busy", "true");
-      for (const question of about.questions) {
-        const part = sections.get(question), state = part.querySelector(".live-state"), room = part.querySelector(".live-answer");
-        const stop = own.clock(state);
-        try {
-          const answer = await own.post("answer", {question, turn: number, sheet: fit === true && question === "kinematics" ? null : sheet()}, mine.signal);
-          if (mine.signal.aborted || answer.overtaken) return;
-          about.questions = answer.order || about.questions;
-          own.warn(about.mistake);
-          if (answer.wrong) room.replaceChildren(Object.assign(document.createElement("p"), {className: "failed", textContent: answer.wrong}));
-          else show(question, answer, room, fit === true);
-          room.removeAttribute("aria-busy");
-        } catch (error) {
-          if (error.name !== "AbortError") own.lost(error);
-          return;
-        } finally {
-          stop();
-        }
+      const long = about.questions.filter(question => about.long.includes(question)), quick = about.questions.filter(question => !long.includes(question));
+      try {
+        for (const question of quick) if (!goes() || !await answered(question, number, mine.signal, fit === true)) return;
+        for (const question of quick) if (!goes() || !await pictured(question, number, mine.signal)) return;
+        if (long.length) await new Promise(resolve => setTimeout(resolve, LONG));
+        for (const question of long)
+          if (!goes() || !await answered(question, number, mine.signal) || !await pictured(question, number, mine.signal)) return;
+      } catch (error) {
+        if (error.name !== "AbortError") own.lost(error);
       }
-      // Pictures last: they take longer than numbers.
-      for (const question of about.questions) {
-        const room = sections.get(question).querySelector(".live-pictures");
-        try {
-          const answer = await own.post("pictures", {question, turn: number}, mine.signal);
-          if (answer.overtaken && mine.signal.aborted) return;
-          room.innerHTML = answer.html || "";
-          if (answer.dark) own.colour(`${question} pictures`, answer.dark);
-          room.removeAttribute("aria-busy");
-        } catch (error) {
-          if (error.name !== "AbortError") own.lost(error);
-          return;
-        }
+    }
+
+    async function answered(question, number, signal, fit) {
+      const part = sections.get(question), room = part.querySelector(".live-answer"), stop = own.clock(part.querySelector(".live-state"));
+      try {
+        const answer = await own.post("answer", {question, turn: number, sheet: fit && question === "kinematics" ? null : sheet()}, signal);
+        if (signal.aborted || answer.overtaken) return false;
+        about.questions = answer.order || about.questions;
+        own.warn(about.mistake);
+        if (answer.wrong) room.replaceChildren(Object.assign(document.createElement("p"), {className: "failed", textContent: answer.wrong}));
+        else show(question, answer, room, fit);
+        room.removeAttribute("aria-busy");
+        return true;
+      } finally {
+        stop();
       }
+    }
+
+    async function pictured(question, number, signal) {
+      const room = sections.get(question).querySelector(".live-pictures"), answer = await own.post("pictures", {question, turn: number}, signal);
+      if (signal.aborted) return false;
+      room.innerHTML = answer.html || "";
+      if (answer.dark) own.colour(`${question} pictures`, answer.dark);
+      room.removeAttribute("aria-busy");
+      return true;
     }
 
     function show(question, answer, room, fit) {
