@@ -136,15 +136,14 @@
 
     // Whether a hand has brought a point out of the drawing.
     function outside() {
-      const {x, y} = moving.points(), k = moving.row(), {width, height} = drawing.viewBox.baseVal;
-      return about.points.some(point => x[point][k] < 0 || y[point][k] < 0 || x[point][k] > width || y[point][k] > height);
+      const {width, height} = drawing.viewBox.baseVal;
+      return about.points.map(moving.point).some(([x, y]) => x < 0 || y < 0 || x > width || y > height);
     }
 
     const here = point => {
-      const {x, y} = moving.points(), k = moving.row(), {corner, scale} = moving.data();
-      return [corner[0] + x[point][k] / scale, corner[1] - y[point][k] / scale];
+      const [x, y] = moving.point(point), {corner, scale} = moving.data();
+      return [corner[0] + x / scale, corner[1] - y / scale];
     };
-    const row = () => moving.rows()[moving.row()];
     const locked = () => [...own.rows].filter(([, part]) => part.querySelector("[type=checkbox]").checked).map(([name]) => name);
 
     function drag(point, to, near) {
@@ -153,15 +152,16 @@
 
     // Until the last place of the hand is answered.
     async function settled() {
+      const mine = gesture;
       while (running) await new Promise(resolve => setTimeout(resolve, 5));
-      gesture = null;
+      if (gesture === mine) gesture = null;
     }
 
     function grasp(event, point, ring) {
       if (event.button) return;
       moving.stop();
       const at = here(point);
-      gesture = {row: row(), held: []};
+      gesture = {row: moving.row(), held: []};
       own.grasp(event, ring, (across, down) => {
         const scale = moving.data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width;
         drag(point, [at[0] + across / scale, at[1] - down / scale], NEAR);
@@ -177,7 +177,7 @@
       if (running) return;
       moving.stop();
       const step = own.step(event), before = {...own.changes}, [x, y] = here(point);
-      gesture = {row: row(), held: []};
+      gesture = {row: moving.row(), held: []};
       drag(point, [x + way[0] * step, y + way[1] * step], 0);
       await settled();
       own.remember(before);
@@ -209,11 +209,8 @@
       } catch (error) { own.lost(error); }
     });
 
-    if (own.kept.pose !== undefined) {
-      moving.slider.value = own.kept.pose;
-      moving.slider.dispatchEvent(new Event("input"));
-    }
-    own.keeping = () => ({pose: moving.row()});
+    if (own.kept.row !== undefined) moving.seek(own.kept.row);
+    own.keeping = () => ({row: moving.row()});
     own.begin();
     if (Object.keys(own.changes).length) move({}); else ask();
   }
