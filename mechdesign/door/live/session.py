@@ -221,7 +221,8 @@ class Session:
                 texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
                 number_of(drag.get("near", 0)) / sheet.scale,
             )  # fmt: skip
-            if hand.point not in study.mechanism.points or not {*hand.held} <= {*study.parameters.names()}:
+            numbers = {TURNED, *study.parameters.names(), *self._entries()}
+            if hand.point not in study.mechanism.points or not numbers.issuperset(hand.held):
                 raise AskedError
             done = dragged(study, changes, hand)
             changes, names, why, row = dict(done.changes), done.names, done.why, done.row
