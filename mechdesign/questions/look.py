@@ -6,7 +6,7 @@ from collections.abc import Collection
 from importlib import import_module
 from typing import Any
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.ground.results import Result
 from mechdesign.ground.work.chunks import here
 from mechdesign.study import Study
@@ -20,7 +20,7 @@ INSTANT = 1e-6
 
 def ask(study: Study, command: str, **options: Any) -> Result:
     """A command's answer, with options of its function."""
-    result: Result = getattr(import_module(COMMANDS[command].module), command)(study, **options)
+    result: Result = getattr(import_module(QUESTIONS[command].module), command)(study, **options)
     return result
 
 

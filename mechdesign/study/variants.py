@@ -52,8 +52,14 @@ def overrides(changes: Changes) -> tuple[str, ...]:
     return tuple(f"{name}={in_yaml(value)}" for name, value in changes)
 
 
-def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] | None = None) -> Study:
-    """The study with changed entries, and perhaps more parameters, without sections that make other studies of it.
+def with_entries(
+    study: Study,
+    changes: Changes,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    without: Collection[str] = _OF_OTHERS,
+) -> Study:
+    """The study with changed entries, and perhaps more parameters, `without` sections that make other studies of it.
 
     Where only numbers of the mechanism are otherwise its assembly is that of the study's sketch, unless the sketch is
     changed itself.
@@ -63,7 +69,7 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
     StudyError
         If the entries make no study; every mistake in one go.
     """
-    data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
+    data = plain({key: value for key, value in study.resolved.items() if key not in without})
     texts = overrides(changes)
     document = Document.of(data)
     override(document, texts)

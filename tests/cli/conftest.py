@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from helpers.live_page import FOUR_BAR, Live
 from typer.testing import CliRunner
 
 from mechdesign.door.cli.app import app
@@ -76,3 +77,20 @@ def analysis(monkeypatch):
 def invoke():
     """Run the command line in this process."""
     return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def live(browser, tmp_path):
+    """A function that opens the live page of a study; at the end nothing complained."""
+    opened = []
+
+    def start(text=FOUR_BAR, *, name="bar.yaml", **looks):
+        path = tmp_path / name
+        path.write_text(text)
+        opened.append(Live(browser, path, **looks))
+        return opened[-1]
+
+    yield start
+    for one in opened:
+        one.close()
+        assert one.complaints == []

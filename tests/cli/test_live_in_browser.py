@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
-import sys
 import urllib.request
 
 import pytest
 from helpers.axe import violations
-from helpers.studies import COMMENTED_FOUR_BAR
+from helpers.live_page import FOUR_BAR
 
 from mechdesign import kinematics, load
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
-from mechdesign.door.live.task import session_of
 
 try:
     from playwright.sync_api import expect
@@ -23,83 +19,6 @@ except ImportError:
     expect = None
 
 pytestmark = pytest.mark.browser
-
-FOUR_BAR = f"""\
-{COMMENTED_FOUR_BAR}kinematics: {{outputs: [P, rocker.angle], rates: {{theta: 60 rpm}}}}
-requirements: [{{result: kinematics.rocker.angle, at_most: 160}}]
-"""
-
-
-class Live:
-    """A page of a study's server."""
-
-    def __init__(self, browser, path, **looks):
-        self.path, self.session = path, session_of(load(path), lambda: load(path))
-        self.server = LiveServer(self.session)
-        self.server.start()
-        self.complaints = []
-        self.page = self.open(browser, **looks)
-
-    def open(self, browser, **looks):
-        page = browser.new_page(**{"viewport": {"width": 1300, "height": 900}, "reduced_motion": "reduce", **looks})
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(self.server.url)
-        self.answered(page)
-        return page
-
-    @staticmethod
-    def answered(page):
-        """Wait until every question is answered by the numbers as they are."""
-        page.wait_for_selector(".live-answer:not([aria-busy])", timeout=30_000)
-        page.wait_for_selector(".live-answer[aria-busy=true]", state="detached", timeout=30_000)
-
-    def middle(self, point):
-        box = self.page.locator(f".live-handle[data-at={point}]").bounding_box()
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-    def drag(self, point, across, down):
-        """Take a point by the mouse, move it by pixels and let it go."""
-        x, y = self.middle(point)
-        self.page.mouse.move(x, y)
-        self.page.mouse.down()
-        self.page.mouse.move(x + across / 2, y + down / 2, steps=4)
-        self.page.mouse.move(x + across, y + down, steps=4)
-        self.page.mouse.up()
-        self.page.wait_for_selector(".live-handle.held", state="detached")
-        self.answered(self.page)
-
-    def value(self, name):
-        return float(self.page.locator(f"[data-name='{name}'] input[type=number]").input_value())
-
-    @property
-    def scale(self):
-        """Pixels of the screen per length of the study."""
-        return self.page.evaluate("""() => {
-            const {drawing, data} = document.getElementById("kinematics-moving").moving;
-            return data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width; }""")
-
-    def close(self):
-        for page in self.page.context.pages:
-            page.close()
-        self.server.close()
-
-
-@pytest.fixture
-def live(browser, tmp_path):
-    """A function that opens the page of a study; at the end nothing complained."""
-    opened = []
-
-    def start(text=FOUR_BAR, **looks):
-        path = tmp_path / "bar.yaml"
-        path.write_text(text)
-        opened.append(Live(browser, path, **looks))
-        return opened[-1]
-
-    yield start
-    for one in opened:
-        one.close()
-        assert one.complaints == []
 
 
 def test_a_dragged_pivot_changes_the_study_that_is_saved_and_the_command_line_gives_the_same(live):
@@ -367,29 +286,6 @@ def test_dead_centres_are_marked_along_the_motion_and_lead_there(live):
     drive.fill("120")
     drive.blur()
     assert "theta = 120.0" in bar.page.locator(".moving-words").inner_text().replace("\xa0", " ")
-
-
-@pytest.mark.nightly
-def test_the_command_serves_until_ctrl_c_and_says_how_many_pages_were_open(browser, tmp_path):
-    path = tmp_path / "bar.yaml"
-    path.write_text(FOUR_BAR)
-    command = [sys.executable, "-m", "mechdesign", "live", str(path), "--no-browser"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    try:
-        address = process.stderr.readline().partition("live at ")[2].split()[0]
-        page = browser.new_page()
-        page.goto(address)
-        page.wait_for_selector("#kinematics .numbers")
-        path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
-        expect(page.locator("[data-name='rocker.length'] input[type=number]")).to_have_value("64")
-        page.wait_for_selector("#kinematics .numbers")
-        process.send_signal(signal.SIGINT)
-        assert "ended; 1 page open" in process.communicate(timeout=20)[1]
-        assert process.returncode == 0
-        page.close()
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def test_what_cannot_be_live(tmp_path, monkeypatch):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
@@ -33,4 +33,4 @@ def altered(study: Study, changes: Mapping[str, float]) -> Study:
     return variant(base, {name: value for name, value in changes.items() if not is_entry(name)})
 
 
-_with_entries = lru_cache(_KEPT)(with_entries)
+_with_entries = lru_cache(_KEPT)(partial(with_entries, without=()))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.door.live.turned import dead_centres
 from mechdesign.door.report.page.headlines import Headline, headlines
 from mechdesign.door.report.page.linkage import Canvas
@@ -66,7 +66,7 @@ class ChangedAnswer:
         result, moves = self.result, {} if stage is None else {"kinematics": stage}
         section = AnsweredQuestion(self.question, "", 0, verdicts=requirements(self.study, result) if result else ())
         return fragment(
-            "answer.html.j2", PACKAGE, command=self.question, question=COMMANDS[self.question].question,
+            "answer.html.j2", PACKAGE, command=self.question, question=QUESTIONS[self.question].question,
             numbers=self.numbers, mover=partial(mover, moves), pose_of=pose_of, dead=dead_centres(self.motion),
             required=[entry for entry in required_of(self.study, [section]) if entry["verdict"] is not None],
             failed=result.failed if result else "", warnings=[*map(str, result.warnings if result else ())],

@@ -18,7 +18,8 @@ class AskedError(Exception):
 def changes_of(asked: Mapping[str, Any]) -> dict[str, float]:
     """Changes of a study, by the names of parameters and dimensions."""
     changes = asked.get("changes")
-    if not isinstance(changes, Mapping):
+    # They become entries as `--set` takes them: a name ends before the sign.
+    if not isinstance(changes, Mapping) or any("=" in str(name) for name in changes):
         raise AskedError
     return {str(name): number_of(value) for name, value in changes.items()}
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.door.live import saving
 from mechdesign.door.live.altered import SKETCH, altered, is_entry
 from mechdesign.door.live.answers import AS_IT_WAS, PACKAGE, ChangedAnswer, staged, titled
@@ -33,8 +33,11 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.look import ask
 from mechdesign.study import Study
 
-# Questions about one design, in the order in which they are asked first; the others make designs of their own.
-QUESTIONS = ("kinematics", "stiffness", "dynamics", "workspace", "reliability")
+# In the order in which they are asked first, and those that make designs of their own, which are asked last.
+_ORDER, _LONG = (
+    ("kinematics", "stiffness", "dynamics", "workspace", "reliability"),
+    ("sensitivities", "sweep", "optimize"),
+)
 _MOST_ROWS = 20_000  # poses that a page draws
 _MOST_PAGES = 16  # whose answers are kept: those that asked last
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
@@ -154,14 +157,14 @@ class Session:
         assert part is not None
         questions = self._questions()
         about = {
-            "version": self.version, "questions": self._quickest(), "length": study.units.label("length"),
-            **saving.file_names(study), "points": self._handles(),
+            "version": self.version, "questions": self._quickest(), "long": _LONG,
+            "length": study.units.label("length"), **saving.file_names(study), "points": self._handles(),
             "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake, "entries": self._entries(),
         }  # fmt: skip
         return rendered(
             "live.html.j2", package=PACKAGE, parts=("moving", "hand", "live"), connect="'self'",
             drawings=[part.drawing], study=study, part=part, about=about, groups=self._groups(), taken=self.taken,
-            questions={name: COMMANDS[name].question for name in questions}, mistake=self.mistake,
+            questions={name: QUESTIONS[name].question for name in questions}, mistake=self.mistake,
         )  # fmt: skip
 
     def _entries(self) -> dict[str, float]:
@@ -171,7 +174,8 @@ class Session:
         return {name: value_of(self.study, name) for name in names}
 
     def _questions(self) -> list[str]:
-        return [name for name in QUESTIONS if name == "kinematics" or name in self.study.questions]
+        asked, names = self.study.sections, (*_ORDER, *_LONG)
+        return [name for name in names if name == "kinematics" or asked.get(QUESTIONS[name].key) is not None]
 
     def _quickest(self) -> list[str]:
         """The questions by the time that each took last; then those that were not asked yet."""
@@ -217,7 +221,8 @@ class Session:
                 texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
                 number_of(drag.get("near", 0)) / sheet.scale,
             )  # fmt: skip
-            if hand.point not in study.mechanism.points or not {*hand.held} <= {*study.parameters.names()}:
+            numbers = {TURNED, *study.parameters.names(), *self._entries()}
+            if hand.point not in study.mechanism.points or not numbers.issuperset(hand.held):
                 raise AskedError
             done = dragged(study, changes, hand)
             changes, names, why, row = dict(done.changes), done.names, done.why, done.row
@@ -282,7 +287,7 @@ class Session:
         """What the study with changed numbers answers, and how the study that is shown moves with them."""
         study = moves = altered(self.study, self._own(changes))
         result = motion = None
-        if question in study.questions or self.shown is self.study:
+        if question != "kinematics" or study.kinematics is not None or self.shown is self.study:
             result = motion = ask(study, question, progress=progress)
         if question == "kinematics" and self.shown is not self.study:
             moves = altered(self.shown, changes)

@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const REST = 150; // milliseconds after which a hand rests
+  const LONG = 1000; // until questions are asked that make designs of their own
   const RING = 13; // radius of a handle in the drawing
   const NEAR = 6; // units of the drawing beside a crank's circle within which a hand turns the crank alone
 
@@ -56,14 +57,14 @@
           }
           own.set = answer.set;
           moving.take(answer.data, answer.drawing);
-          if (job.drag && answer.row !== gesture.row) {
+          if (job.drag && answer.names.includes("")) {
             gesture.row = answer.row;
             moving.seek(answer.row);
             answer.words.push(moving.words());
           }
           own.fill();
           const lost = answer.data.gaps.reduce((sum, [first, end]) => sum + end - first + 1, 0);
-          const gaps = lost ? `${answer.data.gaps[0][2]} at ${lost} of ${poses} poses` : "";
+          const gaps = lost ? `${lost} of ${poses} poses: ${answer.data.gaps[0][2].replace(" here", "")}` : "";
           own.beside([...answer.words, answer.why, gaps].filter(Boolean).join("\n"), Boolean(answer.why));
         } catch (error) {
           own.lost(error);
@@ -71,46 +72,50 @@
         }
       }
       running = false;
-      timer = setTimeout(ask, REST);
+      timer = setTimeout(() => ask(!gesture && outside()), REST);
     }
 
-    // All questions, one after the other, as long as no newer change comes.
+    // All questions, one after the other, and their pictures, as long as no newer change comes; those that make designs
+    // of their own when the hand rests longer.
     async function ask(fit) {
       if (asking) asking.abort();
-      const mine = asking = new AbortController(), number = ++turn;
+      const mine = asking = new AbortController(), number = ++turn, goes = () => !mine.signal.aborted;
       for (const room of document.querySelectorAll(".live-answer, .live-pictures")) room.setAttribute("aria-busy", "true");
-      for (const question of about.questions) {
-        const part = sections.get(question), state = part.querySelector(".live-state"), room = part.querySelector(".live-answer");
-        const stop = own.clock(state);
-        try {
-          const answer = await own.post("answer", {question, turn: number, sheet: fit === true && question === "kinematics" ? null : sheet()}, mine.signal);
-          if (mine.signal.aborted || answer.overtaken) return;
-          about.questions = answer.order || about.questions;
-          own.warn(about.mistake);
-          if (answer.wrong) room.replaceChildren(Object.assign(document.createElement("p"), {className: "failed", textContent: answer.wrong}));
-          else show(question, answer, room, fit === true);
-          room.removeAttribute("aria-busy");
-        } catch (error) {
-          if (error.name !== "AbortError") own.lost(error);
-          return;
-        } finally {
-          stop();
-        }
+      const long = about.questions.filter(question => about.long.includes(question)), quick = about.questions.filter(question => !long.includes(question));
+      try {
+        for (const question of quick) if (!goes() || !await answered(question, number, mine.signal, fit === true)) return;
+        for (const question of quick) if (!goes() || !await pictured(question, number, mine.signal)) return;
+        if (long.length) await new Promise(resolve => setTimeout(resolve, LONG));
+        for (const question of long)
+          if (!goes() || !await answered(question, number, mine.signal) || !await pictured(question, number, mine.signal)) return;
+      } catch (error) {
+        if (error.name !== "AbortError") own.lost(error);
       }
-      // Pictures last: they take longer than numbers.
-      for (const question of about.questions) {
-        const room = sections.get(question).querySelector(".live-pictures");
-        try {
-          const answer = await own.post("pictures", {question, turn: number}, mine.signal);
-          if (answer.overtaken && mine.signal.aborted) return;
-          room.innerHTML = answer.html || "";
-          if (answer.dark) own.colour(`${question} pictures`, answer.dark);
-          room.removeAttribute("aria-busy");
-        } catch (error) {
-          if (error.name !== "AbortError") own.lost(error);
-          return;
-        }
+    }
+
+    async function answered(question, number, signal, fit) {
+      const part = sections.get(question), room = part.querySelector(".live-answer"), stop = own.clock(part.querySelector(".live-state"));
+      try {
+        const answer = await own.post("answer", {question, turn: number, sheet: fit && question === "kinematics" ? null : sheet()}, signal);
+        if (signal.aborted || answer.overtaken) return false;
+        about.questions = answer.order || about.questions;
+        own.warn(about.mistake);
+        if (answer.wrong) room.replaceChildren(Object.assign(document.createElement("p"), {className: "failed", textContent: answer.wrong}));
+        else show(question, answer, room, fit);
+        room.removeAttribute("aria-busy");
+        return true;
+      } finally {
+        stop();
       }
+    }
+
+    async function pictured(question, number, signal) {
+      const room = sections.get(question).querySelector(".live-pictures"), answer = await own.post("pictures", {question, turn: number}, signal);
+      if (signal.aborted) return false;
+      room.innerHTML = answer.html || "";
+      if (answer.dark) own.colour(`${question} pictures`, answer.dark);
+      room.removeAttribute("aria-busy");
+      return true;
     }
 
     function show(question, answer, room, fit) {
@@ -129,11 +134,16 @@
       if (question === "kinematics") marks.replaceChildren(...places.map(place => Object.assign(document.createElement("option"), {value: Math.round(place)})));
     }
 
+    // Whether a hand has brought a point out of the drawing.
+    function outside() {
+      const {width, height} = drawing.viewBox.baseVal;
+      return about.points.map(moving.point).some(([x, y]) => x < 0 || y < 0 || x > width || y > height);
+    }
+
     const here = point => {
-      const {x, y} = moving.points(), k = moving.row(), {corner, scale} = moving.data();
-      return [corner[0] + x[point][k] / scale, corner[1] - y[point][k] / scale];
+      const [x, y] = moving.point(point), {corner, scale} = moving.data();
+      return [corner[0] + x / scale, corner[1] - y / scale];
     };
-    const row = () => moving.rows()[moving.row()];
     const locked = () => [...own.rows].filter(([, part]) => part.querySelector("[type=checkbox]").checked).map(([name]) => name);
 
     function drag(point, to, near) {
@@ -142,15 +152,16 @@
 
     // Until the last place of the hand is answered.
     async function settled() {
+      const mine = gesture;
       while (running) await new Promise(resolve => setTimeout(resolve, 5));
-      gesture = null;
+      if (gesture === mine) gesture = null;
     }
 
     function grasp(event, point, ring) {
       if (event.button) return;
       moving.stop();
       const at = here(point);
-      gesture = {row: row(), held: []};
+      gesture = {row: moving.row(), held: []};
       own.grasp(event, ring, (across, down) => {
         const scale = moving.data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width;
         drag(point, [at[0] + across / scale, at[1] - down / scale], NEAR);
@@ -166,7 +177,7 @@
       if (running) return;
       moving.stop();
       const step = own.step(event), before = {...own.changes}, [x, y] = here(point);
-      gesture = {row: row(), held: []};
+      gesture = {row: moving.row(), held: []};
       drag(point, [x + way[0] * step, y + way[1] * step], 0);
       await settled();
       own.remember(before);
@@ -198,11 +209,8 @@
       } catch (error) { own.lost(error); }
     });
 
-    if (own.kept.pose !== undefined) {
-      moving.slider.value = own.kept.pose;
-      moving.slider.dispatchEvent(new Event("input"));
-    }
-    own.keeping = () => ({pose: moving.row()});
+    if (own.kept.row !== undefined) moving.seek(own.kept.row);
+    own.keeping = () => ({row: moving.row()});
     own.begin();
     if (Object.keys(own.changes).length) move({}); else ask();
   }

@@ -87,6 +87,7 @@
       playing = requestAnimationFrame(frame);
     }
     function stop() {
+      if (!playing) return;
       cancelAnimationFrame(playing);
       playing = 0;
       button.textContent = "Play";
@@ -175,6 +176,8 @@
     const size = drawing.viewBox.baseVal, paths = [], boxes = [];
     (data.arrows || []).forEach(({key: [length, words], layers}, row) => {
       const y = size.height - 10 - 24 * row, group = make("g", {"stroke-width": 2}, drawing);
+      // Below the handles of a hand.
+      drawing.querySelector(".moving-stays")?.before(group);
       const key = make("g", {stroke: "#222222"}, group);
       make("path", {d: `M${size.width - 14 - length} ${y}h${length}m-8 -4l8 4l-8 4`}, key);
       make("text", {x: size.width - 14, y: y - 8, "text-anchor": "end", "font-size": 10, fill: "#222222", stroke: "white",
@@ -516,28 +519,35 @@
       return passed;
     }
 
+    // The row of the motion that is shown.
+    const here = () => between(decode(data.rows, data.poses, ROWS), Math.min(at, last));
+
+    // The place of a row of the motion, between two poses where it is between two.
+    function placed(row) {
+      const rows = decode(data.rows, data.poses, ROWS), next = rows.findIndex(own => own > row), k = (next < 0 ? rows.length : next) - 1;
+      const step = next < 0 ? rows[last] - rows[last - 1] : rows[next] - rows[k];
+      return k < 0 ? 0 : Math.min(k + (row - rows[k]) / step, data.returns ? data.poses - 0.01 : last);
+    }
+
     // Shows the motion anew by other data, of places alone or with all numbers, at the pose where it is. Of the drawing
     // stays what is marked to stay, unless `whole` is asked.
     figure.moving = {
       drawing, slider, leading, stop: player.stop,
       go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; },
-      // The pose at a row of the motion, between two where it is between two.
-      seek(row) {
-        const rows = decode(data.rows, data.poses, ROWS), next = rows.findIndex(own => own > row), k = (next < 0 ? rows.length : next) - 1;
-        const step = next < 0 ? rows[last] - rows[last - 1] : rows[next] - rows[k];
-        choose(k < 0 ? 0 : Math.min(k + (row - rows[k]) / step, data.returns ? data.poses - 0.01 : last));
-      },
-      words: () => words.textContent, at: () => at, row: () => Math.round(at) % data.poses, data: () => data, points: () => moved,
-      rows: () => decode(data.rows, data.poses, ROWS), again() { begin(true); show(at); },
+      seek(row) { choose(placed(row)); },
+      words: () => words.textContent, at: () => at, row: here, data: () => data,
+      point: name => [between(moved.x[name], Math.min(at, last)), between(moved.y[name], Math.min(at, last))],
+      again() { begin(true); show(at); },
       take(next, markup, entire) {
-        const share = at / data.poses, room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
+        const row = here(), room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;
         const stays = part => part.classList.contains("moving-stays") || (!entire && part.classList.contains("moving-kept"));
         [...drawing.children].filter(part => !stays(part)).forEach(part => part.remove());
         drawing.prepend(...fresh.children);
         if (entire) drawing.setAttribute("viewBox", fresh.getAttribute("viewBox"));
-        if (next.poses && next.poses !== data.poses) at = Math.min(Math.round(share * next.poses), next.poses - 1);
         data = {...data, before: undefined, ...next};
         begin("numbers" in next);
+        // Poses lie closer where more happens: at the same place of the motion is another one.
+        if (next.rows) at = placed(row);
         if ("numbers" in next) curve.take(data, readout);
         show(at);
       },

@@ -1,0 +1,91 @@
+"""The live page of a study, as hands use it in a browser."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+from helpers.studies import COMMENTED_FOUR_BAR
+from mechdesign import load
+from mechdesign.door.live.server import LiveServer
+from mechdesign.door.live.task import session_of
+
+FOUR_BAR = f"""\
+{COMMENTED_FOUR_BAR}kinematics: {{outputs: [P, rocker.angle], rates: {{theta: 60 rpm}}}}
+requirements: [{{result: kinematics.rocker.angle, at_most: 160}}]
+"""
+
+
+class Live:
+    """A page of a study's server."""
+
+    def __init__(self, browser, path, **looks):
+        self.path, self.session = path, session_of(load(path), lambda: load(path))
+        self.server = LiveServer(self.session)
+        self.server.start()
+        self.complaints = []
+        self.page = self.open(browser, **looks)
+
+    def open(self, browser, **looks):
+        page = browser.new_page(**{"viewport": {"width": 1300, "height": 900}, "reduced_motion": "reduce", **looks})
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.goto(self.server.url)
+        self.answered(page)
+        return page
+
+    @staticmethod
+    def answered(page):
+        """Wait until every question is answered by the numbers as they are."""
+        page.wait_for_selector(".live-answer:not([aria-busy])", timeout=30_000)
+        page.wait_for_selector(".live-answer[aria-busy=true]", state="detached", timeout=30_000)
+
+    def middle(self, point):
+        box = self.page.locator(f".live-handle[data-at={point}]").bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag(self, point, across, down):
+        """Take a point by the mouse, move it by pixels and let it go."""
+        x, y = self.middle(point)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + across / 2, y + down / 2, steps=4)
+        self.page.mouse.move(x + across, y + down, steps=4)
+        self.page.mouse.up()
+        self.page.wait_for_selector(".live-handle.held", state="detached")
+        self.answered(self.page)
+
+    def value(self, name):
+        return float(self.page.locator(f"[data-name='{name}'] input[type=number]").input_value())
+
+    @property
+    def scale(self):
+        """Pixels of the screen per length of the study."""
+        return self.page.evaluate("""() => {
+            const {drawing, data} = document.getElementById("kinematics-moving").moving;
+            return data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width; }""")
+
+    def close(self):
+        for page in self.page.context.pages:
+            page.close()
+        self.server.close()
+
+
+@contextmanager
+def commanded(path, *options):
+    """`mechdesign live` in a process of its own, and the address of its page."""
+    command = [sys.executable, "-m", "mechdesign", "live", str(path), "--no-browser", *options]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process, process.stderr.readline().partition("live at ")[2].split()[0]
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def interrupted(process):
+    """What a command says when Ctrl-C ends it."""
+    process.send_signal(signal.SIGINT)
+    return process.communicate(timeout=20)[1]
