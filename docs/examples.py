@@ -5,7 +5,8 @@ In a page
 - a block of YAML without one is a part of a study: laid over the page's last file, it must pass `check`;
 - a `console` block holds commands after `$ `, each with what a terminal shows but how far it is; a line `...` stands
   for any lines, and numbers agree to six digits;
-- a `python` block runs with those before it; what it prints stands in the `text` block that follows, if there is one.
+- a `python` block runs with those before it; what it prints, and in a notebook the value of its last line if
+  that is text, stands in the `text` block that follows, if there is one.
 
     python docs/examples.py [PAGE...]     writes what the commands print now into the pages
 """
@@ -30,6 +31,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from cells import FENCE, is_notebook, jupyter, shown
+from cells import run as run_cell
 from forking import PICTURES, forked
 from steps import step
 
@@ -37,7 +40,7 @@ import mechdesign
 from mechdesign.ground.errors import MechdesignError
 
 ROOT = Path(__file__).parent
-FOLDERS = ("tutorials", "howto", "theory", "reference", "contributing")
+FOLDERS = ("tutorials", "notebooks", "howto", "theory", "reference", "contributing")
 # Made pages, whose examples are parts of a study; tests/unit/test_reference.py reads them.
 PARTS = ROOT / "reference" / "study"
 # Where the examples of a page were run: its pictures come from there.
@@ -46,7 +49,6 @@ ANY = "..."
 # Two numbers are the same to six digits.
 DIGITS = 1e-6
 ROUNDING = 1e-10
-_FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ ]*$")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
 # Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
 _PYTHON = threading.Lock()
@@ -67,6 +69,7 @@ class Page:
     study: str = ""
     names: dict[str, Any] = field(default_factory=dict)
     printed: str = ""
+    cells: int = 0
     wrong: list[str] = field(default_factory=list)
 
     def fail(self, where: int, words: str) -> None:
@@ -200,18 +203,31 @@ def _yaml(page: Page, body: str, where: int) -> None:
 
 
 def _python(page: Page, body: str, where: int) -> None:
+    if is_notebook(page.path) and page.printed:
+        page.fail(where, f"the cell before prints what the page does not show:\n{page.printed}")
     stream = io.StringIO()
     with _PYTHON:
         before = Path.cwd()
         try:
             os.chdir(page.folder)
             with contextlib.redirect_stdout(stream):
-                exec(compile(body, str(page.path), "exec"), page.names)
+                value = run_cell(body, str(page.path), page.names)
+                if is_notebook(page.path):
+                    _show(page, value)
         except Exception as error:
             page.fail(where, f"{type(error).__name__}: {error}")
         finally:
             os.chdir(before)
     page.printed = stream.getvalue()
+
+
+def _show(page: Page, value: Any) -> None:
+    """Keep what a cell of a notebook shows for the site; of what is text alone the page has it."""
+    if html := shown(value):
+        (page.folder / f"{page.cells}.html").write_text(html, encoding="utf-8")
+    elif value is not None:
+        print(repr(value))
+    page.cells += 1
 
 
 def run(tools: Path, path: Path, base: Path = RUN) -> tuple[str, list[str]]:
@@ -238,8 +254,10 @@ def run(tools: Path, path: Path, base: Path = RUN) -> tuple[str, list[str]]:
             page.printed = ""
         return f"{found['fence']}{found['kind']}\n{body}{found['fence']}"
 
+    if is_notebook(path):
+        (folder / f"{path.stem}.ipynb").write_text(jupyter(text), encoding="utf-8")
     with step(f"examples of {path.relative_to(ROOT)}"):
-        return _FENCE.sub(block, text), page.wrong
+        return FENCE.sub(block, text), page.wrong
 
 
 def pages(names: Iterable[str] = ()) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import cells
 import examples
 import gallery
 import lists
@@ -45,7 +46,18 @@ def write(app: Sphinx) -> None:
         shutil.copyfile(examples.RUN / report, ROOT / "_static" / name)
 
 
+def show_cells(app: Sphinx, name: str, source: list[str]) -> None:
+    """Put what the cells of a notebook have shown below them, and the notebook for Jupyter below its heading."""
+    page = ROOT / f"{name}.md"
+    if cells.is_notebook(page):
+        heading, text = source[0].split("\n", 1)
+        run = examples.RUN / name
+        file = f"../_run/{name}/{page.stem}.ipynb"
+        source[0] = f"{heading}\n\n{{download}}`As a notebook for Jupyter <{file}>`\n{cells.with_outputs(text, run)}"
+
+
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Sphinx's entry."""
     app.connect("builder-inited", write)
+    app.connect("source-read", show_cells)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

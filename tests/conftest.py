@@ -39,7 +39,8 @@ settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if hasattr(signal, "SIGHUP"):  # Windows has none
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
 # Of each generation of the garbage collector, in place of 700, 10, 10.

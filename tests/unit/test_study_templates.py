@@ -52,6 +52,8 @@ def test_shipped_studies_and_pages_are_printed_where_there_is_no_checkout():
     for command, place in (("new", "configs/gallery/cam_dwell.yaml"), ("docs", "docs/howto/gears_and_cams.md")):
         assert f"(mechdesign {command} {place} prints the " in told
         assert command_line.ask(command, place, study="").stdout == (root / place).read_text(encoding="utf-8")
+    workflow = command_line.ask("docs", "docs/ci/github.yml", study="").stdout
+    assert workflow == (root / "docs/ci/github.yml").read_text(encoding="utf-8")
     assert template("cam_dwell") == (root / "configs/gallery/cam_dwell.yaml").read_text(encoding="utf-8")
     assert template("four_bar") != template("configs/gallery/four_bar.yaml")
     assert template("four_bar").startswith("# The shortest study")

@@ -32,7 +32,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
     StudyError
         If a word is not known; the message names the nearest.
     """
-    if len(words) == 1 and words[0].endswith((".md", ".yaml")) and (text := text_of(words[0])) is not None:
+    if len(words) == 1 and "/" in words[0] and (text := text_of(words[0])) is not None:
         emit(text)
         return
     index = entries(commands(group))

@@ -14,7 +14,7 @@ PAGE, SHIPPED = "page", "shipped study"  # kinds of entries
 # Beside the package in a checkout, in it where it is installed.
 _PACKAGE = Path(__file__).parents[2]
 _ROOTS = (_PACKAGE / "pages", _PACKAGE.parent)
-_FOLDERS = ("docs/howto", "docs/tutorials", "docs/theory", "configs")
+_FOLDERS = ("docs/howto", "docs/tutorials", "docs/notebooks", "docs/theory", "docs/ci", "configs")
 _PAGE, _STUDY = ".md", ".yaml"
 _MOST = 4  # pages of a word
 _LONG = 220  # letters of the sentence that is shown
@@ -31,20 +31,22 @@ class _Page(NamedTuple):
 
 @cache
 def _files() -> dict[str, Path]:
-    """The files of pages and studies by their places; none where the package stands alone."""
+    """Pages, studies and files for CI by their places; none where the package stands alone."""
     root = next((root for root in _ROOTS if (root / _FOLDERS[0]).is_dir()), Path())
-    paths = (path for folder in _FOLDERS for path in sorted((root / folder).rglob("*")))
-    return {path.relative_to(root).as_posix(): path for path in paths if path.suffix in (_PAGE, _STUDY)}
+    paths = (path for folder in _FOLDERS for path in sorted((root / folder).rglob("*.*")))
+    return {path.relative_to(root).as_posix(): path for path in paths}
 
 
 @cache
 def _pages() -> tuple[_Page, ...]:
     kinds = {_PAGE: _of_page, _STUDY: _of_study}
-    return tuple(kinds[path.suffix](place, path.read_text("utf-8")) for place, path in _files().items())
+    return tuple(
+        kinds[path.suffix](place, path.read_text("utf-8")) for place, path in _files().items() if path.suffix in kinds
+    )
 
 
 def text_of(name: str) -> str | None:
-    """The text of a page or a shipped study by its place, or of a study by its name; None where there is none."""
+    """The text of a page, study or file for CI by its place, or of a study by its name; None where there is none."""
     studies = {path.stem: path for path in _files().values() if path.suffix == _STUDY}
     path = _files().get(name, studies.get(name))
     return None if path is None else path.read_text("utf-8")
