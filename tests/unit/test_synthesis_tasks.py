@@ -92,8 +92,24 @@ def test_of_many_points_it_is_told_how_many_count() -> None:
 @pytest.mark.parametrize("conditions", [{"lengths": {"crank": [1e6, 1e7]}}, {"pivots": [[0, 0], [0, 0]]}])
 def test_a_path_with_conditions_that_contradict_each_other_says_so(conditions: Any) -> None:
     task = {"path": {"points": SQUARE}, "evaluations": 100, **conditions}
-    with pytest.raises(mechdesign.AssemblyError, match="four-bar: no sample has a curve within all conditions"):
+    with pytest.raises(
+        mechdesign.AssemblyError, match="four-bar: no sample has a curve within all conditions"
+    ) as raised:
         solved(task)
+    # The nearest is a linkage without the conditions, and says which it misses.
+    assert f"({next(iter(conditions))})" in str(raised.value).partition("\n")[0]
+    assert mechdesign.load(text=raised.value.result.files["nearest.yaml"]).kinematics is not None
+
+
+def test_the_nearest_to_a_function_tells_at_which_pairs_it_cannot_be_assembled() -> None:
+    function = {"input": [10, 30, 55, 80, 110, 130, 160, 190], "output": [20, 60, 30, 90, 50, 120, 60, 10]}
+    with pytest.raises(mechdesign.AssemblyError) as raised:
+        solved({"function": function, "zeros": "free"})
+    study = mechdesign.load(text=raised.value.result.files["nearest.yaml"])
+    lost = np.flatnonzero(np.isnan(mechdesign.kinematics(study).tables["motion"]["rocker.angle"])) + 1
+    assert len(lost)
+    missed = f"it cannot be assembled at position {', '.join(map(str, lost))}"
+    assert str(raised.value).partition("nearest.yaml: ")[2].partition("\n")[0] == missed
 
 
 @pytest.mark.nightly

@@ -138,7 +138,7 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
         {**labels, "as the task": error},
         solution=np.arange(1, len(solutions) + 1), kind=np.array([one.kind.name for one in solutions]),
         error=np.array([one.error / unit for one in solutions]),
-        max_error=np.array([one.errors.max() / unit for one in solutions]),
+        max_error=np.array([one.max_error / unit for one in solutions]),
         defects=np.array([one.defects for one in solutions]),
         **{"class": np.array([one.grashof for one in solutions])},
         full_turn=np.array([one.full_turn for one in solutions]).astype(int),

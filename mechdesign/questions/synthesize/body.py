@@ -105,18 +105,25 @@ class Candidates:
     angles: Floats  # shape (count, positions)
 
 
-def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], list[int]]:
+def choices(
+    task: Positions, frame: Site, body: Site, random: np.random.Generator, *, refined: bool = True
+) -> tuple[list[Dyads], list[int]]:
     """Dyads through all positions of a body, those of each kind, and how many wishes these leave to links.
 
     What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is
-    met by least squares. A single given point is that of one dyad, so that there are two numbers of wishes.
+    met by least squares, or without `refined` by some of them. A single given point is that of one dyad, so that there
+    are two numbers of wishes.
     """
     centre, size = task.centre, task.size
     scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
     for one, other in product(frame.around, body.around):
         sites = one.scaled(centre, size), other.scaled(0j, size)
         spare.append(_known(LINK, scaled)[1] - sum(_needs(LINK, sites)))
-        parts += _least_squares(scaled, sites, random) if spare[-1] < 0 else _exact(scaled, sites, random, WISHES)
+        if spare[-1] < 0:
+            starts = _of_subsets(scaled, sites, random)
+            parts += [_refined(part, scaled, sites) for part in starts] if refined else starts
+        else:
+            parts += _exact(scaled, sites, random, WISHES)
     found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
     return [
         replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size)
@@ -189,8 +196,8 @@ def _joined(parts: Sequence[Dyads]) -> Dyads:
     return whole.take(sorted({key: row for row, key in reversed(rows)}.values()))
 
 
-def _least_squares(task: Positions, sites: tuple[Site, Site], random: np.random.Generator) -> list[Dyads]:
-    """Dyads with the least squares of their errors, from those of subsets of the positions."""
+def _of_subsets(task: Positions, sites: tuple[Site, Site], random: np.random.Generator) -> list[Dyads]:
+    """Dyads of each kind through subsets of the positions, from which those with the least squares are looked for."""
     count = len(task.places)
     size = min(count, 3 if task.shifts else dyads.EXACTLY - sum(_needs(LINK, sites)))
     every = list(combinations(range(count), size)) if count < 12 else [
@@ -208,7 +215,7 @@ def _least_squares(task: Positions, sites: tuple[Site, Site], random: np.random.
         line = (ways.mean(axis=1) * np.conj(normal)).real * normal
         sliding = Dyads(SLIDE, line, pin, normal, 0.0 * link.length)
         parts.append(sliding if kind == SLIDE else Dyads(GUIDE, pin, line, normal, sliding.length))
-    return [_refined(_joined([part for part in parts if part.kind == kind]), task, sites) for kind in _GRADES]
+    return [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
 
 
 def _from_body(task: Positions) -> Positions:

@@ -32,7 +32,7 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
     factor, kind, judge = study.units.angle_factor, solution.kind, task.section.judge
     data = changed_data(kind.study, kind.shown(solution.values, factor))
     mechanism, places = data["mechanism"], kind.mechanism.description.places
-    first = solution.poses.take((0, 0))
+    first = solution.poses.take((0, int(solution.poses.valid[0].argmax())))
     sketch = mechanism.get("sketch", {})
     mechanism["sketch"] = {point: _plain(complex(np.asarray(first.point(point)))) for point in sketch}
     output, targets = task.targets(solution)
@@ -50,7 +50,7 @@ def study_data(study: Study, task: Task, solution: Solution, name: str) -> dict[
         kinematics, result = kind.kinematics, f"targets.{output}.max_abs"
         targets = {output: {"curve": _plain(task.points.tolist()), "closed": task.closed}}
     mechanism["targets"] = {**mechanism.get("targets", {}), **targets}
-    most = max(float(solution.errors.max()) * (1 + _SLACK), _ROUNDING * task.size) / task.error_factor
+    most = max(solution.max_error * (1 + _SLACK), _ROUNDING * task.size) / task.error_factor
     requirement = {"result": f"kinematics.{result}", "at_most": float(f"{most:.4g}"), "abs": True}
     head = {"name": name, "units": study.resolved["units"], "seed": study.seed}
     requirements = [*data.get("requirements", []), requirement]

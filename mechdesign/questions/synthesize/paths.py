@@ -30,6 +30,8 @@ _BEST = 20
 MOST_EXACT = 9
 # Root of the sum of the squared distances, as a part of the task's size, that is rounding.
 _CONVERGED = 1e-14
+# Linkages with a larger damping are stuck.
+_STUCK = 1e8
 # Largest change of the drive in a round, as a part of its course.
 _LARGEST_STEP = 0.05
 # Of samples with poses at which the linkage cannot be assembled few poses are enough to see it.
@@ -245,8 +247,7 @@ def polish(
         gaps = kind.points(kind.solve(values, angles, modes)) - task.points
         return np.asarray(np.nan_to_num((np.abs(gaps) ** 2).sum(axis=1), nan=np.inf, posinf=np.inf))
 
-    (begin, span), count = kind.course, len(kind.places)
-    largest, values, angles, numbers = _LARGEST_STEP * span, start.values, start.angles, start.numbers
+    values, angles, numbers = start.values, start.angles, start.numbers
     costs, damping = cost(values, angles), np.full(len(values), 1e-3)
     for turn in range(ROUNDS):
         best = np.argsort(costs, kind="stable")[: kept.get(turn, len(costs))]
@@ -254,39 +255,48 @@ def polish(
         values, angles, costs, damping, numbers = (
             values[best], angles[best], costs[best], damping[best], numbers[best],
         )  # fmt: skip
-        if not (costs > (_CONVERGED * task.size) ** 2).any():
+        going = np.flatnonzero((costs > (_CONVERGED * task.size) ** 2) & (damping < _STUCK))
+        if not len(going):
             break
-        poses = kind.solve(values, angles, modes)
-        gaps = kind.points(poses) - task.points
-        by_place, by_drive = kind.derivatives(values, poses)
-        by_place = bound.left(values, by_place)
-        speed = np.maximum(np.abs(by_drive), np.finfo(float).tiny)
-        along = by_drive / speed
-        if task.timing is None:
-            across = np.conj(1j * along)
-            right, matrix = (across * gaps).real, (across * by_place).real
-        else:
-            right = np.concatenate([gaps.real, gaps.imag], axis=1)
-            whole = np.concatenate([by_place, by_drive[None]])
-            matrix = np.concatenate([whole.real, whole.imag], axis=2)
-        # Rows of linkages, columns of unknowns.
-        normal = np.einsum("inj,knj->nik", matrix, matrix)
-        slope = np.einsum("inj,nj->ni", matrix, right)
-        size = np.einsum("nii->ni", normal)
-        size = np.maximum(size, 1e-9 * size.max(axis=1, keepdims=True) + np.finfo(float).tiny)
-        normal[:, range(normal.shape[1]), range(normal.shape[1])] += damping[:, None] * size
-        step = -np.linalg.solve(normal, slope[..., None])[..., 0]
-        moved = bound(values + step[:, :count])
-        if task.timing is None:
-            left = gaps + np.einsum("inj,ni->nj", by_place, moved - values)
-            turned = angles - np.clip((np.conj(along) * left).real / speed, -largest, largest)
-            if not kind.turns:
-                turned = np.clip(turned, begin, begin + span)
-        else:
-            turned = angles + step[:, count:]
+        moved, turned = _step(kind, modes, task, values[going], angles[going], damping[going], bound)
         new = cost(moved, turned)
-        better = (new < costs) & bound.accepts(modes, moved)
-        values, angles = np.where(better[:, None], moved, values), np.where(better[:, None], turned, angles)
-        costs, damping = np.where(better, new, costs), np.where(better, np.maximum(damping / 4, 1e-12), 5 * damping)
+        better = (new < costs[going]) & bound.accepts(modes, moved)
+        rows = going[better]
+        values[rows], angles[rows], costs[rows] = moved[better], turned[better], new[better]
+        damping[going] = np.where(better, np.maximum(damping[going] / 4, 1e-12), 5 * damping[going])
     best = np.argsort(costs, kind="stable")
     return Fits(values[best], angles[best], numbers[best], costs[best])
+
+
+def _step(
+    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, damping: Floats, bound: Bounds
+) -> tuple[Floats, Floats]:
+    """Where a round leads: values and angles."""
+    (begin, span), count = kind.course, len(kind.places)
+    largest = _LARGEST_STEP * span
+    poses = kind.solve(values, angles, modes)
+    gaps = kind.points(poses) - task.points
+    by_place, by_drive = kind.derivatives(values, poses)
+    by_place = bound.left(values, by_place)
+    speed = np.maximum(np.abs(by_drive), np.finfo(float).tiny)
+    along = by_drive / speed
+    if task.timing is None:
+        across = np.conj(1j * along)
+        right, matrix = (across * gaps).real, (across * by_place).real
+    else:
+        right = np.concatenate([gaps.real, gaps.imag], axis=1)
+        whole = np.concatenate([by_place, by_drive[None]])
+        matrix = np.concatenate([whole.real, whole.imag], axis=2)
+    # Rows of linkages, columns of unknowns.
+    normal = np.einsum("inj,knj->nik", matrix, matrix)
+    slope = np.einsum("inj,nj->ni", matrix, right)
+    size = np.einsum("nii->ni", normal)
+    size = np.maximum(size, 1e-9 * size.max(axis=1, keepdims=True) + np.finfo(float).tiny)
+    normal[:, range(normal.shape[1]), range(normal.shape[1])] += damping[:, None] * size
+    step = -np.linalg.solve(normal, slope[..., None])[..., 0]
+    moved = bound(values + step[:, :count])
+    if task.timing is not None:
+        return moved, angles + step[:, count:]
+    left = gaps + np.einsum("inj,ni->nj", by_place, moved - values)
+    turned = angles - np.clip((np.conj(along) * left).real / speed, -largest, largest)
+    return moved, turned if kind.turns else np.clip(turned, begin, begin + span)

@@ -36,7 +36,7 @@ class Pool:
     """Linkages of one kind and assembly that do a task, and how well; each array has a first axis (count,)."""
 
     way: Way
-    errors: Floats  # at each position, shape (count, positions)
+    errors: Floats  # at each position, shape (count, positions); infinite where it cannot be assembled
 
     @property
     def kind(self) -> Kind:
@@ -76,7 +76,7 @@ class Solution:
     modes: tuple[int, ...]
     values: Floats  # shape (places,), angles in radians
     angles: Floats  # drive at the positions
-    errors: Floats  # at the positions
+    errors: Floats  # at the positions, infinite where it cannot be assembled
     defects: str
     transmission: float  # radians
     full_turn: bool
@@ -85,8 +85,13 @@ class Solution:
 
     @property
     def error(self) -> float:
-        """Root mean square of the errors."""
-        return float(np.sqrt((self.errors**2).mean()))
+        """Root mean square of the errors where it can be assembled."""
+        return float(np.sqrt((self.errors[np.isfinite(self.errors)] ** 2).mean()))
+
+    @property
+    def max_error(self) -> float:
+        """The largest of them."""
+        return float(self.errors[np.isfinite(self.errors)].max())
 
     @cached_property
     def poses(self) -> Configuration:
@@ -96,7 +101,8 @@ class Solution:
     @property
     def size(self) -> float:
         """The greatest extent of its points along x or y."""
-        places = np.concatenate([np.broadcast_to(node, self.poses.shape).ravel() for node in self.poses.nodes])
+        poses = self.poses.take(np.nonzero(self.poses.valid))
+        places = np.concatenate([np.broadcast_to(node, poses.shape) for node in poses.nodes])
         return float(max(np.ptp(places.real), np.ptp(places.imag)))
 
     @property
@@ -139,7 +145,7 @@ class Conditions:
 
     def kept(self, pool: Pool) -> Flags:
         """Which linkages keep all conditions."""
-        kept = np.ones(len(pool.way), dtype=bool)
+        kept = np.isfinite(pool.errors).all(axis=1)
         for _, good in self._of_dimensions(pool.kind, pool.way.values):
             kept &= good
         return kept & self.counted(self._of_way(pool.way), len(pool.way))
@@ -147,7 +153,10 @@ class Conditions:
     def missed(self, pool: Pool) -> list[list[str]]:
         """The conditions that each linkage of a pool does not keep."""
         conditions = [*self._of_dimensions(pool.kind, pool.way.values), *self._of_way(pool.way)]
-        return [[reason for reason, good in conditions if not good[row]] for row in range(len(pool.way))]
+        lost = [np.flatnonzero(np.isinf(errors)) + 1 for errors in pool.errors]
+        return [[reason for reason, good in conditions if not good[row]]
+                + [f"it cannot be assembled at position {', '.join(map(str, at))}"] * bool(len(at))
+                for row, at in enumerate(lost)]  # fmt: skip
 
     def placed(self, dyads: Dyads) -> Dyads:
         """The dyads that are in place in frame and body; slides told by a point that is there, if they have one."""

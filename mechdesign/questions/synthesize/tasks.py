@@ -170,19 +170,18 @@ class FunctionTask(_Task):
             frame = replace(frame, ends=((-np.inf, np.inf), (0.0, 0.0)))
             output = replace(frame, axis=1j) if self.slides else frame
         found, spare = body.choices(seen, frame, output, random)
-        links = next(part for part in found if part.kind == LINK)
-        # The frame itself is a dyad between the links.
-        links = links.take(
-            (np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size))
-        )
+        links = self._couplers(found)
         # Of the four dyads of five pairs the frame is one; with fixed zeros three pairs have one coupler.
         fixed, what = any(frame.fixed), f"{len(self.inputs)} pairs"
         words = body.told(f"{what} with fixed zeros" if fixed else what, spare,
                           counted(len(links), "real linkage"), f"of at most {1 if fixed else 3}")  # fmt: skip
         conditions.told.append(words)
-        if len(links):
-            part = self._linkage(links)
-            yield from assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)
+        pools = self._assembled(links, conditions)
+        if not pools:
+            # Of many pairs the frame may be the only best coupler: the nearest pass some pairs.
+            links = self._couplers(body.choices(seen, frame, output, random, refined=False)[0])
+            pools = self._assembled(links, conditions)
+        yield from pools
 
     @property
     def error_factor(self) -> float:
@@ -192,10 +191,25 @@ class FunctionTask(_Task):
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what it should be at each position, in the study's units."""
         if self.slides:
-            zero = solution.poses.point("B")[0].real.mean() - self.outputs.mean()
+            zero = np.nanmean(solution.poses.point("B")[0].real - self.outputs)
             return "B.x", {"B.x": (self.outputs + zero).tolist()}
-        reached = np.unwrap(np.angle(solution.poses.rotation("rocker")[0] * np.exp(-1j * self.outputs)))
-        return "rocker.angle", {"rocker.angle": ((self.outputs + reached.mean()) / self.factor).tolist()}
+        turned = (solution.poses.rotation("rocker")[0] * np.exp(-1j * self.outputs))[solution.poses.valid[0]]
+        zero = np.unwrap(np.angle(turned)).mean()
+        return "rocker.angle", {"rocker.angle": ((self.outputs + zero) / self.factor).tolist()}
+
+    def _assembled(self, links: Dyads, conditions: Conditions) -> list[Pool]:
+        """The linkages with these couplers."""
+        if not len(links):
+            return []
+        part = self._linkage(links)
+        return [*assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)]
+
+    def _couplers(self, parts: Sequence[Dyads]) -> Dyads:
+        """The links among dyads between the input and the output but the frame itself."""
+        links = next(part for part in parts if part.kind == LINK)
+        return links.take(
+            (np.abs(links.pivot) > EXACT * self.size) & (self.slides | (np.abs(links.pin) > EXACT * self.size))
+        )
 
     def _linkage(self, links: Dyads) -> Candidates:
         """The linkages with these couplers; the crank stands at the input plus the angle of its pin."""
@@ -259,44 +273,54 @@ class PathTask(_Task):
         """Linkages of every kind and assembly."""
         if len(self.path.points) < self.given:
             conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
-        for kind in self.kinds:
-            bound, ways = self._bound(kind, conditions.sites[0]), len(kind.begun)
-            starts = [self._starts(kind, modes, bound, random) for modes in kind.begun]
-            # They are counted in turn.
-            turns = [part.numbers * ways + k for k, part in enumerate(starts)]
-            every = np.sort(np.concatenate(turns))
-            starts = [replace(part, numbers=np.searchsorted(every, turn))
-                      for part, turn in zip(starts, turns, strict=True)]  # fmt: skip
-            count, exact = len(every), list[paths.Starts]()
-            points = len(self.path.points)
-            few = points <= paths.MOST_EXACT
-            # Where the points leave no choice, linkages that pass them may need an assembly at each.
-            alone = few and len(kind.modes) > 1 and (points if self.free else 2 * points - 1) >= bound.freedom
-            if alone and count:
-                exact.append(_distinct([passing(kind, self.path, starts, bound)], self.size))
-                part = Candidates(kind, exact[0].values, exact[0].angles)
-                if len(part.values):
-                    yield from assembled(part, self.gaps(part), conditions, self.size)
-            for modes, start in zip(kind.begun, starts, strict=True):
-                fits = paths.fits(kind, modes, self.path, start, bound, whole=few and not alone)
-                passes = fits.costs <= (EXACT * self.size) ** 2 * points
-                exact.append(paths.Starts(fits.values[passes], fits.angles[passes], fits.numbers[passes]))
-                if not len(fits.costs):
-                    continue
-                rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
-                values, angles = fits.values[rows], fits.angles[rows]
-                gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
-                none = np.zeros(gaps.shape, dtype=bool)
-                yield Pool(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
-            if not count:
-                conditions.told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
-            elif few:
-                numbers = _distinct(exact, self.size).numbers
-                words = f"{len(numbers)} exact, the last new one at start {numbers[-1] + 1} of {count}" \
-                    if len(numbers) else f"none exact of {count} starts"  # fmt: skip
-                conditions.told.append(f"{in_words(kind.name)}: {words}")
+        site, pools = conditions.sites[0], list[Pool]()
+        # Where no sample is within all conditions the nearest is one of the others.
+        wide = self.section.model_copy(update={"lengths": {}, "pivots": None, "transmission": None})
+        others = replace(self, section=wide), Site(site.centre, site.size, site.reach), list[str]()
+        for task, room, told in ((self, site, conditions.told), others):
+            for kind in self.kinds if not pools else ():
+                pools += task.of_kind(kind, task.bound(kind, room), random, conditions, told)
+        yield from pools
 
-    def _bound(self, kind: Kind, site: Site) -> Bounds:
+    def of_kind(
+        self, kind: Kind, bound: Bounds, random: np.random.Generator, conditions: Conditions, told: list[str]
+    ) -> Iterator[Pool]:
+        """Linkages of every assembly of a kind; what is found is `told` in words."""
+        starts = [self._starts(kind, modes, bound, random) for modes in kind.begun]
+        # They are counted in turn.
+        turns = [part.numbers * len(starts) + k for k, part in enumerate(starts)]
+        every = np.sort(np.concatenate(turns))
+        starts = [replace(part, numbers=np.searchsorted(every, turn))
+                  for part, turn in zip(starts, turns, strict=True)]  # fmt: skip
+        points, count, exact = len(self.path.points), len(every), list[paths.Starts]()
+        few = points <= paths.MOST_EXACT
+        # Where the points leave no choice, linkages that pass them may need an assembly at each.
+        alone = few and len(kind.modes) > 1 and (points if self.free else 2 * points - 1) >= bound.freedom
+        if alone and count:
+            exact.append(_distinct([passing(kind, self.path, starts, bound)], self.size))
+            part = Candidates(kind, exact[0].values, exact[0].angles)
+            if len(part.values):
+                yield from assembled(part, self.gaps(part), conditions, self.size)
+        for modes, start in zip(kind.begun, starts, strict=True):
+            fits = paths.fits(kind, modes, self.path, start, bound, whole=few and not alone)
+            passes = fits.costs <= (EXACT * self.size) ** 2 * points
+            exact.append(paths.Starts(fits.values[passes], fits.angles[passes], fits.numbers[passes]))
+            if not len(fits.costs):
+                continue
+            rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
+            values, angles = fits.values[rows], fits.angles[rows]
+            gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
+            none = np.zeros(gaps.shape, dtype=bool)
+            yield Pool(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
+        if not count:
+            told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
+        elif few:
+            numbers = _distinct(exact, self.size).numbers
+            words = f"{len(numbers)} exact, the last new one at start {numbers[-1] + 1} of {count}" \
+                if len(numbers) else f"none exact of {count} starts"  # fmt: skip
+            told.append(f"{in_words(kind.name)}: {words}")
+
+    def bound(self, kind: Kind, site: Site) -> Bounds:
         """What keeps linkages of a kind within the limits."""
         section = self.section
         if isinstance(kind, OwnKind):
@@ -331,19 +355,25 @@ def _distinct(parts: Sequence[paths.Starts], size: float) -> paths.Starts:
 
 
 def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
-    """Linkages by the assembly in which they are at the first position, with how they pass the others."""
+    """Linkages by the assembly in which they are at the first position, with how they pass the others.
+
+    Errors are infinite at positions at which they cannot be assembled.
+    """
     stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
-    errors = stack.min(axis=0).max(axis=1)
+    errors, lost = stack.min(axis=0).max(axis=1), np.isinf(stack).all(axis=0).sum(axis=1)
     # Those without a defect come first, as far as the positions alone tell.
     branch = ~(stack <= stack.min(axis=0) + _OTHER * size).all(axis=2).any(axis=0)
-    order = np.lexsort((np.where(errors < EXACT * size, 0.0, errors), in_order(part.angles)[1], branch))
+    order = np.lexsort((np.where(errors < EXACT * size, 0.0, errors), in_order(part.angles)[1], branch, lost))
     rows = conditions.begun(part.kind, part.values, order, MOST)
+    whole = conditions.counted([("it cannot be assembled at a position", lost[rows] == 0)], len(rows))
+    # Where none can be, that with the fewest such positions is the nearest.
+    rows = rows[whole] if whole.any() else rows[:1][lost[rows[:1]] < stack.shape[2]]
     part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
     nearest = stack.min(axis=0)
-    whole = conditions.counted([("it cannot be assembled at a position", np.isfinite(nearest).all(axis=1))], len(rows))
-    first = (stack[:, :, 0] <= nearest[:, 0] + _OTHER * size).argmax(axis=0)
+    known, lane = np.isfinite(nearest).argmax(axis=1), np.arange(len(rows))
+    first = (stack[:, lane, known] <= nearest[lane, known] + _OTHER * size).argmax(axis=0)
     for number, modes in enumerate(part.kind.modes):
-        some = np.flatnonzero((first == number) & whole)
+        some = np.flatnonzero(first == number)
         if len(some):
             other = stack[number, some] > nearest[some] + _OTHER * size
             way = passed(part.kind, modes, part.values[some], part.angles[some], other,
