@@ -262,6 +262,9 @@ def _refined(start: Dyads, task: Positions, sites: tuple[Site, Site]) -> Dyads:
         else:
             normal = normal * np.exp(1j * step[:, 2])
             pivot = pivot + step[:, 3] * normal
+    if not links:
+        # The nearest point of a line to the origin tells those that are the same.
+        pivot = (np.conj(normal) * pivot).real * normal
     return Dyads(start.kind, pivot, pin, normal, length)
 
 
@@ -282,8 +285,12 @@ def pairs(
                 low, high = lengths[link]
                 good &= np.expand_dims((part.length >= low) & (part.length <= high), axis)
         # A pair of links may be driven by either; two slides are the same pair in both orders.
-        if first == second:
-            good &= ~np.eye(len(one), dtype=bool) if first == LINK else np.triu(np.ones(good.shape, dtype=bool), 1)
+        if first == second == LINK:
+            good &= ~np.eye(len(one), dtype=bool)
+        elif first == second:
+            # Along two slides of one direction the body is free, or jammed.
+            turned = np.abs((one.normal[:, None] * np.conj(other.normal)).imag) > _SAME
+            good &= np.triu(turned, 1)
         every = np.flatnonzero(good)
         if len(every):
             some = random.choice(every, most, replace=False) if len(every) > most else every

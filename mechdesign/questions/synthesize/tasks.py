@@ -292,7 +292,10 @@ class PathTask(_Task):
                 conditions.told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
             elif few:
                 numbers = _distinct(exact, self.size).numbers
-                words = f"{len(numbers)} exact, the last new one at start {numbers[-1] + 1} of {count}" \
+                # Assemblies take turns, and the one has fewer starts than the other.
+                every = np.sort(np.concatenate([part.numbers for part in starts]))
+                last = np.searchsorted(every, numbers[-1:], side="right")
+                words = f"{len(numbers)} exact, the last new one at start {last[0]} of {count}" \
                     if len(numbers) else f"none exact of {count} starts"  # fmt: skip
                 conditions.told.append(f"{in_words(kind.name)}: {words}")
 
