@@ -105,18 +105,24 @@ class Candidates:
     angles: Floats  # shape (count, positions)
 
 
-def choices(task: Positions, frame: Site, body: Site, random: np.random.Generator) -> tuple[list[Dyads], list[int]]:
+def choices(
+    task: Positions, frame: Site, body: Site, random: np.random.Generator, *, within_reach: bool = False
+) -> tuple[list[Dyads], list[int]]:
     """Dyads through all positions of a body, those of each kind, and how many wishes these leave to links.
 
-    What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is
-    met by least squares. A single given point is that of one dyad, so that there are two numbers of wishes.
+    What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is met
+    by least squares, perhaps with pivots within reach. A single given point is that of one dyad: two numbers of wishes.
     """
     centre, size = task.centre, task.size
     scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
     for one, other in product(frame.around, body.around):
         sites = one.scaled(centre, size), other.scaled(0j, size)
         spare.append(_known(LINK, scaled)[1] - sum(_needs(LINK, sites)))
-        parts += _least_squares(scaled, sites, random) if spare[-1] < 0 else _exact(scaled, sites, random, WISHES)
+        if spare[-1] < 0:
+            near = (sites[0].within_reach, sites[1]) if within_reach else sites
+            parts += _least_squares(scaled, near, random)
+        else:
+            parts += _exact(scaled, sites, random, WISHES)
     found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
     return [
         replace(part, pivot=part.pivot * size + centre, pin=part.pin * size, length=part.length * size)
