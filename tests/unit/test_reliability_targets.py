@@ -91,3 +91,16 @@ def test_with_free_timing_the_distance_from_the_path_counts_whenever_it_is_passe
 def test_mistakes_of_targets_are_told(limit: str, words: str) -> None:
     with pytest.raises(mechdesign.StudyError, match=words):
         asked(limit)
+
+
+def test_a_place_that_lies_outside_its_circle_as_it_is_drawn_is_told() -> None:
+    (warning,) = asked("A: {radius: 0.3, target: [[50.5, 0], [0, 50]]}").warnings
+    assert "A: the nominal place at theta = 0 deg is 0.5 from its target, of 0.3 mm allowed" in str(warning)
+
+
+def test_limits_of_single_poses_are_marks_in_the_picture_of_errors() -> None:
+    answer = asked("A.x: {min: -0.4, max: 0.4, target: [50.1, null, 25]}", poses="[0, 30, 60]")
+    limits = [line for line in answer.figure("bands").axes[0].lines if line.get_label() == "limit of the error"]
+    upper = np.nanmax(np.concatenate([line.get_ydata() for line in limits]).astype(float))
+    assert upper == pytest.approx(0.5)
+    assert {line.get_marker() for line in limits} == {"_"}

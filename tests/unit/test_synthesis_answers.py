@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +165,24 @@ def test_how_complete_a_list_is_is_told_of_linkages_through_pairs(pairs: int, mo
     notes = mechdesign.synthesize(mechdesign.load(text=text)).notes
     assert any(words in note for note in notes), notes
     assert not [note for note in notes if "dyad" in note]
+
+
+@pytest.mark.nightly
+def test_the_last_start_is_one_of_the_starts() -> None:
+    points = "[[0, 0], [20, 8], [40, 10], [60, 8]]"
+    text = f"synthesis: {{path: {{points: {points}, timing: [0, 20, 40, 60]}}, evaluations: 100}}"
+    (words,) = [note for note in mechdesign.synthesize(mechdesign.load(text=text)).notes if "exact" in note]
+    last, starts = re.findall(r"start (\d+) of (\d+)", words)[0]
+    assert int(last) <= int(starts)
+
+
+@pytest.mark.slow
+def test_of_more_positions_each_linkage_stands_once_and_is_a_mechanism() -> None:
+    text = f"{FIVE.rstrip().removesuffix(']')}, {{x: 95, y: -20, angle: 82}}]\n  limits: {{reach: 20, ratio: 50}}\n"
+    answer = mechdesign.synthesize(mechdesign.load(text=text))
+    lines = [(row["kind"], round(row["error"], 6), round(row["size"], 4)) for row in answer.main]
+    assert len({*lines}) == len(lines)
+    assert {mechdesign.load(text=answer.files[name]).kinematics is not None for name in answer.files} == {True}
 
 
 def test_of_five_positions_without_a_slide_the_nearest_is_a_four_bar_and_misses_it() -> None:

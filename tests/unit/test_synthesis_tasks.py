@@ -22,10 +22,13 @@ def solved(task: Any) -> Any:
         ({}, "a task is one of body, function and path"),
         ({"body": []}, "2 to 1000 positions, not 0"),
         ({"body": [THREE[0], THREE[0]]}, "position 2 of the body is one of those before it"),
+        ({"body": [THREE[0], THREE[0] | {"angle": 360}]}, "position 2 of the body is one of those before it"),
+        ({"body": THREE, "pivots": {"x": [4, -4]}}, r"^<study>:\d+:\d+: synthesis.pivots: x: -4 is not beyond 4$"),
+        ({"body": THREE, "pins": "near"}, "pins: expected a box, a line or points, not 'near'"),
+        ({"function": {"input": [1, 2, 3], "output": [7, 7, 7]}}, "all outputs are one"),
         ({"body": [THREE[0], {"x": 1e300, "y": 0, "angle": 0}]}, "too large"),
         ({"body": [THREE[0], {"x": float("inf"), "y": 0, "angle": 0}]}, "finite"),
-        ({"body": THREE, "pivots": {"x": [4, -4]}}, "-4 is not beyond 4"),
-        ({"body": THREE, "pivots": []}, "not an empty list"),
+        ({"body": THREE, "pivots": []}, "expected a box, a line or points"),
         ({"body": THREE, "lengths": {"cramk": [1, 2]}}, "no link 'cramk'; links are ground, crank"),
         ({"body": THREE, "lengths": {"crank": [2, 1]}}, "crank: 1 is not beyond 2"),
         ({"function": {"input": [], "output": []}}, "3 to 1000 pairs, not 0"),
@@ -58,6 +61,17 @@ def test_conditions_that_contradict_each_other_are_named(conditions: Any, words:
     with pytest.raises(mechdesign.AssemblyError, match=words) as raised:
         solved({"body": THREE, **conditions, "kinds": "four_bar"})
     assert "the nearest is in nearest.yaml: a pivot" in str(raised.value)
+
+
+@pytest.mark.slow
+def test_many_positions_are_met_by_linkages_whose_pivots_are_within_reach() -> None:
+    """The best links of all have pivots 290 mm away from the middle of a way of 90 mm; within 270 mm others do it."""
+    s = np.linspace(0, 1, 12)
+    places = zip(90 * s, 20 * np.sin(3 * s), 70 * s, strict=True)
+    table = solved({"body": [{"x": float(x), "y": float(y), "angle": float(a)} for x, y, a in places]}).main
+    row = next(iter(table.take(table["defects"] == "")))
+    assert row["error"] < 1.5
+    assert max(abs(row["ground.O.x"] - 45), abs(row["ground.O.y"])) < 290
 
 
 def test_where_pivots_are_wished_each_linkage_has_one_in_the_box() -> None:

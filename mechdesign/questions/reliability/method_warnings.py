@@ -43,20 +43,30 @@ def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution
 def _outside(task: Task) -> Iterator[Caution]:
     """Warnings of nominal values outside their own limits, each at its farthest pose."""
     for limit, band in zip(task.question.limits, task.question.at(task.nominal).limits, strict=True):
-        beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
+        away = np.hypot(*band.middle) - band.high if band.round else np.maximum(band.low, -band.high)
+        beyond = np.where(task.assembled & limit.absolute, away, 0.0)
         poses = np.flatnonzero(beyond > 0)
         if not len(poses):
             continue
         pose, scale, unit = int(np.argmax(beyond)), task.scale[band.output], task.labels[2][band.output]
+        several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
+        name = task.question.channels[band.output].name
+        if band.round:
+            radius, distance = (
+                scale * np.broadcast_to(end, beyond.shape)[pose] for end in (band.high, away + band.high)
+            )
+            words = f"the nominal place at {task.where(pose)}{several} is {numeral(distance)} from its target, of"
+            words = f"{name.replace('.x', '')}: {words} {numeral(radius)} {unit} allowed"
+            yield Caution("suspect", words, pose=task.where(pose))
+            continue
         value = scale * task.nominal[band.output, pose]
         low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
         between = f"{numeral(low)} to {numeral(high)}"
         if not np.isfinite(low) or not np.isfinite(high):
             between = f"at least {numeral(low)}" if np.isfinite(low) else f"at most {numeral(high)}"
-        several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
         yield Caution(
             "suspect",
-            f"{task.question.channels[band.output].name}: the nominal value {numeral(value)} at {task.where(pose)}"
+            f"{name}: the nominal value {numeral(value)} at {task.where(pose)}"
             f"{several} lies outside its limits, {between}{f' {unit}' if unit else ''}",
             pose=task.where(pose),
         )  # fmt: skip

@@ -66,7 +66,7 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
         for one in best:
             solutions.append(replace(one, made=judged(study, study_data(study, task, one, study.name))))
             progress.update(1)
-        told.append(f"the best {len(solutions)} are judged")
+        told.append(f"the best {len(solutions)} are judged" if len(solutions) != 1 else "the best is judged")
     solutions, scores = ranked(solutions, section.rank, task.size)
     if not solutions:
         raise _none(study, task, pools, conditions, told)

@@ -106,13 +106,19 @@ class Candidates:
 
 
 def choices(
-    task: Positions, frame: Site, body: Site, random: np.random.Generator, *, refined: bool = True
+    task: Positions,
+    frame: Site,
+    body: Site,
+    random: np.random.Generator,
+    *,
+    refined: bool = True,
+    within_reach: bool = False,
 ) -> tuple[list[Dyads], list[int]]:
     """Dyads through all positions of a body, those of each kind, and how many wishes these leave to links.
 
     What positions leave free is sampled in the sites of frame and body, which dyads may miss; what is too much is
-    met by least squares, or without `refined` by some of them. A single given point is that of one dyad, so that there
-    are two numbers of wishes.
+    met by least squares, perhaps with pivots within reach, or without `refined` by some of them. A single given point
+    is that of one dyad, so that there are two numbers of wishes.
     """
     centre, size = task.centre, task.size
     scaled, parts, spare = Positions((task.places - centre) / size, task.rotations), list[Dyads](), list[int]()
@@ -120,8 +126,9 @@ def choices(
         sites = one.scaled(centre, size), other.scaled(0j, size)
         spare.append(_known(LINK, scaled)[1] - sum(_needs(LINK, sites)))
         if spare[-1] < 0:
-            starts = _of_subsets(scaled, sites, random)
-            parts += [_refined(part, scaled, sites) for part in starts] if refined else starts
+            near = (sites[0].within_reach, sites[1]) if within_reach else sites
+            starts = _of_subsets(scaled, near, random)
+            parts += [_refined(part, scaled, near) for part in starts] if refined else starts
         else:
             parts += _exact(scaled, sites, random, WISHES)
     found = [_joined([part for part in parts if part.kind == kind]) for kind in _GRADES]
@@ -269,6 +276,9 @@ def _refined(start: Dyads, task: Positions, sites: tuple[Site, Site]) -> Dyads:
         else:
             normal = normal * np.exp(1j * step[:, 2])
             pivot = pivot + step[:, 3] * normal
+    if not links:
+        # The nearest point of a line to the origin tells those that are the same.
+        pivot = (np.conj(normal) * pivot).real * normal
     return Dyads(start.kind, pivot, pin, normal, length)
 
 
@@ -289,8 +299,12 @@ def pairs(
                 low, high = lengths[link]
                 good &= np.expand_dims((part.length >= low) & (part.length <= high), axis)
         # A pair of links may be driven by either; two slides are the same pair in both orders.
-        if first == second:
-            good &= ~np.eye(len(one), dtype=bool) if first == LINK else np.triu(np.ones(good.shape, dtype=bool), 1)
+        if first == second == LINK:
+            good &= ~np.eye(len(one), dtype=bool)
+        elif first == second:
+            # Along two slides of one direction the body is free, or jammed.
+            turned = np.abs((one.normal[:, None] * np.conj(other.normal)).imag) > _SAME
+            good &= np.triu(turned, 1)
         every = np.flatnonzero(good)
         if len(every):
             some = random.choice(every, most, replace=False) if len(every) > most else every

@@ -16,7 +16,7 @@ from mechdesign.questions.synthesize.declared import BODIES, FOUR_BAR, FUNCTIONS
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.text import fields
-from mechdesign.study.text.reading import failure
+from mechdesign.study.text.reading import failure, shown
 
 _KINDS = {
     "four_bar": "two links hold the coupler",
@@ -73,6 +73,8 @@ class FunctionTask(fields.Model):
             yield f"a function has 3 to {MOST_POSITIONS} pairs, not {len(self.input)}"
         elif len({*self.input}) < len(self.input):
             yield "two pairs have the same input"
+        elif len({*self.output}) < 2:
+            yield "all outputs are one"
 
 
 def _points(raw: Any) -> Any:
@@ -137,14 +139,17 @@ class Box(fields.Model):
 
 def _region(raw: Any) -> Any:
     """A list of points, or what `Region` takes."""
-    if raw == []:
-        raise failure("expected a box, a line or points, not an empty list")
+    if not isinstance(raw, list | dict) or not raw:
+        raise failure(f"expected a box, a line or points, not {shown(raw)}")
     if isinstance(raw, list) and len(raw) == 2 and not any(isinstance(part, list) for part in raw):
         return [raw]
     return raw
 
 
-Places = Annotated[tuple[Point, ...] | Region, BeforeValidator(_region)]
+Places = Annotated[
+    Annotated[tuple[Point, ...], Tag("points")] | Annotated[Region, Tag("region")],
+    Discriminator(lambda raw: "points" if isinstance(raw, list | tuple) else "region"), BeforeValidator(_region),
+]  # fmt: skip
 
 
 class Limits(fields.Model):
@@ -308,10 +313,6 @@ class SynthesisSection(fields.Model):
             count = len(self.body)
             if not 2 <= count <= MOST_POSITIONS:
                 yield f"a body has 2 to {MOST_POSITIONS} positions, not {count}"
-            places = [(part.x, part.y, part.angle) for part in self.body]
-            twice = [k for k, place in enumerate(places) if place in places[:k]]
-            if twice:
-                yield f"position {twice[0] + 1} of the body is one of those before it"
         possible = BODIES if self.body is not None else PATHS if self.path is not None else ()
         for kind in self.kinds:
             if kind not in possible:
@@ -352,6 +353,11 @@ class SynthesisSection(fields.Model):
 
     def checked(self, checker: Checker) -> Self:
         """Check the loads, on the kind of linkage with which a search begins where that stands for the mechanism."""
+        turn = 2 * np.pi / checker.units.angle_factor
+        places = [(part.x, part.y, round(math.remainder(part.angle, turn), 9)) for part in self.body or ()]
+        for number in [k for k, place in enumerate(places) if place in places[:k]][:1]:
+            message = f"position {number + 1} of the body is one of those before it"
+            checker.report(("synthesis", "body", number), message)
         stands = self.of is None and checker.reporter.document.raw(("mechanism", "links")) is None
         if self.judge is not None and stands:
             check_loads(checker, self.judge.loads, ("synthesis", "judge", "loads"), moving=False, timed=False)

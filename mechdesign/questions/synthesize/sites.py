@@ -73,6 +73,16 @@ class Site:
         """The sites of two points: beside a single given point the other has a choice."""
         return [self, Site(self.centre, self.size, self.reach)] if len(self.given) == 1 else [self]
 
+    @property
+    def within_reach(self) -> Site:
+        """The part of it that is a box within reach."""
+        if len(self.given):
+            return self
+        own, half = (self.centre - self.origin) / self.axis, self.reach * self.size / np.sqrt(2)
+        x, y = (ends if np.isfinite(ends).all() else (max(ends[0], side - half), min(ends[1], side + half))
+                for side, ends in zip((own.real, own.imag), self.ends, strict=True))  # fmt: skip
+        return replace(self, ends=(x, y))
+
     def scaled(self, centre: complex, size: float) -> Site:
         """The site in lengths of a size from a centre."""
         x, y = ((low / size, high / size) for low, high in self.ends)

@@ -102,7 +102,7 @@ class BodyTask(_Task):
         conditions.told += filter(None, [self.positions.remark])
         if self.positions.straight:
             return
-        found, spare = body.choices(self.positions, *sites, random)
+        found, spare = body.choices(self.positions, *sites, random, within_reach=True)
         given = any(map(any, (site.fixed for site in sites)))
         what, real = f"{len(self.positions.places)} positions", f"{sum(map(len, found))} real dyads"
         words = body.told(f"{what} and what is given" if given else what, spare, real,
@@ -395,7 +395,10 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
         return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
     assert section.path is not None
     points = section.path.points
-    table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
+    try:
+        table = read_table(study.folder, points) if isinstance(points, str) else np.array(points, dtype=float)
+    except StudyError as error:
+        raise StudyError([study.problem(str(error), "synthesis", "path", "points")]) from None
     if table.shape[1] != 2 or len(table) < 2:
         raise StudyError(
             [study.problem("a path has two points or more, a row [x, y] each", "synthesis", "path", "points")]

@@ -139,7 +139,7 @@ def check_poses(targets: Mapping[str, Target], mechanism: Mechanism, poses: Pose
             continue
         if target.closed is not None:
             if not poses.followed:
-                sweep = f"sweep: {{{mechanism.drives[0]}: {{from: 0, to: 360}}}}"
+                sweep = f"sweep: {{{mechanism.drives[0]}: {{from: 0, to: 360, step: 5}}}}"
                 reporter.report((*ROOT, owner), f"a curve is passed by a motion; give kinematics one, such as {sweep}")
             continue
         rows = len(target.table)

@@ -138,10 +138,11 @@ def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:
         circle = samples.limits[0]
         radius, middle = circle.high, np.array(circle.middle)[:, None]
         words = f"limit: {radius:g} {samples.units[samples.pair[0]]}".rstrip() + f" from {circle.origin}"
-        if radius >= _FAR_FROM_ERRORS * reach.max():
-            return np.zeros((2, 0)), words, f"{words}, outside"
         turn = np.linspace(0.0, 2 * np.pi, 181)
-        return middle + radius * np.stack([np.cos(turn), np.sin(turn)]), words, ""
+        outline = middle + radius * np.stack([np.cos(turn), np.sin(turn)])
+        if np.hypot(*outline).min() >= _FAR_FROM_ERRORS * reach.max():
+            return np.zeros((2, 0)), words, f"{words}, outside"
+        return outline, words, ""
     limits, sides, far = (
         {limit.output: (limit.low, limit.high) for limit in samples.limits},
         list[list[float]](),

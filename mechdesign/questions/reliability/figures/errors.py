@@ -77,7 +77,10 @@ def _band(view: ErrorsView, swept: Along, output: str, order: str, unit: str) ->
     for limit in (np.broadcast_to(end, len(x)) for end in ends):
         near = np.where(np.abs(limit) < _FAR_FROM_ERRORS * largest, limit, np.nan)
         if np.isfinite(near).any():
-            marks.append(Trace(x, near, label="limit of the error", look=_LIMIT))
+            # Limits of single poses are no line.
+            alone = not np.isfinite(near[1:] + near[:-1]).any()
+            own = _LIMIT | ({"linestyle": "", "marker": "_", "markersize": 8.0} if alone else {})
+            marks.append(Trace(x, near, label="limit of the error", look=own))
         elif len(beyond := limit[np.isfinite(limit)]):
             far.append(" to ".join(dict.fromkeys(f"{end:+g}" for end in (beyond.min(), beyond.max()))))
     words = f"limit {', '.join(far)} {printed(unit)}, outside" if far else ""
