@@ -74,7 +74,8 @@ class _Watched(Progress):
     def update(self, n: int) -> None:
         """Go on, unless it was overtaken."""
         self._done += n
-        self._page.progress = f"{self._stage} {100 * self._done // max(self._total, 1)} %"
+        share = f" {100 * self._done // self._total} %" if self._total > 1 else ""
+        self._page.progress = f"{self._stage}{share}"
         self.look()
 
     def look(self) -> None:

@@ -116,7 +116,7 @@ class TaskSession(Session):
         self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
         whole: dict[str, Any] | None = None
         if part is not None:
-            count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} are drawn."
+            count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
             whole = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
         content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
