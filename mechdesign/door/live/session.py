@@ -231,13 +231,14 @@ class Session:
         if not 0 < count <= _MOST_ROWS:
             raise AskedError
         now = altered(study, changes)
+        own = now if study is self.study else altered(self.study, self._own(changes))
         drawing, tracks = posed(now, steps(str(asked.get("rows")), count) / ROWS, sheet, study)
-        told = [name for name in names if name != TURNED]
+        told, entries = [name for name in names if name != TURNED], saving.overrides(self.study, own)
         if any(map(is_entry, changes)):
             # What is measured in the sketch changes with it, and none of it in silence.
             told += [name for name in now.parameters.measured if not math.isclose(now.sizes[name], study.sizes[name])]
         return {"changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
-                "set": self.overrides(changes), "words": [self._in_words(now, name) for name in told]}  # fmt: skip
+                "set": entries, "words": [self._in_words(now, name) for name in told]}  # fmt: skip
 
     @np.errstate(all="ignore")
     def assembly(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -282,7 +283,7 @@ class Session:
             html = answer.html(stage)
             self._seconds[question] = time.perf_counter() - begin
         moved = _drawn(stage) if part and stage else {}
-        return {"set": self.overrides(changes), "html": html, "order": self._quickest(), **moved}
+        return {"set": saving.overrides(self.study, answer.study), "html": html, "order": self._quickest(), **moved}
 
     def _ask(self, question: str, changes: Mapping[str, float], progress: Progress) -> ChangedAnswer:
         """What the study with changed numbers answers, and how the study that is shown moves with them."""
@@ -325,10 +326,6 @@ class Session:
                 progress.look()
         html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
         return {"html": html, "dark": dark(drawn.values())}
-
-    def overrides(self, changes: Mapping[str, float]) -> list[str]:
-        """Changes as `--set` takes them, by the entries of the study."""
-        return saving.overrides(self.study, altered(self.study, self._own(changes)))
 
     @np.errstate(all="ignore")
     def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from mechdesign.door.live.altered import TASK, altered
 from mechdesign.door.live.answers import PACKAGE
 from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
-from mechdesign.door.live.saving import file_names
+from mechdesign.door.live.saving import file_names, overrides
 from mechdesign.door.live.session import Session
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.linkage import Canvas
@@ -121,7 +121,7 @@ class TaskSession(Session):
         content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
         return {
-            "set": self.overrides(changes), "search": key, "dark": dark(drawn),
+            "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
             "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
