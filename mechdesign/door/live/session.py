@@ -64,7 +64,6 @@ class _Watched(Progress):
 
     def __init__(self, page: _OpenPage, overtaken: Callable[[], bool]) -> None:
         self._page, self._overtaken, self._stage, self._done, self._total = page, overtaken, "", 0, 0
-        self.look()
 
     def start(self, total: int, stage: str) -> None:
         """Begin a stage."""
@@ -297,13 +296,19 @@ class Session:
         assert motion is not None
         return ChangedAnswer(question, study, result, moves, motion)
 
+    def _turn(self, asked: Mapping[str, Any]) -> tuple[_OpenPage, _Watched]:
+        """The page that asks, and what ends its computation when it has asked something newer."""
+        page, turn = self._page(asked)
+        return page, _Watched(page, lambda: self.ended or page.turn != turn)
+
     @contextmanager
     def _watched(self, asked: Mapping[str, Any]) -> Iterator[tuple[_OpenPage, _Watched]]:
-        """The turn of a computation for a page, which ends when the page has asked something newer."""
-        page, turn = self._page(asked)
+        """The same, alone among all computations but those of pictures."""
+        page, progress = self._turn(asked)
         with self._computing:
             try:
-                yield page, _Watched(page, lambda: self.ended or page.turn != turn)
+                progress.look()
+                yield page, progress
             finally:
                 page.progress = ""
 
@@ -316,14 +321,12 @@ class Session:
         OvertakenError
             If the page has asked something newer.
         """
-        with self._watched(asked) as (page, progress):
-            answer = page.answers.get(str(asked.get("question")))
-            if answer is None:
-                raise OvertakenError
-            drawn = dict[str, str]()
-            for name, picture in answer.pictures():
-                drawn[name] = picture
-                progress.look()
+        page, progress = self._turn(asked)
+        progress.look()
+        answer = page.answers.get(str(asked.get("question")))
+        if answer is None:
+            raise OvertakenError
+        drawn = answer.pictures(progress.look)
         html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
         return {"html": html, "dark": dark(drawn.values())}
 

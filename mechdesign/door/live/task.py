@@ -13,7 +13,7 @@ import numpy as np
 
 from mechdesign.commands import COMMANDS
 from mechdesign.door.live.altered import TASK, altered
-from mechdesign.door.live.answers import PACKAGE
+from mechdesign.door.live.answers import DRAWING, PACKAGE
 from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
 from mechdesign.door.live.saving import file_names, overrides
@@ -110,7 +110,7 @@ class TaskSession(Session):
                     raise
                 result = error.result
             progress.look()
-            with style.context("paper"):
+            with DRAWING, style.context("paper"):
                 part = solutions(study, result, f"{_QUESTION}-trade")
         key = str(next(self._counter))
         self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
