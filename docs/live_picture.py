@@ -1,4 +1,4 @@
-"""Makes the moving picture of the live page, ``docs/live.gif``: real drags at the four-bar of the README, in a browser.
+"""Makes the pictures of the live page in a browser: real drags at the four-bar of the README, and a task's linkages.
 
     python docs/live_picture.py
 
@@ -21,7 +21,7 @@ from playwright.sync_api import Page, sync_playwright
 
 import mechdesign
 from mechdesign.door.live.server import LiveServer
-from mechdesign.door.live.session import Session
+from mechdesign.door.live.task import session_of
 
 DOCS = Path(__file__).parent
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -97,32 +97,18 @@ def answered(page: Page) -> None:
     page.wait_for_selector(".live-answer[aria-busy=true]", state="detached")
 
 
-def main() -> None:
-    """Write the picture."""
-    found = next(filter(None, map(shutil.which, BROWSERS)))
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        path = Path(folder) / "study.yaml"
-        path.write_text(study_text(), encoding="utf-8")
-        server = LiveServer(Session(mechdesign.load(path)))
-        server.start()
-        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
-        page = browser.new_page(
-            viewport={"width": SIZE[0], "height": SIZE[1]}, device_scale_factor=SCALE, reduced_motion="reduce"
-        )
-        page.goto(server.url)
-        page.wait_for_selector("#kinematics .numbers")
-        page.evaluate(POINTER)
-        film = Film(page)
-        film.take(PAUSE)
-        # Round the crank's circle, then pins and a pivot, whose dimensions are named beside the hand.
-        film.drag("A", [30 * cmath.exp(1j * math.radians(angle)) for angle in range(10, 101, 10)], 1)
-        film.drag("B", [66 + 66j], 8)
-        page.evaluate("document.getElementById('kinematics').scrollIntoView()")
-        film.take(PAUSE)
-        film.drag("D", [116 - 4j, 92 - 4j], 6)
-        film.times[-1] = 2 * PAUSE
-        browser.close()
-        server.close()
+def drags(page: Page) -> None:
+    """Write the film of drags at the four-bar of the README."""
+    page.evaluate(POINTER)
+    film = Film(page)
+    film.take(PAUSE)
+    # Round the crank's circle, then pins and a pivot, whose dimensions are named beside the hand.
+    film.drag("A", [30 * cmath.exp(1j * math.radians(angle)) for angle in range(10, 101, 10)], 1)
+    film.drag("B", [66 + 66j], 8)
+    page.evaluate("document.getElementById('kinematics').scrollIntoView()")
+    film.take(PAUSE)
+    film.drag("D", [116 - 4j, 92 - 4j], 6)
+    film.times[-1] = 2 * PAUSE
     # One palette for all, so that a frame holds what has changed alone.
     few = film.frames[:: len(film.frames) // 6]
     sheet = Image.new("RGB", (few[0].width, few[0].height * len(few)))
@@ -131,6 +117,36 @@ def main() -> None:
     palette = sheet.quantize(COLORS, dither=Image.Dither.NONE)
     first, *rest = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in film.frames]
     first.save(DOCS / "live.gif", save_all=True, append_images=rest, duration=film.times, loop=0, optimize=True)
+
+
+def linkages(page: Page) -> None:
+    """Write a picture of a task with its linkages side by side."""
+    page.set_viewport_size({"width": SIZE[0], "height": 820})
+    page.locator(".live-handle").nth(4).focus()
+    image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    image.quantize(COLORS, dither=Image.Dither.NONE).save(DOCS / "live_task.png", optimize=True)
+
+
+def main() -> None:
+    """Write the pictures."""
+    found = next(filter(None, map(shutil.which, BROWSERS)))
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path = Path(folder) / "study.yaml"
+        path.write_text(study_text(), encoding="utf-8")
+        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        for file, show in ((path, drags), (DOCS.parent / "configs/gallery/five_positions.yaml", linkages)):
+            server = LiveServer(session_of(mechdesign.load(file)))
+            server.start()
+            page = browser.new_page(
+                viewport={"width": SIZE[0], "height": SIZE[1]}, device_scale_factor=SCALE, reduced_motion="reduce"
+            )
+            page.goto(server.url)
+            page.wait_for_selector(".live-answer:not([aria-busy])")
+            answered(page)
+            show(page)
+            page.close()
+            server.close()
+        browser.close()
 
 
 if __name__ == "__main__":

@@ -223,8 +223,11 @@ class AlongMotion:
         pieces = self.curve.pieces
         if not len(pieces.line):
             return False
-        if not self._evaluated_names:
+        if not self._evaluated_names and any(request.part for request in self._requests):
             self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
+        elif not self._evaluated_names:
+            # Where they are followed, as they will be, they are evaluated.
+            _ = self.functions
         return self._evaluated_names >= {*names}
 
     def _ends(self, names: Collection[str]) -> dict[str, int]:

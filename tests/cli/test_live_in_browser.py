@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import urllib.request
 
 import pytest
@@ -269,6 +271,85 @@ def test_axe_finds_no_fault_in_narrow_dark_pages(live, text):
     page = live(text, viewport={"width": 390, "height": 800}, color_scheme="dark").page
     page.wait_for_selector("[aria-busy=true]", state="detached", timeout=60_000)
     assert violations(page) == []
+
+
+@pytest.mark.nightly
+def test_undo_goes_on_after_the_file_was_changed_in_an_editor_and_says_what_it_lost(live):
+    bar = live()
+    bar.drag("D", 10 * bar.scale, 0)
+    moved = bar.value("ground.D.x")
+    field = bar.page.locator("[data-name='rocker.length'] input[type=number]")
+    field.fill("66")
+    field.blur()
+    bar.answered(bar.page)
+    undo = bar.page.get_by_role("button", name="Undo")
+    edited = FOUR_BAR.replace("[O, A, 30]", "[O, A, 33]")
+    bar.path.write_text(edited)
+    bar.session.reload()
+    expect(bar.page.locator("[data-name='crank.length'] input[type=number]")).to_have_value("33")
+    assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 66)
+    undo.click()
+    assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 60)
+    undo.click()
+    assert (bar.value("ground.D.x"), bar.value("crank.length")) == (100, 33)
+    assert undo.is_disabled()
+    bar.page.get_by_role("button", name="Redo").click()
+    bar.page.get_by_role("button", name="Redo").click()
+    bar.path.write_text(edited.replace("rocker: [D, B, 60]", "arm: [D, B, 60]").replace("rocker.", "arm."))
+    bar.session.reload()
+    expect(bar.page.locator(".live-said")).to_contain_text("Undo goes on without rocker.length")
+    assert bar.value("ground.D.x") == moved
+
+
+@pytest.mark.nightly
+def test_a_cranks_pin_turns_the_crank_and_a_button_shows_the_other_assembly(live):
+    bar = live()
+    pixels = bar.scale
+    x, y = bar.middle("A")
+    bar.page.mouse.move(x, y)
+    bar.page.mouse.down()
+    for angle in range(10, 61, 10):
+        turned = math.radians(angle)
+        bar.page.mouse.move(x + 30 * pixels * (math.cos(turned) - 1), y - 30 * pixels * math.sin(turned))
+        expect(bar.page.locator(".live-hand")).to_contain_text(re.compile(rf"theta\W+=\W+{angle}\.|{angle - 1}\.[5-9]"))
+    bar.page.mouse.up()
+    bar.answered(bar.page)
+    assert bar.value("crank.length") == 30
+    bar.page.get_by_role("button", name="Other assembly").click()
+    expect(bar.page.locator(".live-said")).to_contain_text("assembly 2 of 2")
+    bar.answered(bar.page)
+    _, below = bar.middle("B")
+    _, pivot = bar.middle("D")
+    assert below > pivot
+    bar.page.get_by_role("button", name="Copy as --set").click()
+    expect(bar.page.locator(".live-said")).to_contain_text("mechanism.sketch.B.1=-40.6")
+
+
+@pytest.mark.nightly
+def test_what_is_drawn_without_numbers_says_that_arrows_wait_for_the_hand_to_rest(live):
+    bar = live()
+    bar.page.get_by_label("Velocities").check()
+    x, y = bar.middle("B")
+    bar.page.mouse.move(x, y)
+    bar.page.mouse.down()
+    bar.page.mouse.move(x - 10, y, steps=3)
+    expect(bar.page.get_by_label("Velocities")).to_be_disabled()
+    bar.page.mouse.up()
+    bar.answered(bar.page)
+    expect(bar.page.get_by_label("Velocities")).to_be_checked()
+    expect(bar.page.get_by_label("Velocities")).to_be_enabled()
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("motion", "moves"), [("reduce", False), ("no-preference", True)])
+def test_pages_move_by_themselves_only_for_who_wants_motion(live, motion, moves):
+    for text in (FOUR_BAR, TASK):
+        page = live(text, reduced_motion=motion).page
+        page.wait_for_selector("[aria-busy=true]", state="detached", timeout=60_000)
+        slider = page.get_by_role("slider", name="pose of the motion")
+        before = slider.input_value()
+        page.wait_for_timeout(600)
+        assert (slider.input_value() != before) is moves
 
 
 @pytest.mark.nightly

@@ -21,6 +21,7 @@ from mechdesign import kinematics, load
 from mechdesign.door.live.altered import altered
 from mechdesign.door.live.assembly import next_assembly
 from mechdesign.door.live.drag import TURNED, Drag, dragged
+from mechdesign.door.live.saving import overrides
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
 from mechdesign.door.live.task import session_of
@@ -168,10 +169,9 @@ def test_a_copy_keeps_comments_and_layout_and_has_the_changed_numbers(tmp_path):
     assert session.save({**asked, "name": "copy.yaml"}) == {"exists": "copy.yaml"}
     assert session.save({**asked, "name": ""}) == {"exists": "bar.yaml"}
     assert path.read_text() == FOUR_BAR
-    assert session.overrides(asked["changes"]) == [
-        "mechanism.links.ground.D.0=105.0", "mechanism.links.rocker.2=63.5",
-    ]  # fmt: skip
-    assert load(path, session.overrides(asked["changes"])).sizes == load(tmp_path / "copy.yaml").sizes
+    entries = overrides(session.study, altered(session.study, asked["changes"]))
+    assert entries == ["mechanism.links.ground.D.0=105.0", "mechanism.links.rocker.2=63.5"]
+    assert load(path, entries).sizes == load(tmp_path / "copy.yaml").sizes
 
 
 @pytest.mark.parametrize("name", ["../out.yaml", "/tmp/out.yaml", "a\\b.yaml", ".hidden.yaml", "out.txt", "a\0.yaml"])

@@ -16,6 +16,7 @@ from helpers.studies import COMMENTED_FOUR_BAR
 
 from mechdesign import load
 from mechdesign.door.live import server as serving
+from mechdesign.door.live.answers import DRAWING
 from mechdesign.door.live.asked import AskedError
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import OvertakenError, Session
@@ -102,6 +103,8 @@ def test_a_body_of_a_million_bytes_is_read_and_one_byte_more_is_not(server):
     # A million blanks are no JSON.
     assert answered(server, [POST, "Content-Length: 1000000"], b" " * 1_000_000) == 400
     assert answered(server, [POST, "Content-Length: 1000001"]) == 413
+    # Nor is a number of ten thousand digits.
+    assert answered(server, [POST, "Content-Length: 10000"], b"1" * 10_000) == 400
 
 
 def test_a_body_that_does_not_come_is_not_waited_for(server, monkeypatch):
@@ -272,3 +275,23 @@ def test_an_answer_that_a_newer_change_has_overtaken_is_dropped_and_the_page_goe
     assert session.answer({**asked, "turn": 3})["html"]
     with pytest.raises(OvertakenError):
         session.pictures({**asked, "turn": 2})
+
+
+@pytest.mark.nightly
+def test_an_answer_does_not_wait_for_pictures_that_are_being_drawn(session):
+    asked = {"page": "r", "changes": {}, "sheet": None, "question": "kinematics"}
+    session.answer({**asked, "turn": 1})
+    drawn = []
+
+    def draw():
+        with suppress(OvertakenError):
+            drawn.append(session.pictures({**asked, "turn": 1}))
+
+    with DRAWING:
+        drawing = threading.Thread(target=draw)
+        drawing.start()
+        assert session.answer({**asked, "turn": 2})["html"]
+        assert drawing.is_alive()
+    drawing.join(20)
+    # The newer change has made them worthless.
+    assert drawn == []

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from helpers import command_line
 from matplotlib.figure import Figure
+from PIL import Image
 
 import mechdesign
 from mechdesign.ground.columns import ColumnKind
@@ -357,6 +358,14 @@ def test_the_readme_begins_with_three_lines_one_command_its_verdict_and_the_link
     assert f"{judged.requirement}: met, worst {judged.worst:.6g}" in verdict
     assert judged.met
     assert (README.parent / picture).read_bytes().startswith(b"GIF89a")
+
+
+def test_the_first_picture_of_the_readme_is_the_live_page_moving_and_quickly_loaded() -> None:
+    picture = README.parent / re.findall(r"!\[[^]]*\]\((.*?)\)", README.read_text(encoding="utf-8"))[0]
+    assert picture.name == "live.gif"
+    with Image.open(picture) as film:
+        assert film.n_frames > 20
+    assert picture.stat().st_size < 600_000
 
 
 def test_code_of_the_readme_fits_its_box() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import threading
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -25,6 +26,7 @@ from mechdesign.study import Study
 
 PACKAGE = "mechdesign.door.live"
 AS_IT_WAS = "As it was"
+DRAWING = threading.Lock()  # held where Matplotlib's settings, which are those of the process, are changed
 # Questions whose answers move, those that show the motion itself before others along it.
 _MOVE = ("kinematics", "dynamics")
 _STAGED = ("motion", "paths")  # pictures in whose place the mechanism moves
@@ -72,14 +74,16 @@ class ChangedAnswer:
             failed=result.failed if result else "", warnings=[*map(str, result.warnings if result else ())],
         )  # fmt: skip
 
-    def pictures(self) -> Iterable[tuple[str, str]]:
-        """Names and HTML of its first pictures, one after the other, but those in whose place the mechanism moves."""
-        if self.result is None:
-            return
-        with style.context():
-            gallery = figures(self.study, self.result)
-            for name in [name for name in gallery if name not in _STAGED][:_MOST_PICTURES]:
-                yield name, picture_of(self.question, name, gallery[name])
+    def pictures(self, look: Callable[[], None]) -> dict[str, str]:
+        """HTML of its first pictures but those in whose place it moves, by names; `look` is called before each."""
+        drawn = dict[str, str]()
+        if self.result is not None:
+            with DRAWING, style.context():
+                gallery = figures(self.study, self.result)
+                for name in [name for name in gallery if name not in _STAGED][:_MOST_PICTURES]:
+                    look()
+                    drawn[name] = picture_of(self.question, name, gallery[name])
+        return drawn
 
 
 def staged(parts: Mapping[str, dict[str, Any]]) -> dict[str, Any] | None:

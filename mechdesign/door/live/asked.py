@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,17 @@ _WIDEST = 1e5  # size of a sheet, and of a mechanism on it, in units of the draw
 
 class AskedError(Exception):
     """A request that no page makes."""
+
+
+def asked_in(body: bytes) -> dict[str, Any]:
+    """What a page asks, by the text of its request."""
+    try:
+        asked = json.loads(body)
+    except (ValueError, RecursionError):
+        asked = None
+    if not isinstance(asked, dict):
+        raise AskedError
+    return asked
 
 
 def changes_of(asked: Mapping[str, Any]) -> dict[str, float]:

@@ -12,13 +12,15 @@ import secrets
 import socket
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from hmac import compare_digest
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from mechdesign.door.live.asked import AskedError
+from mechdesign.door.live.asked import AskedError, asked_in
 from mechdesign.door.live.session import OvertakenError, Session
 from mechdesign.ground.errors import explain
 
@@ -36,6 +38,10 @@ _HEADERS = {
 }  # fmt: skip
 
 
+class _RefusedError(Exception):
+    """A request that is answered by a status alone."""
+
+
 class LiveServer(ThreadingHTTPServer):
     """Serves the pages of a session on a port of 127.0.0.1, a free one where it is 0.
 
@@ -48,7 +54,7 @@ class LiveServer(ThreadingHTTPServer):
 
     def __init__(self, session: Session, port: int = 0, *, framed: bool = False) -> None:
         self.session, self.token, self.framed = session, secrets.token_urlsafe(16), framed
-        self.waiting: dict[str, int] = {}  # requests by which open pages wait for a change of the file
+        self.waiting: list[str] = []  # open pages, once for each request by which they wait for a change of the file
         self.connections: set[socket.socket] = set()
         self.computing = 0  # requests that are answered just now
         self.lock = threading.Condition()
@@ -75,7 +81,7 @@ class LiveServer(ThreadingHTTPServer):
         self.shutdown()
         self.server_close()
         with self.lock:
-            count, open_ones = len(self.waiting), [*self.connections]
+            count, open_ones = len({*self.waiting}), [*self.connections]
             self.lock.wait_for(lambda: not self.computing, _END)
         for connection in open_ones:
             with suppress(OSError):
@@ -123,27 +129,12 @@ class _Handler(BaseHTTPRequestHandler):
     def __getattr__(self, name: str) -> Any:
         # Methods that are none of these two.
         if name.startswith("do_"):
-            return self._other_method
+            return partial(self._refuse, HTTPStatus.METHOD_NOT_ALLOWED)
         raise AttributeError(name)
 
     def do_GET(self) -> None:
         """The page, or what a page waits for."""
-        if (admitted := self._admitted()) is None:
-            return
-        session, words = admitted
-        if words == [""]:
-            try:
-                page = session.page()
-            except Exception as error:
-                self._send(HTTPStatus.OK, f"{explain(error)[1]}\n".encode(), "text/plain; charset=utf-8")
-                return
-            self._send(HTTPStatus.OK, page, "text/html; charset=utf-8")
-        elif len(words) == 3 and words[0] == "changes" and words[1].isdigit():
-            self._wait(session, int(words[1][:9]), words[2][:40])
-        elif len(words) == 2 and words[0] == "progress":
-            self._reply({"progress": session.progress(words[1])})
-        else:
-            self._refuse(HTTPStatus.NOT_FOUND)
+        self._serve(self._got)
 
     def do_POST(self) -> None:
         """What a page asks, as JSON."""
@@ -151,41 +142,51 @@ class _Handler(BaseHTTPRequestHandler):
         with server.lock:
             server.computing += 1
         try:
-            self._do_post()
+            self._serve(self._posted)
         finally:
             with server.lock:
                 server.computing -= 1
                 server.lock.notify_all()
 
-    def _do_post(self) -> None:
-        if (admitted := self._admitted()) is None or (body := self._body()) is None:
-            return
-        session, words = admitted
-        actions = session.actions
+    def _serve(self, answer: Callable[[Session, list[str]], None]) -> None:
+        """Answer a page of ours behind the token by the words of its address; refuse others."""
+        try:
+            answer(*self._admitted())
+        except _RefusedError as refusal:
+            self._refuse(refusal.args[0])
+
+    def _got(self, session: Session, words: list[str]) -> None:
+        if words == [""]:
+            try:
+                page, kind = session.page(), "text/html; charset=utf-8"
+            except Exception as error:
+                page, kind = f"{explain(error)[1]}\n".encode(), "text/plain; charset=utf-8"
+            self._send(HTTPStatus.OK, page, kind)
+        elif len(words) == 3 and words[0] == "changes" and words[1].isdigit():
+            self._wait(session, int(words[1][:9]), words[2][:40])
+        elif len(words) == 2 and words[0] == "progress":
+            self._reply({"progress": session.progress(words[1])})
+        else:
+            raise _RefusedError(HTTPStatus.NOT_FOUND)
+
+    def _posted(self, session: Session, words: list[str]) -> None:
+        body, actions = self._body(), session.actions
         if len(words) != 1 or words[0] not in actions:
-            self._refuse(HTTPStatus.NOT_FOUND)
-            return
+            raise _RefusedError(HTTPStatus.NOT_FOUND)
         try:
-            asked = json.loads(body)
-        except (ValueError, RecursionError):
-            asked = None
-        if not isinstance(asked, dict):
-            self._refuse(HTTPStatus.BAD_REQUEST)
-            return
-        try:
+            asked = asked_in(body)
             # A page of an older version of the file asks for names that there may not be.
             answer = actions[words[0]](asked) if asked.get("version") == session.version else {"outdated": True}
         except OvertakenError:
             answer = {"overtaken": True}
         except AskedError:
-            self._refuse(HTTPStatus.BAD_REQUEST)
-            return
+            raise _RefusedError(HTTPStatus.BAD_REQUEST) from None
         except Exception as error:
             answer = {"wrong": explain(error)[1]}
         self._reply(answer)
 
-    def _admitted(self) -> tuple[Session, list[str]] | None:
-        """Whose page asks, and the address behind the token, in words; None of a request that was refused."""
+    def _admitted(self) -> tuple[Session, list[str]]:
+        """Whose page asks, and the address behind the token, in words."""
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
         foreign = origin is not None and origin not in [f"http://{host}" for host in hosts]
@@ -193,63 +194,44 @@ class _Handler(BaseHTTPRequestHandler):
         arrives = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"
         foreign |= not arrives and self.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none")
         if self.headers.get_all("Host", []) not in ([hosts[0]], [hosts[1]]):
-            self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
-        elif foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
-            self._refuse(HTTPStatus.FORBIDDEN)
-        else:
-            session, words = self.server.session, rest.split("/")
-            if words[0] == "linkage" and len(words) > 2 and words[1] in session.linkages:
-                session, words = session.linkages[words[1]], words[2:]
-            return session, words
-        return None
+            raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST)
+        if foreign or not compare_digest(token.encode(errors="replace"), self.server.token.encode()):
+            raise _RefusedError(HTTPStatus.FORBIDDEN)
+        session, words = self.server.session, rest.split("/")
+        if words[0] == "linkage" and len(words) > 2 and words[1] in session.linkages:
+            return session.linkages[words[1]], words[2:]
+        return session, words
 
-    def _body(self) -> bytes | None:
-        """The text of a request; None of one that was refused."""
+    def _body(self) -> bytes:
+        """The text of a request."""
         lengths = self.headers.get_all("Content-Length", [])
         if not lengths or "Transfer-Encoding" in self.headers:
-            self._refuse(HTTPStatus.LENGTH_REQUIRED)
-        elif len(lengths) > 1 or not (lengths[0].isascii() and lengths[0].isdigit()):
-            self._refuse(HTTPStatus.BAD_REQUEST)
-        elif len(lengths[0]) > 9 or int(lengths[0]) > _MOST_BYTES:
-            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-        else:
-            return self._read(int(lengths[0]))
-        return None
-
-    def _read(self, count: int) -> bytes | None:
-        """So many bytes; None where they did not come, or not in time."""
-        body, end = b"", time.monotonic() + _SLOW
-        while len(body) < count and (left := end - time.monotonic()) > 0:
-            self.connection.settimeout(left)
-            part = b""
-            with suppress(TimeoutError):
-                part = self.rfile.read1(count - len(body))
-            if not part:
-                break
-            body += part
+            raise _RefusedError(HTTPStatus.LENGTH_REQUIRED)
+        if len(lengths) > 1 or not (lengths[0].isascii() and lengths[0].isdigit()):
+            raise _RefusedError(HTTPStatus.BAD_REQUEST)
+        if len(lengths[0]) > 9 or int(lengths[0]) > _MOST_BYTES:
+            raise _RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        body, count, end = b"", int(lengths[0]), time.monotonic() + _SLOW
+        with suppress(TimeoutError):
+            while len(body) < count:
+                self.connection.settimeout(max(end - time.monotonic(), 1e-3))
+                if not (part := self.rfile.read1(count - len(body))):
+                    break
+                body += part
         self.connection.settimeout(_IDLE)
-        if len(body) == count:
-            return body
-        self._refuse(HTTPStatus.REQUEST_TIMEOUT)
-        return None
+        if len(body) < count:
+            raise _RefusedError(HTTPStatus.REQUEST_TIMEOUT)
+        return body
 
     def _wait(self, session: Session, version: int, page: str) -> None:
         """Answer when the file has changed, or after a while."""
-        server = self.server
-        with server.lock:
-            server.waiting[page] = server.waiting.get(page, 0) + 1
+        self.server.waiting.append(page)
         try:
             with session.changed:
                 session.changed.wait_for(lambda: session.version != version, _WAIT)
             self._reply({"version": session.version, "mistake": session.mistake})
         finally:
-            with server.lock:
-                server.waiting[page] -= 1
-                if not server.waiting[page]:
-                    del server.waiting[page]
-
-    def _other_method(self) -> None:
-        self._refuse(HTTPStatus.METHOD_NOT_ALLOWED)
+            self.server.waiting.remove(page)
 
     def _refuse(self, status: HTTPStatus) -> None:
         """Say no, and end the connection: what else it holds was not read."""

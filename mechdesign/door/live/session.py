@@ -64,7 +64,6 @@ class _Watched(Progress):
 
     def __init__(self, page: _OpenPage, overtaken: Callable[[], bool]) -> None:
         self._page, self._overtaken, self._stage, self._done, self._total = page, overtaken, "", 0, 0
-        self.look()
 
     def start(self, total: int, stage: str) -> None:
         """Begin a stage."""
@@ -74,7 +73,8 @@ class _Watched(Progress):
     def update(self, n: int) -> None:
         """Go on, unless it was overtaken."""
         self._done += n
-        self._page.progress = f"{self._stage} {100 * self._done // max(self._total, 1)} %"
+        share = f" {100 * self._done // self._total} %" if self._total > 1 else ""
+        self._page.progress = f"{self._stage}{share}"
         self.look()
 
     def look(self) -> None:
@@ -230,13 +230,14 @@ class Session:
         if not 0 < count <= _MOST_ROWS:
             raise AskedError
         now = altered(study, changes)
+        own = now if study is self.study else altered(self.study, self._own(changes))
         drawing, tracks = posed(now, steps(str(asked.get("rows")), count) / ROWS, sheet, study)
-        told = [name for name in names if name != TURNED]
+        told, entries = [name for name in names if name != TURNED], saving.overrides(self.study, own)
         if any(map(is_entry, changes)):
             # What is measured in the sketch changes with it, and none of it in silence.
             told += [name for name in now.parameters.measured if not math.isclose(now.sizes[name], study.sizes[name])]
         return {"changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
-                "set": self.overrides(changes), "words": [self._in_words(now, name) for name in told]}  # fmt: skip
+                "set": entries, "words": [self._in_words(now, name) for name in told]}  # fmt: skip
 
     @np.errstate(all="ignore")
     def assembly(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -281,7 +282,7 @@ class Session:
             html = answer.html(stage)
             self._seconds[question] = time.perf_counter() - begin
         moved = _drawn(stage) if part and stage else {}
-        return {"set": self.overrides(changes), "html": html, "order": self._quickest(), **moved}
+        return {"set": saving.overrides(self.study, answer.study), "html": html, "order": self._quickest(), **moved}
 
     def _ask(self, question: str, changes: Mapping[str, float], progress: Progress) -> ChangedAnswer:
         """What the study with changed numbers answers, and how the study that is shown moves with them."""
@@ -295,13 +296,19 @@ class Session:
         assert motion is not None
         return ChangedAnswer(question, study, result, moves, motion)
 
+    def _turn(self, asked: Mapping[str, Any]) -> tuple[_OpenPage, _Watched]:
+        """The page that asks, and what ends its computation when it has asked something newer."""
+        page, turn = self._page(asked)
+        return page, _Watched(page, lambda: self.ended or page.turn != turn)
+
     @contextmanager
     def _watched(self, asked: Mapping[str, Any]) -> Iterator[tuple[_OpenPage, _Watched]]:
-        """The turn of a computation for a page, which ends when the page has asked something newer."""
-        page, turn = self._page(asked)
+        """The same, alone among all computations but those of pictures."""
+        page, progress = self._turn(asked)
         with self._computing:
             try:
-                yield page, _Watched(page, lambda: self.ended or page.turn != turn)
+                progress.look()
+                yield page, progress
             finally:
                 page.progress = ""
 
@@ -314,20 +321,14 @@ class Session:
         OvertakenError
             If the page has asked something newer.
         """
-        with self._watched(asked) as (page, progress):
-            answer = page.answers.get(str(asked.get("question")))
-            if answer is None:
-                raise OvertakenError
-            drawn = dict[str, str]()
-            for name, picture in answer.pictures():
-                drawn[name] = picture
-                progress.look()
+        page, progress = self._turn(asked)
+        progress.look()
+        answer = page.answers.get(str(asked.get("question")))
+        if answer is None:
+            raise OvertakenError
+        drawn = answer.pictures(progress.look)
         html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
         return {"html": html, "dark": dark(drawn.values())}
-
-    def overrides(self, changes: Mapping[str, float]) -> list[str]:
-        """Changes as `--set` takes them, by the entries of the study."""
-        return saving.overrides(self.study, altered(self.study, self._own(changes)))
 
     @np.errstate(all="ignore")
     def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:

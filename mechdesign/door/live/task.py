@@ -13,10 +13,10 @@ import numpy as np
 
 from mechdesign.commands import COMMANDS
 from mechdesign.door.live.altered import TASK, altered
-from mechdesign.door.live.answers import PACKAGE
+from mechdesign.door.live.answers import DRAWING, PACKAGE
 from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
-from mechdesign.door.live.saving import file_names
+from mechdesign.door.live.saving import file_names, overrides
 from mechdesign.door.live.session import Session
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.linkage import Canvas
@@ -110,18 +110,18 @@ class TaskSession(Session):
                     raise
                 result = error.result
             progress.look()
-            with style.context("paper"):
+            with DRAWING, style.context("paper"):
                 part = solutions(study, result, f"{_QUESTION}-trade")
         key = str(next(self._counter))
         self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
         whole: dict[str, Any] | None = None
         if part is not None:
-            count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} are drawn."
+            count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
             whole = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
         content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
         return {
-            "set": self.overrides(changes), "search": key, "dark": dark(drawn),
+            "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
             "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -56,7 +56,7 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     random = np.random.default_rng(seed)
     task = task_of(study, section)
     conditions = Conditions(section, task.centre, task.size, task.factor)
-    pools = [*task.pools(random, conditions)]
+    pools = [*_pools(task, random, conditions, progress)]
     solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
     told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
     if section.judge is not None:
@@ -73,6 +73,15 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     result = _answer(study, task, solutions[: section.solutions], scores, told)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(result.main)}
     return replace(result, counts=counts)
+
+
+def _pools(task: Task, random: np.random.Generator, conditions: Conditions, progress: Progress) -> Iterator[Pool]:
+    """Linkages of every kind and assembly, one after the other; between two a search may be ended."""
+    progress.start(1, "linkages looked for")
+    for pool in task.pools(random, conditions):
+        progress.update(0)
+        yield pool
+    progress.update(1)
 
 
 def _answer(

@@ -8,7 +8,26 @@
     const about = JSON.parse(document.getElementById("live-data").textContent);
     const state = document.querySelector(".live-state"), room = document.querySelector(".live-answer"), stage = document.querySelector(".live-stage");
     const own = openHand(about, () => { place(); soon(); });
+    const alone = document.querySelector(".live-alone"), button = document.querySelector("[data-do=alone]");
     let turn = 0, timer = 0, asking = null, search = "", drawing = stage.querySelector("svg"), at = about.sheet, rings = [];
+
+    // The task alone, where its points lie close together beside a linkage.
+    button?.addEventListener("click", () => {
+      alone.hidden = !alone.hidden;
+      stage.hidden = !alone.hidden;
+      button.setAttribute("aria-pressed", stage.hidden);
+      look();
+    });
+
+    // Rings stand in the drawing that is seen.
+    function look() {
+      const {moving} = stage.querySelector("figure") || {};
+      if (moving && stage.hidden) moving.stop();
+      for (const ring of document.querySelectorAll(".live-rings")) ring.remove();
+      drawing = stage.hidden ? alone.querySelector("svg") : moving ? moving.drawing : stage.querySelector("svg");
+      at = stage.hidden || !moving ? about.sheet : moving.sheet();
+      handle();
+    }
 
     // The search runs when the hand rests; an older one is dropped.
     function soon() {
@@ -47,10 +66,8 @@
       const figure = stage.querySelector("figure");
       figure.dispatchEvent(new Event("moving-new", {bubbles: true}));
       if (still) figure.moving.stop();
-      drawing = figure.moving.drawing;
-      figure.addEventListener("moving-chosen", () => { at = figure.moving.sheet(); place(); });
-      at = figure.moving.sheet();
-      handle();
+      figure.addEventListener("moving-chosen", () => { if (!stage.hidden) { at = figure.moving.sheet(); place(); } });
+      look();
     }
 
     // A click takes a linkage over, before the report's own click enlarges it.
@@ -68,6 +85,7 @@
     function handle() {
       if (!drawing) return;
       const parent = document.createElementNS("http://www.w3.org/2000/svg", "g");
+      parent.setAttribute("class", "live-rings");
       drawing.setAttribute("role", "group");
       drawing.append(parent);
       rings = about.handles.flatMap(({label, names}) => {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import tostring
@@ -115,7 +115,8 @@ def moving(
         if (case := _best_case(result.drawn, result.main)) is None:
             return None
         title, study, result = case
-    with style.context():
+    # A motion without curves is drawn by nobody else's settings.
+    with nullcontext() if handled else style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.followed:
             part = _motion(
                 study, result, result.drawn, f"{command}-curves", before, marked, sheet, plain=plain, handled=handled
