@@ -38,34 +38,9 @@ def test_the_whole_cycle_by_5_degrees() -> None:
     assert result().counts == {"poses": 73, "samples": 73 * 40_000, "invalid": 0}
 
 
-@pytest.mark.parametrize("angle", REFERENCE)
-@pytest.mark.parametrize("k", range(3))
-def test_nominal_and_first_order(angle: int, k: int) -> None:
-    nominal, sigma = REFERENCE[angle]
-    row = angle // 5
-    assert column(ORDERS[k], "analytic", "nominal")[row] == pytest.approx(nominal[k], rel=1e-6)
-    assert column(ORDERS[k], "analytic", "mean")[row] == pytest.approx(nominal[k], rel=1e-6)
-    assert column(ORDERS[k], "analytic", "sigma")[row] == pytest.approx(sigma[k], rel=1e-6)
-
-
 def difference(order: str) -> np.ndarray:
     """Per cent, of the simulation (Fig. 7)."""
     return 100 * (column(order, "analytic", "sigma") / column(order, "monte_carlo", "sigma") - 1)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_methods_differ_by_less_than_half_a_per_cent_on_average(order: str) -> None:
-    assert np.abs(difference(order)).mean() < 0.5
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_printed_maximum_of_3_05_per_cent_is_not_reached(order: str) -> None:
-    """The paper's largest difference (velocity) does not reproduce under any consistent reading of it.
-
-    Without noise it is 0.42 %. A standard deviation from 40,000 samples errs by 0.35 %, so that the largest of 73 is
-    near 1 %, and 2 % would be more than four standard errors beyond 0.42 %.
-    """
-    assert np.abs(difference(order)).max() < 2.0
 
 
 @pytest.mark.parametrize("order", ORDERS)
