@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize
 from scipy.special import ellipk, ndtr, ndtri
 
+from helpers.circles import common_area
 from helpers.gallery import meet
 
 
@@ -259,3 +260,40 @@ def cheapest_tolerances():
     found = [minimize(cost, start, method="SLSQP", bounds=[(1e-3, 1)] * 3,
                       constraints={"type": "ineq", "fun": lambda t: room(t) / level**2}) for start in starts]  # fmt: skip
     return min((each for each in found if each.success), key=lambda each: each.fun).x
+
+
+def arm_condition(l1: float, l2: float, q2):
+    """Inverse condition of two links, from trace and determinant of J^T J in the frame of the first."""
+    trace, determinant = 2 * l1 * l2 * np.cos(q2) + l1**2 + 2 * l2**2, l1 * l2 * np.abs(np.sin(q2))
+    half = trace / (2 * np.maximum(determinant, 1e-300))
+    return half - np.sqrt(np.maximum(half**2 - 1, 0))
+
+
+def arm_mean(l1: float, l2: float) -> float:
+    """Its mean over the annulus."""
+    return quad(lambda q2: arm_condition(l1, l2, q2) * np.sin(q2), 0, np.pi, epsabs=1e-12)[0] / 2
+
+
+def platform_areas(low: float, high: float, degrees):
+    """Areas that a platform of three corners reaches at angles, with legs between two lengths."""
+    bases, corners = (0, 1, 0.5 + 0.9j), (-0.15 - 0.1j, 0.15 - 0.1j, 0.2j)
+    turns = np.exp(1j * np.radians(degrees))
+    return [common_area([(complex(base - turn * corner), low, high) for base, corner in zip(bases, corners, strict=True)])
+            for turn in turns]  # fmt: skip
+
+
+def gallery_platform_areas(degrees):
+    """The same of the gallery's 3-RRR platform."""
+    corners = np.exp(1j * np.radians([210, -30, 90]))
+    return [common_area([(complex(250 * corner - 60 * turn * corner), 40.0, 280.0) for corner in corners])
+            for turn in np.exp(1j * np.radians(degrees))]  # fmt: skip
+
+
+def counted_area(centres, low: float, high: float) -> float:
+    """Area of the common part of annuli, by points on a grid of 1 mm."""
+    x, y = np.meshgrid(np.arange(-0.8, 0.8, 1e-3) + 5e-4, np.arange(-0.7, 0.7, 1e-3) + 5e-4)
+    inside = np.ones(x.shape, dtype=bool)
+    for centre in centres:
+        distance = np.hypot(x - centre, y)
+        inside &= (distance >= low) & (distance <= high)
+    return float(inside.sum() * 1e-6)
