@@ -16,7 +16,7 @@ import mechdesign
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 # The page of papers is made from its data.
-PAGES = sorted(path for path in (DOCS / "theory").glob("*.md") if path.name != "papers.md")
+PAGES = sorted(path for path in (DOCS / "theory").glob("*.md") if path.name[0] != "_" and path.name != "papers.md")
 NAME = re.compile(r"`(tests/[\w/]+\.py)::(\w+)`")
 CASE = re.compile(r"\]\(\.\./verification/(\w+)\.md\)")
 

@@ -257,9 +257,9 @@ def cheapest_tolerances():
         return float(np.sum([1.0, 2.0, 5.0] / tolerances))
 
     starts = np.random.default_rng(1).uniform(0.02, 0.1, (20, 3))
-    found = [minimize(cost, start, method="SLSQP", bounds=[(1e-3, 1)] * 3,
-                      constraints={"type": "ineq", "fun": lambda t: room(t) / level**2}) for start in starts]  # fmt: skip
-    return min((each for each in found if each.success), key=lambda each: each.fun).x
+    safe = {"type": "ineq", "fun": lambda tolerances: room(tolerances) / level**2}
+    ends = [minimize(cost, start, method="SLSQP", bounds=[(1e-3, 1)] * 3, constraints=safe) for start in starts]
+    return min((end for end in ends if end.success), key=lambda end: end.fun).x
 
 
 def arm_condition(l1: float, l2: float, q2):
@@ -276,10 +276,9 @@ def arm_mean(l1: float, l2: float) -> float:
 
 def platform_areas(low: float, high: float, degrees):
     """Areas that a platform of three corners reaches at angles, with legs between two lengths."""
-    bases, corners = (0, 1, 0.5 + 0.9j), (-0.15 - 0.1j, 0.15 - 0.1j, 0.2j)
-    turns = np.exp(1j * np.radians(degrees))
-    return [common_area([(complex(base - turn * corner), low, high) for base, corner in zip(bases, corners, strict=True)])
-            for turn in turns]  # fmt: skip
+    bases, corners = np.array([0, 1, 0.5 + 0.9j]), np.array([-0.15 - 0.1j, 0.15 - 0.1j, 0.2j])
+    return [common_area([(complex(centre), low, high) for centre in bases - turn * corners])
+            for turn in np.exp(1j * np.radians(degrees))]  # fmt: skip
 
 
 def gallery_platform_areas(degrees):
@@ -297,3 +296,18 @@ def counted_area(centres, low: float, high: float) -> float:
         distance = np.hypot(x - centre, y)
         inside &= (distance >= low) & (distance <= high)
     return float(inside.sum() * 1e-6)
+
+
+def best_conditions(first, second: float):
+    """Largest inverse condition over the elbow's angle, of arms."""
+    q2 = np.linspace(0.01, np.pi - 0.01, 20001)
+    return np.array([arm_condition(l1, second, q2).max() for l1 in first])
+
+
+def hoeken_errors(first, third):
+    """Largest deviation from the line over half a turn of Hoeken's linkages with a crank of 1, each 0.01 deg."""
+    pin, errors = np.exp(1j * np.radians(np.linspace(90, 270, 18001))), []
+    for l1, l3 in zip(first, third, strict=True):
+        path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
+        errors.append(np.abs(path.imag - np.sqrt(4 * l3**2 - (l1 + 1) ** 2)).max())
+    return np.array(errors)

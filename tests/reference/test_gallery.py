@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers.gallery import meet, point, result_of, row, study_named, unit
 
-import mechdesign
 from mechdesign.mechanism.wheels import meshes
 from mechdesign.questions.dynamics.analysis import dynamics
 
@@ -58,15 +57,6 @@ def test_arm_with_a_flat_face_is_pushed_square_to_it() -> None:
     turn, a = np.radians(cam["cam"]), np.radians(cam["arm.angle"])
     h = 80 * np.sin(a) + 30 * np.cos(a)
     assert ((cam["x"] + 1j * cam["y"]) * np.exp(1j * (turn - a))).imag == pytest.approx(h, rel=1e-12)
-
-
-def test_backlash_of_a_belt_moves_the_scara_across_its_forearm() -> None:
-    """The variances of x and y by it add up to (l2 b)^2/12 at every pose."""
-    study = study_named("belt_scara", "reliability.methods=analytic", "reliability.sobol=0")
-    linear = mechdesign.reliability(study).tables["contributions"]
-    own = linear["source"] == "elbow"
-    sigma = linear["derivative"][own] * 0.06 / np.sqrt(12)
-    assert np.hypot(sigma[::2], sigma[1::2]) == pytest.approx(np.full(3, 150 * np.radians(0.06) / np.sqrt(12)))
 
 
 def test_rrr_platform_ends_at_a_singularity() -> None:

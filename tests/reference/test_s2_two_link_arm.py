@@ -27,22 +27,11 @@ ANALYTIC = {
         (0.0232, 0.0312, 0.250, 0.865),
     ),
 }
-SIMULATED = {
-    "two_link_arm": ((0.0172, 0.0171, 0.294, 0.993), (0.0171, 0.0171, 0.347, 0.993), (0.0148, 0.0191, 0.211, 0.991)),
-    "two_link_arm_uniform": (
-        (0.0275, 0.0275, 0.347, 0.874),
-        (0.0276, 0.0275, 0.405, 0.871),
-        (0.0233, 0.0314, 0.264, 0.866),
-    ),
-}
-ROUNDING = (5e-5, 5e-5, 5e-4, 5e-4)
 # Table 1 case 1 and Table 2 case 1: sigma, rho, R to the first order, and the true R of the sampling model.
 EXACT = {
     "two_link_arm": (0.01739164, 0.28631860, 0.99200038, 0.99346125),
     "two_link_arm_uniform": (0.02748737, 0.34386303, 0.87149795, 0.87150401),
 }
-# Variance of the drawn lengths (cm^2) and of the drawn pins per unit of the radial clearance.
-DRAWN = {"two_link_arm": (0.01**2, 0.1054942148), "two_link_arm_uniform": (0.03**2 / 3, 0.25)}
 
 studies = pytest.mark.parametrize("name", ANALYTIC)
 cases = pytest.mark.parametrize("case", range(3))

@@ -13,12 +13,6 @@ from mechdesign.ground.results import Result
 
 STUDY = Path(__file__).parents[2] / "configs" / "toggle.yaml"
 ORDERS = ("position", "velocity", "acceleration")
-# Crank angle: nominal and first-order standard deviation of position, velocity and acceleration (cm, s).
-REFERENCE = {
-    0: ((70.3625914216, -0.1977441, 22.3090400), (0.24612856, 0.08994327, 0.60441205)),
-    90: ((70.9917550, 0.7907957, -36.7035840), (0.24239285, 0.17028405, 1.08981792)),
-    180: ((70.1253224, -0.3151511, 54.8069474), (0.24517514, 0.10252653, 1.92518110)),
-}
 
 
 @cache
@@ -36,11 +30,6 @@ def test_the_whole_cycle_by_5_degrees() -> None:
     table = result().tables["moments"]
     assert np.unique(table["theta2"]) == pytest.approx(np.arange(0, 361, 5))
     assert result().counts == {"poses": 73, "samples": 73 * 40_000, "invalid": 0}
-
-
-def difference(order: str) -> np.ndarray:
-    """Per cent, of the simulation (Fig. 7)."""
-    return 100 * (column(order, "analytic", "sigma") / column(order, "monte_carlo", "sigma") - 1)
 
 
 @pytest.mark.parametrize("order", ORDERS)

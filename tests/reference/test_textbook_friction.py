@@ -19,32 +19,6 @@ def kinds(result: Result) -> list[str]:
     return [warning.kind for warning in result.warnings]
 
 
-# A cylinder pulls the upright arm of a bell crank to the left and lifts the weight on its other arm.
-BELL_CRANK = """
-mechanism:
-  parameters: {a: 60, b: 40, mu: 0.25, r: 8}
-  links:
-    ground: {C: [-100, b], O: [0, 0]}
-    bell: {O: [0, 0], A: [0, b], B: [a, 0]}
-    cylinder: {from: C, to: A, telescopic: true}
-  drives: {pull: {length: cylinder}}
-  sketch: {A: [0, b], B: [a, 0]}
-  friction: {O: {coefficient: mu, radius: r}}
-dynamics:
-  poses: [{pull: 100}]
-  rates: {pull: -10}
-  loads: [{at: B, force: [0, -100]}]
-"""
-
-
-def friction_circle(sign: float) -> float:
-    """Pull of the cylinder: moments about the pivot, whose joint force touches the circle of radius mu r."""
-    a, b, circle, weight = 60.0, 40.0, 0.25 * 8, 100.0
-    # (Q b - W a)^2 = circle^2 (Q^2 + W^2)
-    roots = np.roots([b**2 - circle**2, -2 * a * b * weight, weight**2 * (a**2 - circle**2)])
-    return float(roots.max() if sign > 0 else roots.min())
-
-
 # A screw's thread unwound: a wedge of the slope alpha is pushed below a ram that bears the load.
 WEDGE = """
 mechanism:
@@ -72,19 +46,6 @@ def test_a_wedge_jams_where_its_slope_and_the_angle_of_friction_make_a_right_ang
     assert "undefined" not in [w.kind for w in above.warnings if "expression" in w.message]
     assert np.isnan(above.main["push_effort"]).all()
     assert any("friction in face jams" in w.message for w in above.warnings)
-
-
-INCLINE = """
-mechanism:
-  parameters: {beta: 25}
-  links: {ground: {O: [0, 0]}, block: {B: [0, 0], C: [10, 0]}}
-  joints: {plane: {prismatic: [ground, block], direction: beta, point: B}}
-  drives: {way: {slide: plane}}
-  friction: {plane: {coefficient: 0.3}}
-kinematics:
-  sweep: {way: {from: 0, to: 20, step: 10}}
-  loads: [{at: B, force: [0, -100]}]
-"""
 
 
 # A cylinder pushes a slider beside its guide.
