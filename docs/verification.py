@@ -95,7 +95,8 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
     every = [cases()[name] for name in ran]
     counts = Counter((case.question, case.evidence) for case in every)
     lines = []
-    for question in QUESTIONS:
+    questions = [question for question in QUESTIONS if any(case.question == question for case in every)]
+    for question in questions:
         numbers = [counts[question, evidence] for evidence in EVIDENCE]
         lines.append([f"[{question}](#{question})", *map(str, numbers), str(sum(numbers))])
     totals = [sum(case.evidence == evidence for case in every) for evidence in EVIDENCE]
@@ -116,7 +117,7 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
         "The difference of a case is its largest, as a part of the largest number compared. Of printed numbers it is "
         "mostly that of their rounding. Intervals of samples, limits and misprints have none.",
     ]
-    for question in QUESTIONS:
+    for question in questions:
         lines = []
         for case in (case for case in every if case.question == question):
             rows = ran[case.name]
