@@ -11,6 +11,7 @@ import gallery
 import lists
 import papers
 import path_problems
+import verification
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.typing import ExtensionMetadata
@@ -18,7 +19,7 @@ from steps import step
 
 ROOT = Path(__file__).parent
 # What makes pages: functions that give their texts by their paths.
-MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages, path_problems.pages)
+MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages, path_problems.pages, verification.pages)
 # Reports that pages show, by their names in the folder `_static`: what an example has written.
 REPORTS = {"first_four_bar.html": "tutorials/first_four_bar/results/study/kinematics/report.html"}
 

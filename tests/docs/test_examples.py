@@ -12,7 +12,7 @@ from forking import forked
 
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s.][^)#\s]*|\.\.?/[^)#\s]+)(?:#[^)]*)?\)")
 # Pages and pictures that are made while the site is built.
-MADE = {"gallery", "study", "tables", "lists", "papers.md", "_run"}
+MADE = {"gallery", "verification", "study", "tables", "lists", "papers.md", "_run"}
 
 
 @pytest.fixture(scope="session")

@@ -16,10 +16,12 @@ import mechdesign
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 # The page of papers is made from its data.
-PAGES = sorted(path for path in (DOCS / "theory").glob("*.md") if path.name != "papers.md")
+PAGES = sorted(path for path in (DOCS / "theory").glob("*.md") if path.name[0] != "_" and path.name != "papers.md")
 NAME = re.compile(r"`(tests/[\w/]+\.py)::(\w+)`")
+CASE = re.compile(r"\]\(\.\./verification/(\w+)\.md\)")
 
 sys.path.insert(0, str(DOCS))
+import cases  # noqa: E402
 import papers  # noqa: E402
 
 
@@ -30,14 +32,17 @@ def functions_of(file: str) -> set[str]:
 
 
 def missing(text: str) -> list[str]:
-    return [f"{file}::{name}" for file, name in NAME.findall(text)
+    lost = [f"{file}::{name}" for file, name in NAME.findall(text)
             if not (ROOT / file).exists() or name not in functions_of(file)]  # fmt: skip
+    return lost + [name for name in CASE.findall(text) if name not in cases.cases() and name != "index"]
 
 
 def unchecked(text: str) -> list[str]:
-    """Headings of the sections with an equation that name no test."""
+    """Headings of the sections with an equation that name neither a test nor a case of the verification manual."""
     sections = re.split(r"(?m)^#{1,6} ", text)
-    return [part.partition("\n")[0] for part in sections if "$$" in part and not NAME.search(part)]
+    return [
+        part.partition("\n")[0] for part in sections if "$$" in part and not (NAME.search(part) or CASE.search(part))
+    ]
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
@@ -49,8 +54,9 @@ def test_every_equation_names_a_test_that_exists(path: Path) -> None:
 
 def test_what_is_missing_is_found() -> None:
     text = "# A\n$$x$$\n`tests/docs/test_theory.py::test_no_such_thing`\n## B\n$$y$$\n## C\nwords\n"
+    text += "## D\n$$z$$\n[a case](../verification/no_such_case.md)\n"
     assert unchecked(text) == ["B"]
-    assert missing(text) == ["tests/docs/test_theory.py::test_no_such_thing"]
+    assert missing(text) == ["tests/docs/test_theory.py::test_no_such_thing", "no_such_case"]
 
 
 def cited(text: str) -> set[tuple[str, str]]:
@@ -79,22 +85,6 @@ def test_papers_page_is_made_and_names_tests_that_exist() -> None:
     assert len(NAME.findall(text)) == sum(
         len(paper["tests"]) for paper in yaml.safe_load(papers.DATA.read_text()).values()
     )
-
-
-def test_a_difference_without_a_reason_is_an_error() -> None:
-    table = {
-        "title": "T",
-        "label": "case",
-        "file": "two_rpr_printed/optimize/bounds.csv",
-        "columns": {"min": {}},
-        "rows": [{"name": "GRI", "where": {"index": "GRI"}, "printed": "0.437"}],
-    }
-    with pytest.raises(ValueError, match=r"min of GRI is 0\.434005 in results/ and 0\.437 in the paper: why\?"):
-        papers.section(table)
-    assert "{sup}`a` A misprint" in papers.section(table | {"notes": [{"text": "A misprint"}]})
-    right = [{"name": "GRI", "where": {"index": "GRI"}, "printed": "0.434"}]
-    with pytest.raises(ValueError, match="these notes are about no number"):
-        papers.section(table | {"rows": right, "notes": [{"text": "A misprint"}]})
 
 
 def test_citation_names_the_version_and_the_papers() -> None:

@@ -40,38 +40,6 @@ dynamics:
 """)
 
 
-@pytest.mark.parametrize("slope", [0.1, 0.5])
-def test_a_block_slides_up_an_incline_and_sticks_or_comes_back(slope: float) -> None:
-    speed = 3.0
-    slowed, driven = (G * (math.sin(slope) + sign * 0.2 * math.cos(slope)) for sign in (1, -1))
-    stop, way = speed / slowed, speed**2 / (2 * slowed)
-    result = block(slope, speed)
-    table, events = result.main, result.tables["events"]
-    late = np.maximum(table["time"] - stop, 0)
-    back = 0.5 * max(driven, 0.0) * late**2
-    expected = np.where(late > 0, way - back, speed * table["time"] - 0.5 * slowed * table["time"] ** 2)
-    assert table["s"] == pytest.approx(expected, abs=1e-11)
-    assert kept(table) < 1e-12
-    lost = -0.2 * 2 * G * math.cos(slope) * (way + (way - table["s"][-1] if driven > 0 else 0))
-    assert table["friction_work"][-1] == pytest.approx(lost, rel=1e-11)
-    if driven > 0:
-        assert not np.isfinite(events["time"]).any()
-        return
-    assert events["event"].tolist() == ["standstill"]
-    assert events["time"][0] == pytest.approx(stop, rel=1e-12)
-    # The guide holds it: its force is against the weight.
-    forces = result.tables["joint_forces"]
-    assert (forces["fx"][-1], forces["fy"][-1]) == pytest.approx((0.0, 2 * G), abs=1e-12)
-
-
-def test_a_block_breaks_away_once_the_force_is_above_its_friction() -> None:
-    # F = 8 t against mu m g from t0 = mu m g / 8 on: s = (8 / m)(t - t0)^3 / 6.
-    table = block(0.0, 0.0, '{s: "8*time"}').main
-    begin = 0.2 * 2 * G / 8
-    late = np.maximum(table["time"] - begin, 0)
-    assert table["s"] == pytest.approx(8 / 2 * late**3 / 6, abs=1e-10)
-
-
 def test_a_guide_that_is_too_short_jams_at_once() -> None:
     # Its centre of mass lies beside the guide: friction would turn it with 2 mu e / L of what slows it down.
     result = run(f"""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.closed_forms import slider_crank_slopes
 from helpers.gallery import meet, study_named, unit
 
 import mechdesign
@@ -23,49 +24,6 @@ def rows(table: Table, **chosen: object):
     for name, value in chosen.items():
         found &= table[name] == value
     return found
-
-
-def slider_slopes(crank: float, rod: float, guide: float, degrees: float):
-    """ds/dr, ds/dl, ds/de of s = r cos(theta) + sqrt(l^2 - (r sin(theta) - e)^2): crank, rod, guide."""
-    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    across = crank * sin - guide
-    along = math.sqrt(rod * rod - across * across)
-    return np.array([cos - sin * across / along, rod / along, across / along])
-
-
-EXACT = {30.0: 2.7717025e-2, 60.0: 4.0996265e-2}
-
-
-def test_slider_crank_with_tolerances() -> None:
-    # Exact by Gauss-Hermite quadrature over three normal dimensions.
-    table = mechdesign.reliability(study_named("slider_crank_tolerances")).tables["reliability"]
-    for degrees, exact in EXACT.items():
-        failure = {
-            method: float(table["failure"][rows(table, crank=degrees, method=method)][0])
-            for method in set(table["method"])
-        }
-        sigma = math.sqrt(float(((slider_slopes(100, 200, -20, degrees) * [0.1, 0.2, 0.1]) ** 2).sum()))
-        assert failure["analytic"] == pytest.approx(2 * below(-0.5 / sigma), rel=1e-6)
-        for method in ("analytic", "second_order", "form"):
-            assert failure[method] == pytest.approx(exact, rel=1e-3)
-        for method in ("monte_carlo", "importance_sampling"):
-            own = rows(table, crank=degrees, method=method)
-            assert table["failure_low"][own][0] < exact < table["failure_high"][own][0]
-    solved = {method: table["evaluations"][rows(table, method=method)].max() for method in set(table["method"])}
-    assert solved["form"] < solved["monte_carlo"] / 10
-
-
-def test_one_in_a_billion() -> None:
-    # Exact failure probability by quadrature of the sampling model of S2's Table 1, limits 0.10.
-    table = mechdesign.reliability(study_named("one_in_a_billion")).tables["reliability"]
-    auto = rows(table, method="auto")
-    low, high = float(table["failure_low"][auto][0]), float(table["failure_high"][auto][0])
-    assert low < 1.6566e-9 < high
-    assert (high - low) / 2 <= 0.1 * table["failure"][auto][0]
-    assert table["evaluations"][auto][0] < 40_000
-    plain = rows(table, method="monte_carlo")
-    assert table["failure"][plain][0] == 0
-    assert table["failure_high"][plain][0] > 1e-4
 
 
 def test_function_generator_as_made() -> None:
@@ -205,7 +163,7 @@ def test_feeder_with_the_cheapest_tolerances() -> None:
     table = result.tables["allocation"]
     given, found, prices = table["given"][:3], table["allocated"][:3], np.array([1.0, 2.0, 5.0])
     stops = (-60.0, -20.0, 20.0)
-    slopes = np.array([slider_slopes(80, 200, 60, degrees) for degrees in stops])
+    slopes = np.array([slider_crank_slopes(80, 200, 60, degrees) for degrees in stops])
     # The bearing's pin shifts the rod's end along the rod.
     pin = np.array([s[1] for s in slopes]) * 0.02 / 3 * math.sqrt(1 - 4.5 * math.exp(-4.5) / (1 - math.exp(-4.5)))
 

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helpers.gallery import meet, result_of, row, study_named
+from helpers.gallery import meet, result_of, study_named
+from helpers.linkages_from_tasks import structural_error
 from scipy.optimize import minimize, minimize_scalar
 
 import mechdesign
@@ -15,28 +16,6 @@ import mechdesign
 @cache
 def optimised(name: str):
     return mechdesign.optimize(study_named(name)).tables
-
-
-def structural_error(x1: float, x3: float) -> float:
-    """Largest error of the follower for y = log10(x), exact at x1, 1.5 and x3, in degrees.
-
-    K1 cos(follower) - K2 cos(crank) + K3 = cos(crank - follower), linear in the ratios K, and solved for the follower
-    by its half-angle tangent: F. Freudenstein, Approximate synthesis of four-bar linkages, Trans. ASME 77 (1955).
-    """
-
-    def wanted(x):
-        return np.radians(90 + 60 * (x - 1)), np.radians(30 + 60 * np.log2(x))
-
-    crank, follower = wanted(np.array([x1, 1.5, x3]))
-    k1, k2, k3 = np.linalg.solve(
-        np.column_stack([np.cos(follower), -np.cos(crank), np.ones(3)]), np.cos(crank - follower)
-    )
-    crank, follower = wanted(np.linspace(1, 2, 60_001))
-    # a cos(follower) + b sin(follower) = c
-    a, b, c = np.cos(crank) - k1, np.sin(crank), k3 - k2 * np.cos(crank)
-    middle, half = np.arctan2(b, a), np.arccos(c / np.hypot(a, b))
-    errors = [np.angle(np.exp(1j * (middle + side * half - follower))) for side in (1, -1)]
-    return float(np.degrees(min(np.abs(error).max() for error in errors)))
 
 
 @pytest.mark.nightly
@@ -98,24 +77,6 @@ def hoeken(l1, l3, step=0.01):
     """Path of P over a half turn of the crank: where two circles meet, and as far beyond."""
     pin = np.exp(1j * np.radians(np.linspace(90, 270, round(180 / step) + 1)))
     return pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
-
-
-def test_straightest_line_in_the_textbooks_steps() -> None:
-    """L1/L2 = 2.200 and L3/L2 = 2.800 over 180 deg: error 0.096 % of a travel of 4.181 cranks.
-
-    R. L. Norton, Design of Machinery, Table 3-1.
-    """
-    tables = optimised("straight_line_synthesis")
-    designs, optimum = tables["designs"], tables["optimum"]
-    assert (optimum["l1"][0], optimum["l3"][0]) == pytest.approx((2.2, 2.8), abs=1e-12)
-    assert len(designs) == 21 * 29
-    for k in range(0, len(designs), 40):
-        path = hoeken(designs["l1"][k], designs["l3"][k])
-        height = np.sqrt(4 * designs["l3"][k] ** 2 - (designs["l1"][k] + 1) ** 2)
-        assert designs["kinematics.P.y_error"][k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-7)
-    extremes = result_of("straight_line_synthesis").tables["extremes"]
-    assert row(extremes, "P.x")["range"] == pytest.approx(4.181, abs=5e-4)
-    assert 100 * row(extremes, "P.y")["range"] / row(extremes, "P.x")["range"] == pytest.approx(0.096, abs=5e-4)
 
 
 @pytest.mark.nightly

@@ -27,22 +27,11 @@ ANALYTIC = {
         (0.0232, 0.0312, 0.250, 0.865),
     ),
 }
-SIMULATED = {
-    "two_link_arm": ((0.0172, 0.0171, 0.294, 0.993), (0.0171, 0.0171, 0.347, 0.993), (0.0148, 0.0191, 0.211, 0.991)),
-    "two_link_arm_uniform": (
-        (0.0275, 0.0275, 0.347, 0.874),
-        (0.0276, 0.0275, 0.405, 0.871),
-        (0.0233, 0.0314, 0.264, 0.866),
-    ),
-}
-ROUNDING = (5e-5, 5e-5, 5e-4, 5e-4)
 # Table 1 case 1 and Table 2 case 1: sigma, rho, R to the first order, and the true R of the sampling model.
 EXACT = {
     "two_link_arm": (0.01739164, 0.28631860, 0.99200038, 0.99346125),
     "two_link_arm_uniform": (0.02748737, 0.34386303, 0.87149795, 0.87150401),
 }
-# Variance of the drawn lengths (cm^2) and of the drawn pins per unit of the radial clearance.
-DRAWN = {"two_link_arm": (0.01**2, 0.1054942148), "two_link_arm_uniform": (0.03**2 / 3, 0.25)}
 
 studies = pytest.mark.parametrize("name", ANALYTIC)
 cases = pytest.mark.parametrize("case", range(3))
@@ -68,38 +57,9 @@ def standard_errors(values: tuple[float, ...]) -> np.ndarray:
 
 
 @studies
-@cases
-def test_analytic_columns_to_the_printed_digits(name: str, case: int) -> None:
-    differences = np.abs(np.subtract(row(name, case, "analytic"), ANALYTIC[name][case]))
-    assert (differences <= np.array(ROUNDING) * (1 + 1e-9)).all()
-
-
-@studies
 def test_analytic_method_at_case_1_to_all_digits(name: str) -> None:
     sigma, rho, reliability, _ = EXACT[name]
     assert row(name, 0, "analytic") == pytest.approx((sigma, sigma, rho, reliability), abs=6e-9)
-
-
-@studies
-@cases
-def test_simulated_columns_against_the_printed_ones(name: str, case: int) -> None:
-    printed = SIMULATED[name][case]
-    differences = np.abs(np.subtract(row(name, case, "monte_carlo"), printed))
-    assert (differences <= 4 * np.sqrt(2) * standard_errors(printed) + ROUNDING).all()
-
-
-@studies
-@cases
-def test_simulated_moments_against_the_exact_ones_of_their_own_sampling(name: str, case: int) -> None:
-    length, pin = DRAWN[name]
-    spread = pin * (0.03**2 + (0.01 / 3) ** 2)
-    angles = np.radians(CASES[case])
-    x = np.sqrt(np.sum(np.cos(angles) ** 2 * length + spread))
-    y = np.sqrt(np.sum(np.sin(angles) ** 2 * length + spread))
-    rho = np.sum(np.sin(angles) * np.cos(angles)) * length / (x * y)
-    found = row(name, case, "monte_carlo")
-    errors = 4 * standard_errors((x, y, rho, found[3]))
-    assert (np.abs(np.subtract(found[:3], (x, y, rho))) <= errors[:3]).all()
 
 
 @studies
@@ -114,13 +74,6 @@ def test_methods_differ_by_less_than_the_paper_says(name: str, case: int) -> Non
     analytic, simulated = row(name, case, "analytic")[3], row(name, case, "monte_carlo")[3]
     # Sec. 5: "the largest relative difference is below 0.5 %"; ours has the error of another sample.
     assert abs(analytic / simulated - 1) < 0.005 + 4 * standard_errors((1, 1, 0, simulated))[3]
-
-
-@studies
-def test_error_of_the_simulated_reliability_is_equation_16(name: str) -> None:
-    table = result(name).tables["reliability"]
-    for p, n, error in zip(table["reliability"], table["samples"], table["error"], strict=True):
-        assert error == pytest.approx(3 * np.sqrt(p * (1 - p) / n) if n else 0.0, rel=1e-9)
 
 
 def test_simulated_density_follows_the_bivariate_normal() -> None:

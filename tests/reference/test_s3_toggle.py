@@ -13,12 +13,6 @@ from mechdesign.ground.results import Result
 
 STUDY = Path(__file__).parents[2] / "configs" / "toggle.yaml"
 ORDERS = ("position", "velocity", "acceleration")
-# Crank angle: nominal and first-order standard deviation of position, velocity and acceleration (cm, s).
-REFERENCE = {
-    0: ((70.3625914216, -0.1977441, 22.3090400), (0.24612856, 0.08994327, 0.60441205)),
-    90: ((70.9917550, 0.7907957, -36.7035840), (0.24239285, 0.17028405, 1.08981792)),
-    180: ((70.1253224, -0.3151511, 54.8069474), (0.24517514, 0.10252653, 1.92518110)),
-}
 
 
 @cache
@@ -36,36 +30,6 @@ def test_the_whole_cycle_by_5_degrees() -> None:
     table = result().tables["moments"]
     assert np.unique(table["theta2"]) == pytest.approx(np.arange(0, 361, 5))
     assert result().counts == {"poses": 73, "samples": 73 * 40_000, "invalid": 0}
-
-
-@pytest.mark.parametrize("angle", REFERENCE)
-@pytest.mark.parametrize("k", range(3))
-def test_nominal_and_first_order(angle: int, k: int) -> None:
-    nominal, sigma = REFERENCE[angle]
-    row = angle // 5
-    assert column(ORDERS[k], "analytic", "nominal")[row] == pytest.approx(nominal[k], rel=1e-6)
-    assert column(ORDERS[k], "analytic", "mean")[row] == pytest.approx(nominal[k], rel=1e-6)
-    assert column(ORDERS[k], "analytic", "sigma")[row] == pytest.approx(sigma[k], rel=1e-6)
-
-
-def difference(order: str) -> np.ndarray:
-    """Per cent, of the simulation (Fig. 7)."""
-    return 100 * (column(order, "analytic", "sigma") / column(order, "monte_carlo", "sigma") - 1)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_methods_differ_by_less_than_half_a_per_cent_on_average(order: str) -> None:
-    assert np.abs(difference(order)).mean() < 0.5
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_printed_maximum_of_3_05_per_cent_is_not_reached(order: str) -> None:
-    """The paper's largest difference (velocity) does not reproduce under any consistent reading of it.
-
-    Without noise it is 0.42 %. A standard deviation from 40,000 samples errs by 0.35 %, so that the largest of 73 is
-    near 1 %, and 2 % would be more than four standard errors beyond 0.42 %.
-    """
-    assert np.abs(difference(order)).max() < 2.0
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers.gallery import study_named
+from helpers.linkages_from_tasks import by_newton
 
 import mechdesign
 from mechdesign.questions.synthesize import dyads
@@ -16,19 +17,6 @@ CASES = yaml.safe_load((Path(__file__).parents[2] / "docs" / "path_problems.yaml
 BEST = {"eighteen": 0.00310352, "twelve": 7.7611e-05, "thirty_five": 7.5, "twenty": 0.871345, "triangle": 0.951546,
         "line": 1e-5}  # fmt: skip
 WIDE = {"reach": 100, "ratio": 1000}
-# Own: a bar pinned to a crank of 1 runs through a swivel at (3, 0). Place and angle of the bar, five times.
-BAR = [
-    (1.4005012129503, 0.338569211391261, -4.92498503922732),
-    (0.943429840080025, 0.924076906147457, -19.1066053508691),
-    (0.0971834951324821, 1.02395509146605, -15.7046572646688),
-    (-0.558489206982439, -0.108174131376393, 4.96163122670251),
-    (0.81249910593843, -0.54611243313823, 19.1066053508691),
-]
-LINKS = [  # pivot, pin and length of its links
-    (5.45588304567691 - 0.551902093304512j, 5.01845829600562 - 0.8231008401653j, 0.9452958124089),
-    (3.00415712162465 - 0.303892255416656j, 2.58355003981795 - 24.8936286273897j, 24.4089636613067),
-    (0j, -0.4 - 0.2j, 1.0),
-]
 # Morgan and Wampler 1990, problem 7: crank, coupler and rocker of all real four-bars, by 160,000 starts of Newton's
 # method; the first two pass all points in one assembly.
 FIVE = [[0.5, 1.06], [0.22, 0.78], [-0.13, 0.43], [-0.34, 0.22], [-0.83, -0.27]]
@@ -45,43 +33,6 @@ def solved(task: dict, seed: int = 1) -> Any:
     return mechdesign.synthesize(mechdesign.load(text=yaml.safe_dump({"synthesis": task})), seed=seed)
 
 
-def bar() -> dict:
-    body = [{"x": x, "y": y, "angle": angle} for x, y, angle in BAR]
-    return {"body": body, "limits": WIDE, "solutions": 1000}
-
-
-def test_five_positions_of_a_bar_have_three_links_and_the_swivel() -> None:
-    table = solved(bar()).tables["solutions"]
-    pivots = {name: table[f"ground.{name}.x"] + 1j * table[f"ground.{name}.y"] for name in "OD"}
-    pins = {name: table[f"coupler.{name}.x"] + 1j * table[f"coupler.{name}.y"] for name in "AB"}
-    assert len(table["solution"]) == 9
-    for pivot, pin, length in LINKS:
-        found = np.abs(pivots["O"] - pivot) + np.abs(pins["A"] - pin) + np.abs(table["crank.length"] - length)
-        assert np.nanmin(found) < 1e-9 * abs(pin)
-    swivel = table["kind"] == "inverted_slider_crank"
-    assert swivel.sum() == 3
-    np.testing.assert_allclose(pivots["D"][swivel], 3.0, atol=1e-9)
-
-
-def by_newton(places: np.ndarray, rotations: np.ndarray, starts: int, random: np.random.Generator) -> np.ndarray:
-    """Pivots and pins of links, from starts at random; shape (count, 2)."""
-    p, r = places, rotations
-    u = random.normal(size=(starts, 5)) * 3
-    for _ in range(80):
-        a, x, k = u[:, 0] + 1j * u[:, 1], u[:, 2] + 1j * u[:, 3], u[:, 4]
-        arm, back = p + r * x[:, None], (np.conj(p) - np.conj(a)[:, None]) * r
-        gap = np.abs(p) ** 2 + k[:, None] + 2 * (np.conj(p) * r * x[:, None] - np.conj(a)[:, None] * arm).real
-        slope = np.stack([-2 * arm.real, -2 * arm.imag, 2 * back.real, -2 * back.imag, np.ones_like(gap)], axis=2)
-        regular = np.abs(np.linalg.det(slope)) > 1e-12
-        u, gap, slope = u[regular], gap[regular], slope[regular]
-        step = np.linalg.solve(slope, gap[..., None])[..., 0]
-        u = u - step * np.minimum(1, 5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
-    a, x, k = u[:, 0] + 1j * u[:, 1], u[:, 2] + 1j * u[:, 3], u[:, 4]
-    gap = np.abs(p + r * x[:, None] - a[:, None]) ** 2 - (np.abs(x) ** 2 + np.abs(a) ** 2 - k)[:, None]
-    good = (np.abs(gap).max(axis=1) < 1e-10) & (np.abs(u[:, :4]).max(axis=1) < 30)
-    return np.stack([a, x], axis=1)[good]
-
-
 @pytest.mark.parametrize(("tasks", "starts"), [(4, 150), pytest.param(60, 1500, marks=pytest.mark.nightly)])
 def test_no_link_that_newton_finds_from_many_starts_is_missed(tasks: int, starts: int) -> None:
     random, seen = np.random.default_rng(5), 0
@@ -96,15 +47,6 @@ def test_no_link_that_newton_finds_from_many_starts_is_missed(tasks: int, starts
             assert np.abs(pairs - link).max(axis=1).min() < 1e-6 * (1 + np.abs(link).max())
             seen += 1
     assert seen > tasks
-
-
-def test_three_pairs_of_the_logarithm_are_freudensteins_linkage() -> None:
-    # Freudenstein 1955: the linear system of three pairs at Chebyshev's spacing.
-    inputs = [94.01923788646684, 119.99999999999999, 145.98076211353316]
-    outputs = [35.612580106798085, 65.09775004326937, 87.05106705470914]
-    table = solved({"function": {"input": inputs, "output": outputs}, "frame": 100}).tables["solutions"]
-    for name, length in (("crank", 71.3024053978582), ("coupler", 165.815614032428), ("rocker", 71.5656571861527)):
-        assert table[f"{name}.length"][0] == pytest.approx(length, abs=1e-9)
 
 
 @pytest.mark.nightly
@@ -221,14 +163,6 @@ def test_each_link_of_the_tray_keeps_its_length_at_all_five_positions() -> None:
     assert links <= near
     assert (len(links), len(near), len(table["solution"])) == (3, 4, 6)
     assert [words == "" for words in table["defects"]] == [True, True, False, False, False, False]
-
-
-def test_the_pairs_of_log10_are_those_of_freudensteins_linkage() -> None:
-    table = mechdesign.synthesize(study_named("log10")).tables["solutions"]
-    own = study_named("function_generator")
-    for name, place in (("crank", "crank"), ("coupler", "coupler"), ("rocker", "follower")):
-        length = own.mechanism.description.places[f"{place}.length"].nominal
-        assert table[f"{name}.length"] == pytest.approx([length], rel=1e-11)
 
 
 @pytest.mark.nightly

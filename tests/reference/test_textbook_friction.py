@@ -19,49 +19,6 @@ def kinds(result: Result) -> list[str]:
     return [warning.kind for warning in result.warnings]
 
 
-# A cylinder pulls the upright arm of a bell crank to the left and lifts the weight on its other arm.
-BELL_CRANK = """
-mechanism:
-  parameters: {a: 60, b: 40, mu: 0.25, r: 8}
-  links:
-    ground: {C: [-100, b], O: [0, 0]}
-    bell: {O: [0, 0], A: [0, b], B: [a, 0]}
-    cylinder: {from: C, to: A, telescopic: true}
-  drives: {pull: {length: cylinder}}
-  sketch: {A: [0, b], B: [a, 0]}
-  friction: {O: {coefficient: mu, radius: r}}
-dynamics:
-  poses: [{pull: 100}]
-  rates: {pull: -10}
-  loads: [{at: B, force: [0, -100]}]
-"""
-
-
-def friction_circle(sign: float) -> float:
-    """Pull of the cylinder: moments about the pivot, whose joint force touches the circle of radius mu r."""
-    a, b, circle, weight = 60.0, 40.0, 0.25 * 8, 100.0
-    # (Q b - W a)^2 = circle^2 (Q^2 + W^2)
-    roots = np.roots([b**2 - circle**2, -2 * a * b * weight, weight**2 * (a**2 - circle**2)])
-    return float(roots.max() if sign > 0 else roots.min())
-
-
-def test_the_joint_force_of_a_bell_crank_touches_the_friction_circle() -> None:
-    result = answer(BELL_CRANK)
-    pull = friction_circle(1)
-    assert -result.main["pull_effort"][0] == pytest.approx(pull, rel=1e-12)
-    joints = result.tables["joint_forces"]
-    row = list(joints["joint"]).index("O")
-    force = np.hypot(pull, 100.0)
-    assert joints["magnitude"][row] == pytest.approx(force, rel=1e-12)
-    assert abs(joints["moment"][row]) == pytest.approx(2 * force, rel=1e-12)
-    # Without friction 150 N would do; back, the weight pulls with less.
-    assert result.main["efficiency"][0] == pytest.approx(150 / pull, rel=1e-12)
-    assert result.main["back_efficiency"][0] == pytest.approx(friction_circle(-1) / 150, rel=1e-12)
-    back = answer(BELL_CRANK, "dynamics.rates={pull: 10}")
-    assert -back.main["pull_effort"][0] == pytest.approx(friction_circle(-1), rel=1e-12)
-    assert back.main["efficiency"][0] == pytest.approx(friction_circle(-1) / 150, rel=1e-12)
-
-
 # A screw's thread unwound: a wedge of the slope alpha is pushed below a ram that bears the load.
 WEDGE = """
 mechanism:
@@ -80,23 +37,6 @@ dynamics:
 """
 
 
-@pytest.mark.parametrize("alpha", [3.0, 5.0, 6.0, 20.0, 45.0, 80.0])
-def test_a_wedge_has_the_efficiency_of_a_screw(alpha: float) -> None:
-    result = answer(WEDGE, f"mechanism.parameters.alpha={alpha}")
-    slope, angle = np.radians(alpha), np.arctan(0.1)
-    np.testing.assert_allclose(result.main["push_effort"], 100 * np.tan(slope + angle), rtol=1e-12)
-    np.testing.assert_allclose(result.main["efficiency"], np.tan(slope) / np.tan(slope + angle), rtol=1e-12)
-    back = max(np.tan(slope - angle) / np.tan(slope), 0.0)
-    np.testing.assert_allclose(result.main["back_efficiency"], back, rtol=1e-12)
-    locks = [w for w in result.warnings if w.kind == "self_locking"]
-    assert bool(locks) == (slope < angle)
-    assert all("face" in w.message for w in locks)
-    # Downwards the wedge is held back, or drawn out where it locks.
-    down = answer(WEDGE, f"mechanism.parameters.alpha={alpha}", "dynamics.rates={push: -5}")
-    np.testing.assert_allclose(down.main["push_effort"], 100 * np.tan(slope - angle), rtol=1e-12)
-    np.testing.assert_allclose(down.main["efficiency"], back, rtol=1e-12)
-
-
 def test_a_wedge_jams_where_its_slope_and_the_angle_of_friction_make_a_right_angle() -> None:
     limit = 90 - np.degrees(np.arctan(0.1))
     below, above = (answer(WEDGE, f"mechanism.parameters.alpha={limit + by}") for by in (-0.01, 0.01))
@@ -106,41 +46,6 @@ def test_a_wedge_jams_where_its_slope_and_the_angle_of_friction_make_a_right_ang
     assert "undefined" not in [w.kind for w in above.warnings if "expression" in w.message]
     assert np.isnan(above.main["push_effort"]).all()
     assert any("friction in face jams" in w.message for w in above.warnings)
-
-
-def test_friction_on_all_faces_of_a_wedge_adds_two_angles() -> None:
-    result = answer(WEDGE, "mechanism.parameters.sole=0.1")
-    np.testing.assert_allclose(
-        result.main["push_effort"], 100 * np.tan(np.radians(10) + 2 * np.arctan(0.1)), rtol=1e-12
-    )
-
-
-INCLINE = """
-mechanism:
-  parameters: {beta: 25}
-  links: {ground: {O: [0, 0]}, block: {B: [0, 0], C: [10, 0]}}
-  joints: {plane: {prismatic: [ground, block], direction: beta, point: B}}
-  drives: {way: {slide: plane}}
-  friction: {plane: {coefficient: 0.3}}
-kinematics:
-  sweep: {way: {from: 0, to: 20, step: 10}}
-  loads: [{at: B, force: [0, -100]}]
-"""
-
-
-def test_a_block_is_drawn_up_and_let_down_an_incline() -> None:
-    beta = np.radians(25)
-    up = answer(INCLINE, question="kinematics")
-    np.testing.assert_allclose(up.main["way_effort"], 100 * (np.sin(beta) + 0.3 * np.cos(beta)), rtol=1e-12)
-    np.testing.assert_allclose(up.main["efficiency"], 1 / (1 + 0.3 / np.tan(beta)), rtol=1e-12)
-    down = answer(INCLINE, "kinematics.rates={way: -3}", question="kinematics")
-    np.testing.assert_allclose(down.main["way_effort"], 100 * (np.sin(beta) - 0.3 * np.cos(beta)), rtol=1e-12)
-    assert not up.warnings
-    flat = answer(INCLINE, "mechanism.parameters.beta=16", question="kinematics")
-    assert kinds(flat) == ["self_locking"]
-    turning = answer(INCLINE, "kinematics.loads=[{at: C, force: [0, -100]}]", question="kinematics")
-    assert kinds(turning) == ["incomplete"]
-    assert "give its 'length'" in turning.warnings[0].message
 
 
 # A cylinder pushes a slider beside its guide.
@@ -159,14 +64,6 @@ dynamics:
   sweep: {push: {from: 20, to: 60, step: 10}}
   loads: [{at: B, force: [-10, 0]}]
 """
-
-
-@pytest.mark.parametrize("length", [400.0, 50.0, 41.0, 40.001])
-def test_a_slider_pushed_beside_its_guide_takes_more_the_shorter_it_is(length: float) -> None:
-    result = answer(OFFSET, f"mechanism.parameters.long={length}")
-    # Both ends bear P e / length.
-    np.testing.assert_allclose(result.main["push_effort"], 10 / (1 - 2 * 0.2 * 100 / length), rtol=1e-9)
-    assert not result.warnings
 
 
 @pytest.mark.parametrize("length", [40.0, 39.999, 20.0, 1.0])
@@ -202,17 +99,6 @@ dynamics:
   gravity: [0, -9.81 m/s^2]
   loads: [{at: B, force: ["-0.2*B.x_velocity", 0]}]
 """
-
-
-def test_what_friction_takes_is_the_power_that_it_adds() -> None:
-    rubbed = answer(CRANK)
-    smooth = answer(CRANK, "mechanism.parameters.mu=0", "mechanism.parameters.sole=0")
-    lost = rubbed.main["friction_power"]
-    assert (lost < 0).all()
-    np.testing.assert_allclose(
-        rubbed.main["theta_power"] + lost, smooth.main["theta_power"], atol=1e-9 * np.abs(lost).max(), rtol=0
-    )
-    np.testing.assert_array_equal(smooth.main["friction_power"], 0)
 
 
 def test_a_rate_of_a_coefficient_is_that_of_two_studies() -> None:
