@@ -18,6 +18,7 @@ import mechdesign
 from mechdesign.door.cli import process
 from mechdesign.door.cli.options import _studies
 from mechdesign.ground import files
+from mechdesign.ground.work import chunks
 from mechdesign.study.variants import changed_data, in_text
 
 from .conftest import SLIDER
@@ -162,6 +163,12 @@ def test_a_place_with_a_drive_stands_whole_in_a_message(place):
     assert str(error.value).startswith(f"{place}: cannot be read")
 
 
+def test_a_table_behind_backslashes_says_what_every_system_reads(folder):
+    text = SLIDER.replace("  sketch", "  targets: {B.x: data\\table.csv}\n  sketch")
+    with pytest.raises(mechdesign.StudyError, match=r"cannot be read.*every system reads / between folders"):
+        mechdesign.load(text=text)
+
+
 def test_there_is_no_way_between_two_drives(monkeypatch):
     monkeypatch.setattr(os.path, "relpath", ntpath.relpath)
     monkeypatch.setattr(os.path, "abspath", str)
@@ -182,6 +189,13 @@ def test_results_on_another_drive_than_the_study(folder, invoke, monkeypatch):
     content = json.loads((folder / "out/manifest.json").read_text())
     assert content["inputs_in"] == folder.as_posix()
     assert invoke("run", "--verify", "out").exit_code == 0
+
+
+def test_no_more_processes_begin_than_the_system_can_wait_for(monkeypatch):
+    """On Windows 61, whatever is asked; on a computer of 96 processors, too."""
+    monkeypatch.setattr(chunks, "_MOST", 61)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(96)), raising=False)
+    assert (chunks.worker_count(None), chunks.worker_count(100), chunks.worker_count(4)) == (61, 61, 4)
 
 
 def test_a_study_is_completed_behind_a_backslash(folder, monkeypatch):
