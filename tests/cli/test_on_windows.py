@@ -96,6 +96,19 @@ def test_results_have_a_folder_that_windows_takes(folder, analysis, invoke, file
     assert mechdesign.load(folder / file).label == label
 
 
+def test_a_copy_of_a_table_has_a_name_that_windows_takes(folder, invoke):
+    (folder / "a:b.csv").write_text("0,100\n90,60\n")
+    study = SLIDER.replace("  sketch", "  targets: {B.x: 'a:b.csv'}\n  sketch")
+    goal = (
+        "optimize: {variables: {r: {from: 40, to: 41, step: 1}}, method: grid, minimize: [kinematics.B.x_error.rms]}\n"
+    )
+    (folder / "slider.yaml").write_text(study + goal)
+    for _ in range(2):
+        done = invoke("optimize", "slider.yaml", "--no-plots", "--out", "out")
+        assert done.exit_code == 0, done.stderr
+    assert (folder / "out/input_a_b.csv").exists()
+
+
 @pytest.mark.parametrize("file", ["Slider.yaml", "SLIDER.yml", "slider..yaml", "slider:.yaml"])
 def test_two_studies_have_no_folder_that_windows_takes_for_one(folder, analysis, invoke, file):
     (folder / file).write_text(SLIDER)
