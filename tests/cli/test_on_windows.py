@@ -64,8 +64,8 @@ def test_a_file_that_is_open_elsewhere_is_named_and_nothing_is_half_written(fold
     held.add(name)
     done = invoke(*command.split())
     assert done.exit_code == 4
-    assert f"{name} cannot be replaced: it is open in another program, or write-protected" in done.stderr
-    assert "close it there, and run the command again" in done.stderr
+    told = "cannot be replaced: it is open in another program, or write-protected; close it there, and try again"
+    assert f"{name}: {told}" in done.stderr
     after = contents(folder / place)
     for record in (before, after):
         record.pop(".mechdesign.json", None)  # lists both, of which either may be there
