@@ -53,7 +53,7 @@ def replace(path: Path, blocks: Iterable[bytes]) -> str:
 
     Raises
     ------
-    OSError
+    OSError, OutputError
         If it cannot be written; an older file of that name is then as it was.
     """
     for left in _temporaries(path.parent, re.escape(path.name)):
@@ -67,18 +67,18 @@ def replace(path: Path, blocks: Iterable[bytes]) -> str:
 
 @contextmanager
 def giving_way(path: Path) -> Iterator[None]:
-    """Inside, a file is replaced or removed; where the system refuses it, the error says what to do.
+    """Inside, a file is replaced or removed.
 
     Raises
     ------
-    PermissionError
-        On Windows where another program has the file open.
+    OutputError
+        Where the system refuses it, as Windows does of a file that another program has open.
     """
     try:
         yield
     except PermissionError as error:
-        words = f"{path.name} cannot be replaced: it is open in another program, or write-protected; close it there"
-        raise PermissionError(error.errno, f"{words}, and run the command again") from error
+        words = "cannot be replaced: it is open in another program, or write-protected; close it there, and try again"
+        raise OutputError(f"{path}: {words}") from error
 
 
 class Transaction:
@@ -120,7 +120,7 @@ class Transaction:
         ------
         StudyError
             If a file would be replaced that is not one of the folder's own; then nothing has changed.
-        OSError
+        OutputError
             If a file cannot be replaced or removed, as it is open elsewhere; then nothing has changed, either.
         """
         if voucher is None:
@@ -132,7 +132,7 @@ class Transaction:
             for name in (voucher, *sorted({*own, *self._staged} - {voucher, *(set(kept) - self._staged.keys())})):
                 self._set_aside(name)
             self._place(voucher)
-        except OSError:
+        except (OSError, OutputError):
             self._put_back()
             settle(self.directory)
             raise

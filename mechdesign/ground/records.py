@@ -47,7 +47,7 @@ def write_recorded(path: Path, data: bytes, *, whole: bool = True) -> None:
     ------
     StudyError
         If another file stands there, see `check_replaceable`.
-    OSError
+    OSError, OutputError
         If it cannot be written; an older file of that name is then as it was.
     """
     check_replaceable(path, whole=whole)
@@ -63,7 +63,7 @@ def remove_recorded(path: Path) -> None:
 
     Raises
     ------
-    OSError
+    OSError, OutputError
         If it cannot be removed.
     """
     with suppress(StudyError):

@@ -13,6 +13,7 @@ import yaml
 from pydantic import ValidationError
 
 from mechdesign.ground.errors import StudyError, printable
+from mechdesign.ground.files import portable
 from mechdesign.mechanism.elements.joints import Fixed
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.building.notations import LINK_KEYS
@@ -215,7 +216,7 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
     """
     files: dict[str, str] = {}
     for keys, file, content in study.inputs():
-        beside = _INPUT + file.name
+        beside = portable(_INPUT + file.name)
         while files.get(beside, content) != content:
             beside = "_" + beside
         files[beside] = content

@@ -277,7 +277,7 @@ def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("instant", [0, 1, 2, 3, 4, 6, 8])
+@pytest.mark.parametrize("instant", [0, 1, 2, 3, 4, 6, 8, 10, 12])
 def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
     """The n-th step on the way of files into place is the last one."""
     arguments = ("run", "slider.yaml", "--no-plots", "--quiet", "--resume", "--out")

@@ -18,6 +18,7 @@ import mechdesign
 from mechdesign.door.cli import process
 from mechdesign.door.cli.options import _studies
 from mechdesign.ground import files
+from mechdesign.ground.work import chunks
 from mechdesign.study.variants import changed_data, in_text
 
 from .conftest import SLIDER
@@ -63,8 +64,8 @@ def test_a_file_that_is_open_elsewhere_is_named_and_nothing_is_half_written(fold
     held.add(name)
     done = invoke(*command.split())
     assert done.exit_code == 4
-    assert f"{name} cannot be replaced: it is open in another program, or write-protected" in done.stderr
-    assert "close it there, and run the command again" in done.stderr
+    told = "cannot be replaced: it is open in another program, or write-protected; close it there, and try again"
+    assert f"{name}: {told}" in done.stderr
     after = contents(folder / place)
     for record in (before, after):
         record.pop(".mechdesign.json", None)  # lists both, of which either may be there
@@ -93,6 +94,19 @@ def test_results_have_a_folder_that_windows_takes(folder, analysis, invoke, file
     assert invoke("run", file, "--no-plots").exit_code == 0
     assert [path.name for path in (folder / "results").iterdir() if path.is_dir()] == [label]
     assert mechdesign.load(folder / file).label == label
+
+
+def test_a_copy_of_a_table_has_a_name_that_windows_takes(folder, invoke):
+    (folder / "a:b.csv").write_text("0,100\n90,60\n")
+    study = SLIDER.replace("  sketch", "  targets: {B.x: 'a:b.csv'}\n  sketch")
+    goal = (
+        "optimize: {variables: {r: {from: 40, to: 41, step: 1}}, method: grid, minimize: [kinematics.B.x_error.rms]}\n"
+    )
+    (folder / "slider.yaml").write_text(study + goal)
+    for _ in range(2):
+        done = invoke("optimize", "slider.yaml", "--no-plots", "--out", "out")
+        assert done.exit_code == 0, done.stderr
+    assert (folder / "out/input_a_b.csv").exists()
 
 
 @pytest.mark.parametrize("file", ["Slider.yaml", "SLIDER.yml", "slider..yaml", "slider:.yaml"])
@@ -162,6 +176,12 @@ def test_a_place_with_a_drive_stands_whole_in_a_message(place):
     assert str(error.value).startswith(f"{place}: cannot be read")
 
 
+def test_a_table_behind_backslashes_says_what_every_system_reads(folder):
+    text = SLIDER.replace("  sketch", "  targets: {B.x: data\\table.csv}\n  sketch")
+    with pytest.raises(mechdesign.StudyError, match=r"cannot be read.*every system reads / between folders"):
+        mechdesign.load(text=text)
+
+
 def test_there_is_no_way_between_two_drives(monkeypatch):
     monkeypatch.setattr(os.path, "relpath", ntpath.relpath)
     monkeypatch.setattr(os.path, "abspath", str)
@@ -182,6 +202,13 @@ def test_results_on_another_drive_than_the_study(folder, invoke, monkeypatch):
     content = json.loads((folder / "out/manifest.json").read_text())
     assert content["inputs_in"] == folder.as_posix()
     assert invoke("run", "--verify", "out").exit_code == 0
+
+
+def test_no_more_processes_begin_than_the_system_can_wait_for(monkeypatch):
+    """On Windows 61, whatever is asked; on a computer of 96 processors, too."""
+    monkeypatch.setattr(chunks, "_MOST", 61)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(96)), raising=False)
+    assert (chunks.worker_count(None), chunks.worker_count(100), chunks.worker_count(4)) == (61, 61, 4)
 
 
 def test_a_study_is_completed_behind_a_backslash(folder, monkeypatch):

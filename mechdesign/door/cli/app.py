@@ -46,7 +46,7 @@ def _usage() -> Iterator[None]:
 _STUDY = re.compile(rb"^(mechanism|synthesis):", re.MULTILINE)
 # Where there is none yet.
 _FIRST_STEPS = (
-    ("mechdesign new > study.yaml", "writes a commented linkage to change"),
+    ("mechdesign new > study.yaml", "writes a commented study to change"),
     ("mechdesign run study.yaml --report", "answers it: open results/study/report.html"),
     ("mechdesign live study.yaml", "opens a page in which it is dragged"),
     ("mechdesign import FILE", "makes a study of another tool's file"),

@@ -72,7 +72,9 @@ class Folder:
             return content
         except (OSError, ValueError, RuntimeError) as error:
             # The name may be impossible, or links may form a circle.
-            raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'no such name'}") from None
+            why = getattr(error, "strerror", None) or "no such name"
+            hint = "; every system reads / between folders" * ("\\" in file.name)
+            raise StudyError(f"{file} cannot be read: {why}{hint}") from None
 
 
 def _without_waiting(path: str, flags: int) -> int:
