@@ -133,3 +133,27 @@ def test_motor_and_transmission_in_series() -> None:
     """Compliances of what is in series add up, whatever units they are given in."""
     series = ask_stiffness(FIVE_BAR, "stiffness.actuators={a1: [3000, 1.5e6 N*mm/rad], a2: [2000, 2000]}")
     assert matrix(series, "K") == pytest.approx(matrix(ask_stiffness(FIVE_BAR), "K"), rel=1e-12)
+
+
+def test_a_deflection_that_is_not_small_is_told() -> None:
+    """A strip that bends to F L^3 / 3 E I: 10 N move its tip by 0.02 of its length, 100 N by 0.2."""
+    strip = """
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: [O, P, 1000]}
+  drives: [arm]
+  sketch: {P: [1000, 0]}
+stiffness:
+  link: arm
+  at: P
+  sections: {strip: {E: 200 GPa, width: 10, height: 10}}
+  elastic: {arm: strip}
+  poses: [{arm: 0}, {arm: 90}]
+  loads: [[0, -10, 0], [0, -100, 0]]
+"""
+    (large,) = (
+        warning for warning in mechdesign.stiffness(mechdesign.load(text=strip)).warnings if warning.kind == "suspect"
+    )
+    assert "under load 2 the asked point moves by 0.2 times the mechanism's size" in str(large)
+    assert (large.table, large.row, large.pose) == ("deflections", 1, "arm = 0 deg")
+    small = mechdesign.stiffness(mechdesign.load(text=strip, overrides=["stiffness.loads=[[0, -10, 0]]"]))
+    assert all(warning.kind != "suspect" for warning in small.warnings)

@@ -5,7 +5,7 @@ The poses of several designs are one batch, and so are the numbers of the sectio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar, Self, TypeVar
@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
+from mechdesign.ground.numerals import numeral
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.results import Drawn, Result, Table
@@ -52,6 +53,8 @@ POLED = frozenset(["k_x", "k_y", "k_phi", "k_min", "k_max", "k_direction", *(f"{
 # Smallest singular value of the unit wrenches below which a pose gets a warning: its stiffness depends on rounding and
 # tolerances.
 NEAR_SINGULAR = 1e-4
+# Largest deflection, as a part of the mechanism's size, and turn (radians), that count as small.
+SMALL = 0.1
 R = TypeVar("R", Held, Effects)
 
 
@@ -266,9 +269,31 @@ class Stiffness(MotionQuestion):
                 warnings.append(Caution("singular", said, "stiffness", row, first))
         return [
             *warnings,
+            *self._large(passage, rows),
             *_without_joint(self.body),
             *(assumed(self.body.study) if self.body.given.dynamics else ()),
         ], []
+
+    def _large(self, passage: Passage, rows: slice) -> Iterator[Caution]:
+        """A warning about the largest deflection of the asked point where it is not small."""
+        if not self.body.given.wrenches:
+            return
+        body, values = self.body.at(self.poses.take(np.arange(rows.start, rows.stop))), passage.values
+        soft = values.arrays["compliance"][rows]
+        loads = np.broadcast_to(body.loads, (len(soft), len(self.body.given.wrenches), 3))
+        moved = tables.deflections(loads, soft, values.arrays["moved"][rows] if self.loaded and body.uneven else None)
+        way = np.hypot(moved[..., 0], moved[..., 1]) / body.extent
+        share = np.nan_to_num(np.fmax(way, np.abs(moved[..., 2]) if body.size == 3 else 0.0))
+        if share.max(initial=0.0) <= SMALL:
+            return
+        row, load = np.unravel_index(int(share.argmax()), share.shape)
+        first = self.motion.in_words(rows.start + int(row))
+        turns = f" and turns by {numeral(np.degrees(moved[row, load, 2]), 3)} deg" if body.size == 3 else ""
+        said = (
+            f"under load {load + 1} the asked point moves by {numeral(way[row, load], 3)} times the mechanism's size"
+            f"{turns} at {first}: deflections are linear in the load, and good only where they are small"
+        )
+        yield Caution("suspect", said, "deflections", int(row) * share.shape[1] + int(load), first)
 
     def drawn(self, passage: Passage) -> DrawnStiffness:
         """The shown poses, the first valid one, and the first with a free twist."""

@@ -114,16 +114,19 @@ def springs_table(motion: Motion, legs: Sequence[str], springs: Springs) -> Tabl
     ))  # fmt: skip
 
 
-def deflections_table(motion: Motion, loads: Floats, soft: Floats, others: Floats | None) -> Table:
-    """``deflections.csv``: a row a pose and load.
+def deflections(loads: Floats, soft: Floats, others: Floats | None) -> Floats:
+    """Twists of the asked point, shape (poses, loads, 2 or 3).
 
-    `loads` are those on the asked point, shape (poses, loads, 3), `others` what loads elsewhere move it, if there are
-    such, shape (poses, loads, 2 or 3).
+    `loads` are those on it, shape (poses, loads, 3), `others` what loads elsewhere move it, if there are such.
     """
+    moved = np.einsum("nij,nlj->nli", soft, loads[:, :, : soft.shape[1]])
+    return np.asarray(moved if others is None else moved + others)
+
+
+def deflections_table(motion: Motion, loads: Floats, soft: Floats, others: Floats | None) -> Table:
+    """``deflections.csv``: a row a pose and load, which are those of `deflections`."""
     size = soft.shape[1]
-    moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
-    if others is not None:
-        moved = moved + others.reshape(-1, size)
+    moved = deflections(loads, soft, others).reshape(-1, size)
     repeat = np.repeat(np.arange(motion.poses.count), loads.shape[1])
     names = (*("fx", "fy", "mz")[:size], *("dx", "dy", "dphi")[:size])
     values = (*loads.reshape(-1, 3).T[:size], *moved.T)
