@@ -76,3 +76,18 @@ def test_a_linkage_is_found_that_draws_the_curve_of_a_random_one(family: str, co
     found = np.sort([*errors(family, count)])
     assert np.median(found) < 1e-4
     assert np.quantile(found, 0.95) < 1e-2
+
+
+@pytest.mark.nightly
+def test_both_crank_rockers_of_a_curve_are_listed() -> None:
+    # Roberts 1875: the third pivot completes, with the two others, a triangle like that of the coupler.
+    pin, coupler, arm = 0.4 * np.exp(1j * AROUND), 1.1, 0.6 + 0.5j
+    other, _ = third(pin, 1 + 0j, coupler, 0.9, 1.0)
+    points = pin + (other - pin) / coupler * arm
+    path = {"points": [[z.real, z.imag] for z in points.tolist()], "closed": True}
+    study = mechdesign.load(text=yaml.safe_dump({"synthesis": {"path": path, "limits": {"reach": 5, "ratio": 12}}}))
+    table = mechdesign.synthesize(study, seed=1).tables["solutions"]
+    exact = np.asarray(table["max_error"]) < 1e-9
+    cranks = table["ground.O.x"][exact] + 1j * table["ground.O.y"][exact]
+    assert len(cranks) == 2
+    assert np.abs(np.sort_complex(cranks) - [0, arm / coupler]).max() < 1e-9

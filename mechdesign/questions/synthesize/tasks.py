@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,14 +38,20 @@ MOST = 200
 PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 1_500
 # An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
 _OTHER = 1e-6
+_NONE = np.empty(0, dtype=complex)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Task:
     """What the tasks share."""
 
     section: SynthesisSection
     factor: float  # radians in the study's unit of angle
+    centre: complex  # middle of positions and mechanism
+    size: float  # by which places and errors count
+    points: Complexes = field(default_factory=lambda: _NONE)  # places that the point P shall pass; none of a function
+    directions: Complexes = field(default_factory=lambda: _NONE)  # unit vectors along the body there, if there is one
+    error_factor: float = 1.0  # the study's unit of errors: 1 of lengths, radians in its unit of angle
     apart: ClassVar[tuple[str, ...]] = ()  #: places that are no dimensions of the linkage
 
     @property
@@ -58,43 +64,18 @@ class _Task:
         """Whether its positions are passed at whatever time."""
         return self.section.path is not None and self.section.path.timing is None
 
-    @property
-    def directions(self) -> Complexes:
-        """Unit vectors along the body at the positions; none of a point or a function."""
-        return np.empty(0, dtype=complex)
-
-    @property
-    def error_factor(self) -> float:
-        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
-        return 1.0
-
-    @property
-    def points(self) -> Complexes:
-        """Places that the point P shall pass; none of a function."""
-        return np.empty(0, dtype=complex)
-
     def gaps(self, part: Candidates) -> list[Floats]:
         """Distance of the point P from its place at each position, of each assembly; shape (count, positions)."""
         return [np.abs(part.kind.points(part.kind.solve(part.values, part.angles, modes)) - self.points)
                 for modes in part.kind.modes]  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class BodyTask(_Task):
     """Positions of a body."""
 
     positions: Positions
     apart: ClassVar[tuple[str, ...]] = (f"{BODY}.{POINT}.x", f"{BODY}.{POINT}.y")
-
-    @property
-    def centre(self) -> complex:
-        """The middle of the places."""
-        return self.positions.centre
-
-    @property
-    def size(self) -> float:
-        """The extent of the places."""
-        return self.positions.size
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
@@ -120,23 +101,13 @@ class BodyTask(_Task):
         for part, _ in parts:
             yield from assembled(part, self.gaps(part), conditions, self.size)
 
-    @property
-    def points(self) -> Complexes:
-        """Places that the point P shall pass; none of a function."""
-        return self.positions.places
-
-    @property
-    def directions(self) -> Complexes:
-        """Unit vectors along the body at the positions."""
-        return self.positions.rotations
-
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what the outputs should be at each position, in the study's units."""
         turns = np.unwrap(np.angle(self.positions.rotations)) / self.factor
         return POINT, {POINT: self.positions.places.tolist(), f"{BODY}.angle": turns.tolist()}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionTask(_Task):
     """Pairs of an input angle and an output angle or place."""
 
@@ -147,16 +118,6 @@ class FunctionTask(_Task):
     def slides(self) -> bool:
         """Whether the output is a slide."""
         return self.section.output_kind != FOUR_BAR
-
-    @property
-    def size(self) -> float:
-        """The frame of a four-bar, or the stroke of a slider."""
-        return float(np.ptp(self.outputs)) if self.slides else float(self.section.frame or 1.0)
-
-    @property
-    def centre(self) -> complex:
-        """The middle of the mechanism."""
-        return complex(self.outputs.mean(), 0.0) if self.slides else self.size / 2 + 0j
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every assembly."""
@@ -182,11 +143,6 @@ class FunctionTask(_Task):
             links = self._couplers(body.choices(seen, frame, output, random, refined=False)[0])
             pools = self._assembled(links, conditions)
         yield from pools
-
-    @property
-    def error_factor(self) -> float:
-        """What the study's unit of errors is: 1 of lengths, radians in its unit of angle."""
-        return 1.0 if self.slides else self.factor
 
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what it should be at each position, in the study's units."""
@@ -242,7 +198,7 @@ class FunctionTask(_Task):
         return gaps
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PathTask(_Task):
     """Points that a point passes."""
 
@@ -250,29 +206,14 @@ class PathTask(_Task):
     given: int  # points that the task has, of which the path may have every second, third and so on
     kinds: Sequence[Kind]
 
-    @property
-    def centre(self) -> complex:
-        """The middle of the points."""
-        return self.path.centre
-
-    @property
-    def size(self) -> float:
-        """The extent of the points."""
-        return self.path.size
-
-    @property
-    def points(self) -> Complexes:
-        """Places that the point P shall pass; none of a function."""
-        return self.path.points
-
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and where it should be at each position."""
-        return solution.kind.point, {solution.kind.point: self.path.points.tolist()}
+        return solution.kind.point, {solution.kind.point: self.points.tolist()}
 
     def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
         """Linkages of every kind and assembly."""
-        if len(self.path.points) < self.given:
-            conditions.told.append(f"{len(self.path.points)} of {self.given} points count, evenly chosen")
+        if len(self.points) < self.given:
+            conditions.told.append(f"{len(self.points)} of {self.given} points count, evenly chosen")
         site, pools = conditions.sites[0], list[Pool]()
         # Where no sample is within all conditions the nearest is one of the others.
         wide = self.section.model_copy(update={"lengths": {}, "pivots": None, "transmission": None})
@@ -292,7 +233,7 @@ class PathTask(_Task):
         every = np.sort(np.concatenate(turns))
         starts = [replace(part, numbers=np.searchsorted(every, turn))
                   for part, turn in zip(starts, turns, strict=True)]  # fmt: skip
-        points, count, exact = len(self.path.points), len(every), list[paths.Starts]()
+        points, count, exact = len(self.points), len(every), list[paths.Starts]()
         few = points <= paths.MOST_EXACT
         # Where the points leave no choice, linkages that pass them may need an assembly at each.
         alone = few and len(kind.modes) > 1 and (points if self.free else 2 * points - 1) >= bound.freedom
@@ -309,7 +250,7 @@ class PathTask(_Task):
                 continue
             rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)
             values, angles = fits.values[rows], fits.angles[rows]
-            gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.path.points)
+            gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.points)
             none = np.zeros(gaps.shape, dtype=bool)
             yield Pool(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
         if not count:
@@ -335,7 +276,7 @@ class PathTask(_Task):
         samples = kind.samples(random, count, ratio, full_turn=section.needs_turn)
         if bound.in_place:
             samples = bound.placed(samples)
-        most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.path.points)))
+        most = max(_FEWEST, paths.POLISHED * _MANY // max(_MANY, len(self.points)))
         return paths.starts(kind, modes, self.path, samples, bound, most)
 
 
@@ -387,12 +328,18 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     if section.body is not None:
         places = np.array([complex(part.x, part.y) for part in section.body])
         positions = Positions(places, np.exp(1j * factor * np.array([part.angle for part in section.body])))
-        return BodyTask(section, factor, positions)
+        return BodyTask(section=section, factor=factor, centre=positions.centre, size=positions.size, points=places,
+                        directions=positions.rotations, positions=positions)  # fmt: skip
     if section.function is not None:
-        outputs = np.array(section.function.output, dtype=float)
-        slides = section.output_kind != FOUR_BAR
-        inputs = factor * np.array(section.function.input, dtype=float)
-        return FunctionTask(section, factor, inputs, outputs if slides else factor * outputs)
+        inputs, outputs = factor * np.array(section.function.input), np.array(section.function.output, dtype=float)
+        if section.output_kind != FOUR_BAR:
+            size, centre = float(np.ptp(outputs)), complex(outputs.mean())
+            return FunctionTask(
+                section=section, factor=factor, centre=centre, size=size, inputs=inputs, outputs=outputs
+            )
+        size = float(section.frame or 1.0)
+        return FunctionTask(section=section, factor=factor, centre=complex(size / 2), size=size, error_factor=factor,
+                            inputs=inputs, outputs=factor * outputs)  # fmt: skip
     assert section.path is not None
     points = section.path.points
     try:
@@ -416,4 +363,5 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     kinds = (
         [own_kind(study, section)] if section.of else [kind_of("path", name) for name in section.kinds or (FOUR_BAR,)]
     )
-    return PathTask(section, factor, path, given, kinds)
+    return PathTask(section=section, factor=factor, centre=path.centre, size=path.size, points=path.points, path=path,
+                    given=given, kinds=kinds)  # fmt: skip
