@@ -185,6 +185,34 @@ def test_of_more_positions_each_linkage_stands_once_and_is_a_mechanism() -> None
     assert {mechdesign.load(text=answer.files[name]).kinematics is not None for name in answer.files} == {True}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pairs", "zeros", "kind"),
+    [
+        (5, "fixed", "four_bar"),
+        (7, "free", "four_bar"),
+        (4, "fixed", "slider_crank"),
+        (7, "free", "slider_crank"),
+    ],
+)
+def test_the_study_of_a_function_misses_its_pairs_by_the_error_of_the_table(pairs: int, zeros: str, kind: str) -> None:
+    """The output as it moves; links' own angles count from the link or its other end, free ones from the best zero."""
+    output = [36, 50, 65, 76, 87, 92, 95] if kind == "four_bar" else [10, 14, 19, 25, 31, 36, 40]
+    function = f"{{input: {[97, 108, 120, 131, 143, 150, 155][:pairs]}, output: {output[:pairs]}}}"
+    text = f"{{function: {function}, kind: {kind}, zeros: {zeros}, limits: {{ratio: 1000, reach: 100}}, solutions: 2}}"
+    answer = mechdesign.synthesize(mechdesign.load(text=f"synthesis: {text}"))
+    for row, number in zip(answer.main, (1, 2), strict=False):
+        study = mechdesign.load(text=answer.files[f"solution_{number}.yaml"])
+        motion = mechdesign.kinematics(study).main
+        away = motion["rocker.angle" if kind == "four_bar" else "B.x"] - np.array(output[:pairs])
+        zero = away.mean() if zeros == "free" else 180 * np.round(away.mean() / 180) if kind == "four_bar" else 0
+        assert row["error"] > 0.1
+        assert np.sqrt(((away - zero) ** 2).mean()) == pytest.approx(row["error"], rel=1e-6)
+        assert abs(motion[f"{'rocker.angle' if kind == 'four_bar' else 'B.x'}_error"]).max() == pytest.approx(
+            row["max_error"], rel=1e-6
+        )
+
+
 def test_of_five_positions_without_a_slide_the_nearest_is_a_four_bar_and_misses_it() -> None:
     for key, missed in (("slide: true", "no side of the body is a slide"), ("kinds: trammel", "it is of another kind")):
         with pytest.raises(mechdesign.AssemblyError, match=f"the nearest is in nearest.yaml: {missed}"):

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.ground.errors import StudyError, counted
 from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.questions.synthesize import body, paths
 from mechdesign.questions.synthesize.body import Candidates, Positions
 from mechdesign.questions.synthesize.bounds import Bounds, KindBounds, RangeBounds
@@ -144,21 +145,39 @@ class FunctionTask(_Task):
             pools = self._assembled(links, conditions)
         yield from pools
 
+    def _away(self, poses: Configuration) -> Floats:
+        """By how much the output is beyond what it should be, shape (count, positions): its zero, and errors."""
+        if self.slides:
+            return np.asarray(poses.point("B").real - self.outputs)
+        return np.unwrap(np.angle(poses.rotation("rocker") * np.exp(-1j * self.outputs)))
+
+    def _zero(self, solution: Solution) -> float:
+        """From where the outputs of a linkage count."""
+        away = self._away(solution.poses)[0][solution.poses.valid[0]]
+        if self.section.zeros == "fixed":
+            return 0.0 if self.slides else float(np.pi * np.round(away.mean() / np.pi))
+        return float(away[0] if len(solution.elsewhere) else away.mean())
+
     def targets(self, solution: Solution) -> tuple[str, dict[str, Any]]:
         """The output that is judged, and what it should be at each position, in the study's units."""
-        if self.slides:
-            zero = np.nanmean(solution.poses.point("B")[0].real - self.outputs)
-            return "B.x", {"B.x": (self.outputs + zero).tolist()}
-        turned = (solution.poses.rotation("rocker")[0] * np.exp(-1j * self.outputs))[solution.poses.valid[0]]
-        zero = np.unwrap(np.angle(turned)).mean()
-        return "rocker.angle", {"rocker.angle": ((self.outputs + zero) / self.factor).tolist()}
+        output = "B.x" if self.slides else "rocker.angle"
+        return output, {output: ((self.outputs + self._zero(solution)) / self.error_factor).tolist()}
 
     def _assembled(self, links: Dyads, conditions: Conditions) -> list[Pool]:
         """The linkages with these couplers."""
         if not len(links):
             return []
         part = self._linkage(links)
-        return [*assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)]
+        pools = assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)
+        return [*pools] if self.section.zeros == "fixed" else [*map(self._from_best_zero, pools)]
+
+    def _from_best_zero(self, pool: Pool) -> Pool:
+        """The linkages with the errors from the zero that is best for all pairs, where one assembly passes them."""
+        way = pool.way
+        away = self._away(way.kind.solve(way.values, way.angles, way.modes))
+        best = np.abs(away - away.mean(axis=1, keepdims=True))
+        lost = (way.elsewhere | ~np.isfinite(pool.errors)).any(axis=1, keepdims=True)
+        return replace(pool, errors=np.where(lost, pool.errors, best))
 
     def _couplers(self, parts: Sequence[Dyads]) -> Dyads:
         """The links among dyads between the input and the output but the frame itself."""
