@@ -402,6 +402,18 @@ def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_o
     assert path.read_text() == TASK.replace("x: 46", "x: 47.0").replace("angle: 45", "angle: 46.0")
 
 
+def test_points_of_a_file_that_are_dragged_become_those_of_the_study(tmp_path):
+    (tmp_path / "points.csv").write_text("x,y\n55,60\n45,75\n25,75\n")
+    path = tmp_path / "path.yaml"
+    path.write_text("synthesis: {path: {points: points.csv}, evaluations: 100}\n")
+    session = session_of(load(path), lambda: load(path))
+    changes = {"synthesis.path.points.1.0": 47.0}
+    (whole,) = session.overrides(changes)
+    assert load(path, [whole]).synthesis.path.points == ((55, 60), (47, 75), (25, 75))
+    session.save({"changes": changes, "name": "moved.yaml"})
+    assert load(tmp_path / "moved.yaml").synthesis.path.points == ((55, 60), (47, 75), (25, 75))
+
+
 def test_a_notebook_shows_the_page_in_a_frame():
     frame = load(text=FOUR_BAR).live()
     try:
