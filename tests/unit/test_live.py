@@ -71,6 +71,7 @@ def test_one_number_is_enough_where_it_leads_to_the_hand(study):
     assert done.row == pytest.approx(9)
 
 
+@pytest.mark.slow
 def test_a_cranks_pin_turns_the_drive_along_its_circle_and_changes_the_length_across_it(study):
     along = dragged(study, {}, Drag("A", 32 * cmath.exp(0.7j), row=9, resolution=0.01, near=3.0))
     assert (along.changes, along.names) == ({}, (TURNED,))
@@ -88,6 +89,7 @@ def test_a_cranks_pin_turns_the_drive_along_its_circle_and_changes_the_length_ac
     assert locked.row == pytest.approx(36 - math.degrees(0.2) / 10, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_points_of_a_sketch_from_which_lengths_are_measured_are_dragged_as_its_entries():
     links = "{ground: {O: , D: }, crank: [O, A], rod: {A: , B: , P: }, rocker: [D, B]}"
     sketch = "{O: [0, 0], D: [100, 0], A: [0, 30], B: [75, 55], P: [40, 70]}"
@@ -380,6 +382,7 @@ synthesis:
 """
 
 
+@pytest.mark.slow
 def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_over_and_saved(tmp_path):
     path = tmp_path / "tray.yaml"
     path.write_text(TASK)
