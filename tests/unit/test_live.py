@@ -411,7 +411,7 @@ def test_points_of_a_file_that_are_dragged_become_those_of_the_study(tmp_path):
     path.write_text("synthesis: {path: {points: points.csv}, evaluations: 100}\n")
     session = session_of(load(path), lambda: load(path))
     changes = {"synthesis.path.points.1.0": 47.0}
-    (whole,) = session.overrides(changes)
+    (whole,) = overrides(session.study, altered(session.study, changes))
     assert load(path, [whole]).synthesis.path.points == ((55, 60), (47, 75), (25, 75))
     session.save({"changes": changes, "name": "moved.yaml"})
     assert load(tmp_path / "moved.yaml").synthesis.path.points == ((55, 60), (47, 75), (25, 75))
