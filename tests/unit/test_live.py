@@ -71,6 +71,7 @@ def test_one_number_is_enough_where_it_leads_to_the_hand(study):
     assert done.row == pytest.approx(9)
 
 
+@pytest.mark.slow
 def test_a_cranks_pin_turns_the_drive_along_its_circle_and_changes_the_length_across_it(study):
     along = dragged(study, {}, Drag("A", 32 * cmath.exp(0.7j), row=9, resolution=0.01, near=3.0))
     assert (along.changes, along.names) == ({}, (TURNED,))
@@ -88,6 +89,7 @@ def test_a_cranks_pin_turns_the_drive_along_its_circle_and_changes_the_length_ac
     assert locked.row == pytest.approx(36 - math.degrees(0.2) / 10, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_points_of_a_sketch_from_which_lengths_are_measured_are_dragged_as_its_entries():
     links = "{ground: {O: , D: }, crank: [O, A], rod: {A: , B: , P: }, rocker: [D, B]}"
     sketch = "{O: [0, 0], D: [100, 0], A: [0, 30], B: [75, 55], P: [40, 70]}"
@@ -380,6 +382,7 @@ synthesis:
 """
 
 
+@pytest.mark.slow
 def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_over_and_saved(tmp_path):
     path = tmp_path / "tray.yaml"
     path.write_text(TASK)
@@ -400,6 +403,18 @@ def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_o
         assert moved["coupler.angle"][k] == pytest.approx(angle, abs=1e-5)
     assert session.save({"changes": changes, "name": "", "replace": True}) == {"saved": "tray.yaml", "comments": True}
     assert path.read_text() == TASK.replace("x: 46", "x: 47.0").replace("angle: 45", "angle: 46.0")
+
+
+def test_points_of_a_file_that_are_dragged_become_those_of_the_study(tmp_path):
+    (tmp_path / "points.csv").write_text("x,y\n55,60\n45,75\n25,75\n")
+    path = tmp_path / "path.yaml"
+    path.write_text("synthesis: {path: {points: points.csv}, evaluations: 100}\n")
+    session = session_of(load(path), lambda: load(path))
+    changes = {"synthesis.path.points.1.0": 47.0}
+    (whole,) = overrides(session.study, altered(session.study, changes))
+    assert load(path, [whole]).synthesis.path.points == ((55, 60), (47, 75), (25, 75))
+    session.save({"changes": changes, "name": "moved.yaml"})
+    assert load(tmp_path / "moved.yaml").synthesis.path.points == ((55, 60), (47, 75), (25, 75))
 
 
 def test_a_notebook_shows_the_page_in_a_frame():

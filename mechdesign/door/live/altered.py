@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import lru_cache, partial
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
 
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
+from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.variants import with_entries
 
 SKETCH, TASK = "mechanism.sketch", "synthesis"
+POINTS = f"{TASK}.path.points"
 _KEPT = 8  # studies with other entries that are kept: a hand changes numbers on one of them
 
 
@@ -33,4 +36,21 @@ def altered(study: Study, changes: Mapping[str, float]) -> Study:
     return variant(base, {name: value for name, value in changes.items() if not is_entry(name)})
 
 
-_with_entries = lru_cache(_KEPT)(partial(with_entries, without=()))
+@lru_cache(_KEPT)
+def _with_entries(study: Study, entries: tuple[tuple[str, float], ...]) -> Study:
+    changes: list[tuple[str, Any]] = [*entries]
+    if any(name.startswith(f"{POINTS}.") for name, _ in entries):
+        # Those of a file become the study's own.
+        changes.insert(0, (POINTS, path_points(study)))
+    return with_entries(study, changes, without=())
+
+
+def path_points(study: Study) -> list[list[float]]:
+    """The points of a study's path, a row [x, y] each, of its file where they stand in one; none of other tasks."""
+    path = None if study.synthesis is None else study.synthesis.path
+    if path is None:
+        return []
+    rows: Sequence[Sequence[float]] = path.points if not isinstance(path.points, str) else []
+    if isinstance(path.points, str):
+        rows = read_table(study.folder, path.points).tolist()
+    return [[*map(float, row)] for row in rows]

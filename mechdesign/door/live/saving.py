@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ from mechdesign.ground.errors import StudyError
 from mechdesign.ground.files import flowing, proper, replace
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
-from mechdesign.study.text.document import dotted, in_yaml, leaves, plain
+from mechdesign.study.text.document import KeyPath, dotted, in_yaml, leaves, plain
 from mechdesign.study.variants import edited, in_text
 
 _NOWHERE = frozenset('\\:*?"<>|')  # characters that some systems do not have in names of files
@@ -27,9 +29,16 @@ def file_names(study: Study) -> dict[str, str]:
 
 def overrides(study: Study, changed: Study) -> list[str]:
     """What is otherwise in a changed study, as `--set` takes it, by the entries of the study."""
-    now = dict(leaves(plain(study.resolved)))
-    entries = leaves(plain(changed.resolved))
-    return [f"{dotted(keys)}={in_yaml(value)}" for keys, value in entries if keys not in now or now[keys] != value]
+    now, data = dict(leaves(plain(study.resolved))), plain(changed.resolved)
+    entries = dict[KeyPath, Any]()
+    for keys, value in leaves(data):
+        # What has parts now and had none is given whole.
+        whole = next((keys[:k] for k in range(1, len(keys)) if keys[:k] in now), None)
+        if whole is not None:
+            entries[whole] = reduce(getitem, whole, data)
+        elif keys not in now or now[keys] != value:
+            entries[keys] = value
+    return [f"{dotted(keys)}={in_yaml(value)}" for keys, value in entries.items()]
 
 
 def save(study: Study, changed: Study, name: str, *, own: bool, replacing: bool) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import tostring
 import numpy as np
 
 from mechdesign.commands import COMMANDS
-from mechdesign.door.live.altered import TASK, altered
+from mechdesign.door.live.altered import POINTS, TASK, altered, path_points
 from mechdesign.door.live.answers import DRAWING, PACKAGE
 from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
@@ -169,10 +169,8 @@ def _handles(study: Study) -> list[dict[str, Any]]:
         keys: tuple[Any, ...] = ("x", "y", "angle")
         what, where = "position", f"{TASK}.body"
         rows: list[tuple[float, ...]] = [(part.x, part.y, part.angle) for part in section.body]
-    elif section.path is not None and not isinstance(section.path.points, str):
-        keys, what, where, rows = (0, 1), "point", f"{TASK}.path.points", [*section.path.points]
     else:
-        return []
+        keys, what, where, rows = (0, 1), "point", POINTS, [*map(tuple, path_points(study))]
     return [
         {"label": f"{what} {k + 1}", "names": [f"{where}.{k}.{key}" for key in keys], "values": [*map(float, row)]}
         for k, row in enumerate(rows)

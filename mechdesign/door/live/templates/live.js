@@ -18,6 +18,9 @@
       const label = document.createElement("label");
       label.append(`${name} `, field, ` ${unit}`);
       moving.slider.after(label);
+      const fill = () => { if (document.activeElement !== field) field.value = moving.value(name); };
+      figure.addEventListener("moving-chosen", fill);
+      fill();
       field.addEventListener("change", () => {
         if (field.value !== "" && !moving.go({[name]: Number(field.value)})) own.tell(`${name} = ${field.value} is no pose of the motion`);
       });

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.door.report.page.linkage import Canvas, Sketcher, add
-from mechdesign.door.report.page.moving import gaps
-from mechdesign.door.report.page.tracks import TIMES, Cell, MovingPicture, ShownNumbers, deltas, places
+from mechdesign.door.report.page.tracks import TIMES, Cell, MovingPicture, ShownNumbers, deltas, gaps, places
 from mechdesign.door.report.page.vector import described, inline
 from mechdesign.door.report.tables import json_text
 from mechdesign.drawing.layout import draw
@@ -186,7 +185,7 @@ def _choice(sheet: Canvas, sweep: Sweep, alike: ShownNumbers | None) -> tuple[di
     share = (poses.numbers - poses.numbers[0]) / (poses.numbers[-1] - poses.numbers[0])
     return {
         "drawing": "".join(tostring(part, encoding="unicode") for part in layer), "poses": len(sweep.rows),
-        "first": int(sweep.valid[0]), "returns": sweep.returns, "gaps": gaps(sweep), "given": fields,
+        "first": int(sweep.valid[0]), "returns": sweep.returns, "gaps": gaps(sweep.configuration), "given": fields,
         "numbers": numbers.tracks, "times": deltas(share, TIMES),
     } | places(sheet, sweep.configuration, sweep.mechanism.description.links), numbers  # fmt: skip
 

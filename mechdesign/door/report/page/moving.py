@@ -26,6 +26,7 @@ from mechdesign.door.report.page.tracks import (
     MovingPicture,
     ShownNumbers,
     deltas,
+    gaps,
     meanings,
     places,
 )
@@ -79,14 +80,6 @@ _ARROWS = {
     "effort": ("Drives", LOOKS["effort"].color),
     "coupling": ("Couplings", LOOKS["coupling"].color),
     "shaking": ("Shaking force", style.SKY),
-}
-_WHY = {
-    Reason.NOT_CLOSED: "cannot be assembled here",
-    Reason.OTHER_ASSEMBLY: "in another assembly only",
-    Reason.LIMIT: "beyond a limit",
-    Reason.NOT_HELD: "does not hold its load here",
-    Reason.NOT_DETERMINED: "not determined here",
-    Reason.NO_VALUE: "a coupling has no value here",
 }
 _RATES = ("velocity", "acceleration")
 
@@ -236,7 +229,8 @@ def _at_rows(study: Study, rows: Floats) -> Sweep:
 
 def _tracks(sheet: Canvas, sweep: Sweep, earlier: Sweep | None) -> dict[str, Any]:
     """Where points and links of a motion are, and of that before, and where there are none."""
-    tracks = {**places(sheet, sweep.configuration, sweep.mechanism.description.links), "gaps": gaps(sweep)}
+    configuration = sweep.configuration
+    tracks = {**places(sheet, configuration, sweep.mechanism.description.links), "gaps": gaps(configuration)}
     if earlier is not None:
         tracks["before"] = places(sheet, earlier.configuration, earlier.mechanism.description.links)
     return tracks
@@ -288,14 +282,6 @@ def _drawing(
         sketcher.names(scenes)
         sketcher.ruler(study.units.label("length"))
     return tostring(root, encoding="unicode")
-
-
-def gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
-    """Runs of poses that are not valid: the first, the last, why in words."""
-    reason = sweep.configuration.reason
-    ends = np.flatnonzero(np.diff(reason)) + 1
-    runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
-    return [(begin, end - 1, _WHY[Reason.of(int(reason[begin]))]) for begin, end in runs if reason[begin]]
 
 
 def _rows(table: Table, numbers: ShownNumbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:

@@ -16,7 +16,7 @@ from mechdesign.ground.numerals import printed, reading
 from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.results import Table
 from mechdesign.ground.table_text import Rounding
-from mechdesign.mechanism import Configuration
+from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.elements.links import Link
 from mechdesign.mechanism.graph import GROUND
 
@@ -34,6 +34,15 @@ _STEPS = 1000
 _SMALL, _LARGE = 1e-4, 1e7
 _EXACT = 2.0**53  # integers below it are exact as numbers of 64 bits
 _LONG = 10.0  # a number varies little whose size is so many times its range
+
+_WHY = {
+    Reason.NOT_CLOSED: "cannot be assembled here",
+    Reason.OTHER_ASSEMBLY: "in another assembly only",
+    Reason.LIMIT: "beyond a limit",
+    Reason.NOT_HELD: "does not hold its load here",
+    Reason.NOT_DETERMINED: "not determined here",
+    Reason.NO_VALUE: "a coupling has no value here",
+}
 
 
 @dataclass(frozen=True)
@@ -249,3 +258,11 @@ def places(sheet: Canvas, configuration: Configuration, links: Mapping[str, Link
             angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
             tracks["turn"][name] = deltas(np.degrees(angles), TURNS)
     return tracks
+
+
+def gaps(configuration: Configuration) -> list[tuple[int, int, str]]:
+    """Runs of poses that are not valid: the first, the last, why in words."""
+    reason = configuration.reason
+    ends = np.flatnonzero(np.diff(reason)) + 1
+    runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
+    return [(begin, end - 1, _WHY[Reason.of(int(reason[begin]))]) for begin, end in runs if reason[begin]]

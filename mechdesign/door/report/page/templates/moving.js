@@ -461,6 +461,7 @@
       words.textContent = text;
       slider.value = near;
       slider.setAttribute("aria-valuetext", text);
+      figure.dispatchEvent(new Event("moving-chosen"));
     }
 
     // The pose of a time of the motion, between two where it is between two.
@@ -535,6 +536,7 @@
       drawing, slider, leading, stop: player.stop,
       go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; },
       seek(row) { choose(placed(row)); },
+      value: name => readout.text(data.given.find(([own]) => own === name)[2], Math.min(at, last)),
       words: () => words.textContent, at: () => at, row: here, data: () => data,
       point: name => [between(moved.x[name], Math.min(at, last)), between(moved.y[name], Math.min(at, last))],
       again() { begin(true); show(at); },
