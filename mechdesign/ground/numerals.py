@@ -35,15 +35,6 @@ def raised(power: int) -> str:
     return str(power).translate(_RAISED)
 
 
-def writable(encoding: str) -> bool:
-    """Whether an encoding has the letters of powers of ten."""
-    try:
-        f"\N{MIDDLE DOT}{raised(-1234567890)}".encode(encoding)
-    except (UnicodeEncodeError, LookupError):
-        return False
-    return True
-
-
 def plain_powers(text: str) -> str:
     """A text with powers of ten in letters that every encoding has: ``2.5*10^-6``."""
     return _TEN.sub(lambda power: f"{'*' * bool(power[1])}10^{power[2].translate(_LOWERED)}", text)

@@ -38,7 +38,8 @@ def test_bash_completes_what_is_typed(folder):
         ("run", "de"): [],
         ("kinematics", "--style", "p"): ["paper"],
         ("watch", "slider.yaml", "k"): ["kinematics"],
-        ("new", "f"): ["five_bar", "four_bar"],
+        ("new", "fo"): ["four_bar"],
+        ("new", "cam_"): ["cam_arm", "cam_dwell"],
         ("docs", "comp"): ["compare"],
         ("synthesize", "--set", "synthesis.judge.t"): ["synthesis.judge.tolerance"],
     }

@@ -50,11 +50,15 @@ def held(monkeypatch):
     ("command", "name", "place"),
     [
         ("run slider.yaml --no-plots --out out", "motion.csv", "out/kinematics"),
-        ("run slider.yaml --no-plots --out out", "manifest.json", "out/kinematics"),
+        pytest.param(
+            "run slider.yaml --no-plots --out out", "manifest.json", "out/kinematics", marks=pytest.mark.nightly
+        ),
         pytest.param("run slider.yaml --out out", "motion.png", "out/kinematics", marks=pytest.mark.nightly),
         ("kinematics slider.yaml --no-plots --report --out out", "report.html", "out"),
-        ("run slider.yaml --no-plots --junit ci/gate.xml", "gate.xml", "ci"),
-        ("export slider.yaml --to study.json --out out/study.json", "study.json", "out"),
+        pytest.param("run slider.yaml --no-plots --junit ci/gate.xml", "gate.xml", "ci", marks=pytest.mark.nightly),
+        pytest.param(
+            "export slider.yaml --to study.json --out out/study.json", "study.json", "out", marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_a_file_that_is_open_elsewhere_is_named_and_nothing_is_half_written(folder, invoke, held, command, name, place):
@@ -256,7 +260,9 @@ def test_what_a_code_page_lacks_is_written_in_other_letters(tmp_path, encoding, 
     assert (tmp_path / "out").read_bytes().decode(encoding) == told + "\n"
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["docs"], ["schema"], ["new"], ["run", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], pytest.param(["docs"], marks=pytest.mark.nightly), ["new"], ["run", "--help"]]
+)
 def test_code_pages_of_consoles_have_the_letters_of_help(invoke, arguments):
     """But the Greek letter that a unit may be written with, beside the sign."""
     letters = {*invoke(*arguments).stdout} - {"\N{GREEK SMALL LETTER MU}"}

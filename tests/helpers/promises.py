@@ -147,7 +147,7 @@ def _freeze() -> None:
     texts = {path.name: path.read_bytes() for path in sorted((ROOT / "configs").rglob("*.yaml"))}
     found = {name: facts(mechdesign.load(text=text.decode())) for name, text in texts.items()}
     with tarfile.open(STUDIES, "w:xz", preset=9) as archive:
-        for name, content in (*texts.items(), (FACTS, json.dumps(found).encode())):
+        for name, content in (*texts.items(), (FACTS, json.dumps(found, sort_keys=True).encode())):
             member = tarfile.TarInfo(name)
             member.size = len(content)
             archive.addfile(member, io.BytesIO(content))

@@ -57,8 +57,10 @@ def _paths(incomplete: str) -> list[str]:
 
 
 def _templates(incomplete: str) -> list[str]:
-    folder = Path(__file__).parents[2] / "study" / "templates"
-    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+    package = Path(__file__).parents[2]
+    shipped = next(filter(Path.is_dir, (package / "pages" / "configs", package.parent / "configs")), package)
+    files = (*(package / "study" / "templates").glob("*.yaml"), *shipped.rglob("*.yaml"))
+    return sorted({path.stem for path in files if path.stem.startswith(incomplete)})
 
 
 def _one_of(words: Iterable[str]) -> Callable[[str], list[str]]:

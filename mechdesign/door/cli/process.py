@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from mechdesign.ground.numerals import plain_letters, plain_powers, writable
+from mechdesign.ground.numerals import plain_letters, plain_powers
 from mechdesign.ground.work.interrupts import Signals
 
 _NOT_WRITTEN = 4  # exit code where results could not be written
@@ -116,13 +116,13 @@ def _stream(raw: _Unfailing, old: TextIO | None) -> TextIO:
         return old
     buffer = io.BufferedWriter(raw)
     at_once = raw.fileno() == 2 or buffer.isatty()
-    kind = io.TextIOWrapper if writable(encoding) else _PlainPowers
+    kind = io.TextIOWrapper if codecs.lookup(encoding).name.startswith("utf") else _PlainPowers
     # Lines end as in the files, whatever the system.
     return kind(buffer, encoding, errors=_LACKING, newline="\n", line_buffering=at_once)
 
 
 class _PlainPowers(io.TextIOWrapper):
-    """A stream whose encoding lacks raised digits: without them a number would lose its power of ten."""
+    """A stream of a code page, which lacks raised digits or has some of them: a power of ten is written with none."""
 
     def write(self, text: str) -> int:
         super().write(plain_powers(text))
