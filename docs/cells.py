@@ -9,6 +9,7 @@ import itertools
 import json
 import os
 import re
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,9 @@ def shown(value: Any) -> str:
         drawn, small = io.BytesIO(), io.BytesIO()
         value.savefig(drawn, format="png")
         Image.open(drawn).convert("RGB").quantize(_COLOURS).save(small, format="png", optimize=True)
-        return f'<img alt="" src="data:image/png;base64,{base64.b64encode(small.getvalue()).decode()}">'
+        words_of = (*value.texts, *(axes.title for axes in value.axes), *(axes.yaxis.label for axes in value.axes))
+        alt = escape(next(filter(None, (text.get_text() for text in words_of)), ""))
+        return f'<img alt="{alt}" src="data:image/png;base64,{base64.b64encode(small.getvalue()).decode()}">'
     html = getattr(value, "_repr_html_", lambda: None)()
     return html or ""
 

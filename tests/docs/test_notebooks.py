@@ -45,7 +45,9 @@ def test_pictures_and_tables_are_shown_and_numbers_are_text() -> None:
         def _repr_html_(self) -> str:
             return "<table></table>"
 
-    assert cells.shown(Figure()).startswith('<img alt="" src="data:image/png;base64,')
+    figure = Figure()
+    figure.subplots().set_title("Height < stroke")
+    assert cells.shown(figure).startswith('<img alt="Height &lt; stroke" src="data:image/png;base64,')
     assert cells.shown(Table()) == "<table></table>"
     assert cells.shown(1.5) == ""
 

@@ -7,6 +7,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.door.reference.sources import indices as indices_told
 from mechdesign.door.report.tables import to_csv
 from mechdesign.drawing.pictures import figures
 from mechdesign.questions.workspace import indices
@@ -65,6 +66,12 @@ def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
     best = "optimize={variables: {lower.length: {from: 20, to: 40, number: 3}}, maximize: reach_mean}"
     optimum = mechdesign.optimize(study_of(ARM, best)).main
     assert optimum["lower.length"][0] == 40
+
+
+def test_the_reference_has_the_whole_sentence_of_a_new_index(reach: Path) -> None:
+    reach.with_name("remote.py").write_text(FILE.replace("from the origin.", "\nfrom the origin.", 1))
+    (told,) = (entry.text for entry in indices_told() if entry.word == "remote")
+    assert told == "Reach: distance of the workspace's point from the origin."
 
 
 def test_what_a_new_index_needs_is_checked(reach: Path) -> None:

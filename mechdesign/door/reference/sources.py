@@ -28,7 +28,7 @@ def terms() -> Iterator[Entry]:
 def indices() -> Iterator[Entry]:
     """Local indices, with their formulas, units and sources."""
     for name, index in INDEX_NAMES.items():
-        text = quoted((import_module(f"{FOLDER}.{name}").__doc__ or "").partition("\n")[0])
+        text = quoted(" ".join((getdoc(import_module(f"{FOLDER}.{name}")) or "").partition("\n\n")[0].split()))
         formula = f"{index.formula}: {index.meaning}" if index.formula else index.meaning
         needs = f" It needs the section {index.section}." if index.section else ""
         unit = (getdoc(index.unit) or "").partition("\n")[0].removesuffix(".")
