@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -17,7 +18,9 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Floats
 
 SOURCE = Path(__file__).parents[1] / "tests" / "benchmarks" / "floors.c"
-FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
+# Processors other than those of PCs have no `native` in every compiler.
+NATIVE = ("-march=native",) if platform.machine() in ("x86_64", "AMD64") else ()
+FLAGS = ("-O3", *NATIVE, "-ffast-math", "-shared", "-fPIC")
 Places = Callable[[int], tuple[Floats, Floats]]  # so many places between 0 and 1, and their weights
 
 
