@@ -31,6 +31,22 @@ def test_a_side_that_finds_something_else_ends_the_command(monkeypatch: pytest.M
         benchmarks.compare(ROWS["robots"], rounds=1, share=0.001)
 
 
+def test_the_command_prints_a_row_and_leaves_the_stored_run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = benchmarks.MEASURED.read_bytes()
+    monkeypatch.setattr("sys.argv", ["benchmarks.py", "robots", "--rounds", "1"])
+    benchmarks.main()
+    head, _, row = capsys.readouterr().out.strip().splitlines()
+    assert head == "| our time over that of | C | NumPy | pylinkage |"
+    assert re.match(r"\| \*\*Designs of a five-bar\.\*\* .*\| \*\*\d+\*\* \(\d+ to \d+\) \|", row)
+    assert benchmarks.MEASURED.read_bytes() == before
+    monkeypatch.setattr("sys.argv", ["benchmarks.py", "no_such_row"])
+    with pytest.raises(SystemExit):
+        benchmarks.main()
+    assert "no row no_such_row" in capsys.readouterr().err
+
+
 def test_the_tables_are_those_of_the_stored_run() -> None:
     data, pages = benchmarks.measured(), benchmarks.pages()
     assert list(data["rows"]) == list(ROWS)
