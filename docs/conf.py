@@ -21,7 +21,14 @@ extensions = [
     "sphinxcontrib.typer",
     "pages",
 ]
-exclude_patterns = ["_run", "_build", "gallery/_home.md", "theory/_path_problems*.md"]
+exclude_patterns = [
+    "_run",
+    "_build",
+    "gallery/_home.md",
+    "theory/_path_problems*.md",
+    "theory/_limits.md",
+    "_benchmarks*.md",
+]
 nitpicky = True
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3

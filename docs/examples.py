@@ -261,11 +261,12 @@ def run(tools: Path, path: Path, base: Path = RUN) -> tuple[str, list[str]]:
 
 
 def pages(names: Iterable[str] = ()) -> list[Path]:
-    """Pages with examples: those named, or all."""
+    """Pages with examples: those named, or all; made parts of pages, whose names begin with "_", have none."""
     return [Path(name).resolve() for name in names] or [
-        *sorted(ROOT.glob("*.md")),
-        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md")) if PARTS not in path.parents),
-    ]
+        *sorted(ROOT.glob("[!_]*.md")),
+        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("[!_]*.md"))
+          if PARTS not in path.parents),
+    ]  # fmt: skip
 
 
 def wrong(paths: Iterable[Path]) -> list[str]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import benchmarks
 import cells
 import examples
 import gallery
+import limits
 import lists
 import papers
 import path_problems
@@ -19,7 +21,10 @@ from steps import step
 
 ROOT = Path(__file__).parent
 # What makes pages: functions that give their texts by their paths.
-MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages, path_problems.pages, verification.pages)
+MAKERS = (
+    gallery.with_thumbnails, lists.pages, papers.pages, path_problems.pages, verification.pages, benchmarks.pages,
+    limits.pages,
+)  # fmt: skip
 # Reports that pages show, by their names in the folder `_static`: what an example has written.
 REPORTS = {"first_four_bar.html": "tutorials/first_four_bar/results/study/kinematics/report.html"}
 

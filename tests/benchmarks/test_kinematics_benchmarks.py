@@ -1,8 +1,6 @@
 """Speed of kinematics: closed forms with their derivatives, groups solved by Newton's method, and single poses.
 
 Populations of designs, in processor time a design, stand beside a closed form of the same written in NumPy by hand.
-
-pylinkage's compiled stepping of the same four-bar runs beside it where it is installed (`pip install .[benchmark]`).
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from floors import ends_of_turns, five_bar_ranges
 from helpers.memory import peak_of
 from helpers.studies import study_of
 
@@ -107,17 +106,6 @@ def test_memory_of_ten_million_poses(tmp_path: Path) -> None:
     assert peak_of(command) < 1e9
 
 
-def test_pylinkage_steps_a_second(benchmark: Any) -> None:
-    pylinkage = pytest.importorskip("pylinkage")
-    o, d = pylinkage.Ground(0.0, 0.0, name="O"), pylinkage.Ground(4.0, 0.0, name="D")
-    crank = pylinkage.Crank(anchor=o, radius=1.0, angular_velocity=0.01, name="A")
-    pin = pylinkage.RRRDyad(anchor1=crank.output, anchor2=d, distance1=3.5, distance2=3.0, name="B")
-    linkage = pylinkage.Linkage([o, d, crank, pin])
-    places = benchmark.pedantic(linkage.step_fast, (POSES,), rounds=7, warmup_rounds=1)
-    assert np.isfinite(places).all()
-    benchmark.extra_info["poses_per_second"] = POSES / benchmark.stats.stats.min
-
-
 def platform_drives(mechanism: Mechanism, count: int) -> list[np.ndarray]:
     """Leg lengths for random poses about the sketch."""
     random = np.random.default_rng(0)
@@ -193,52 +181,16 @@ def evaluated(text: str, names: Sequence[str], minimised: str, condition: str) -
     return Evaluator(designs_question(study)), population(names, study)
 
 
-def four_bar_turn(crank: np.ndarray, rod: np.ndarray, rocker: np.ndarray) -> list[np.ndarray]:
-    """Range of C.x, time ratio of the rocker, least transmission angle: places of 5 degrees, then Newton's method."""
-    theta = np.linspace(0, 2 * np.pi, 73)
-    a, b, c, d = (np.reshape(v, (-1, 1)) for v in (crank, rod, rocker, 4.0))
-
-    def poses(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        pin = a * np.exp(1j * theta)
-        span = d - pin
-        along = (np.abs(span) ** 2 + b**2 - c**2) / (2 * np.abs(span))
-        turn = span / np.abs(span) * (along + 1j * np.sqrt(b**2 - along**2)) / b
-        return pin + (1.75 + 1.5j) * turn, np.angle(pin + b * turn - d)
-
-    found = []
-    for part in (0, 1):
-        ends = []
-        for sign in (1, -1):
-            values = sign * (poses(theta)[part].real)
-            place = theta[values.argmax(axis=1)][:, None]
-            for _ in range(4):
-                low, middle, high = (sign * poses(place + h)[part].real for h in (-1e-3, 0.0, 1e-3))
-                place = place - 5e-4 * (high - low) / (high - 2 * middle + low)
-            ends.append((sign * poses(place)[part].real, place))
-        found += [ends[0][0] + ends[1][0], ends[0][1] - ends[1][1]]
-    mu = [np.arccos((b**2 + c**2 - (d + side * a) ** 2) / (2 * b * c)) for side in (-1, 1)]
-    return [*found, np.minimum(mu[0], np.pi - mu[1])]
-
-
 def test_ends_of_a_turn_of_many_designs(benchmark: Any) -> None:
     """At most 0.3 ms a design: a range, a time ratio and the least transmission angle of a four-bar's turn."""
     goals = "kinematics.extremes.C.x.range, kinematics.extremes.rocker.angle.time_ratio"
     evaluator, batch = evaluated(MEASURED + TURN, LENGTHS, goals, "{result: kinematics.mu, at_least: 20}")
     found = benchmark.pedantic(evaluator, (batch,), rounds=3, warmup_rounds=1)
     assert not any(found.reasons)
-    floor = four_bar_turn(*batch.values())
-    np.testing.assert_allclose(found.table[:, 0], floor[0][:, 0], rtol=1e-6)
+    floor = ends_of_turns(*batch.values())
+    np.testing.assert_allclose(found.table[:, 0], floor[0], rtol=1e-6)
     benchmark.extra_info["ms_a_design"] = processor_time(lambda: evaluator(batch))
-    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: four_bar_turn(*batch.values()))
-
-
-def five_bar_sweep(lower_1: np.ndarray, upper_1: np.ndarray, lower_2: np.ndarray) -> np.ndarray:
-    """Angle of the first drive at 91 poses, and its range."""
-    reach = 1j * np.linspace(160, 250, 91) - 100
-    a, b, c = (np.reshape(v, (-1, 1)) for v in (lower_1, upper_1, lower_2))
-    other = np.arccos((c**2 + np.abs(reach) ** 2 - 215**2) / (2 * c * np.abs(reach)))
-    angle = np.angle(reach) - np.arccos((a**2 + np.abs(reach) ** 2 - b**2) / (2 * a * np.abs(reach)))
-    return np.ptp(angle, axis=1) + 0 * other.sum(axis=1)
+    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: ends_of_turns(*batch.values()))
 
 
 def test_a_sweep_of_a_five_bar_of_many_designs(benchmark: Any) -> None:
@@ -249,11 +201,11 @@ def test_a_sweep_of_a_five_bar_of_many_designs(benchmark: Any) -> None:
     evaluator, batch = evaluated(text, names, goal, condition)
     found = benchmark.pedantic(evaluator, (batch,), rounds=3, warmup_rounds=1)
     assert not any(found.reasons)
-    floor = np.degrees(five_bar_sweep(*batch.values()))
+    floor = five_bar_ranges(*batch.values())
     assert (found.table[:, 0] >= floor - 1e-9).all()
     np.testing.assert_allclose(found.table[:, 0], floor, rtol=1e-2)
     benchmark.extra_info["ms_a_design"] = processor_time(lambda: evaluator(batch))
-    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: five_bar_sweep(*batch.values()))
+    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: five_bar_ranges(*batch.values()))
 
 
 def test_all_tables_of_many_designs(benchmark: Any) -> None:

@@ -1,18 +1,17 @@
-"""Samples a second of plain Monte Carlo, beside hand-tuned C where there is a compiler; what rare failures cost."""
+"""Samples a second of plain Monte Carlo, what rare failures cost, and the first order of many designs."""
 
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from floors import five_bar_deviations
 from helpers.memory import peak_of
 
 import mechdesign
@@ -24,16 +23,6 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 ARM_SAMPLES = 2_000_000
 
 
-@pytest.fixture(scope="session")
-def floor(compiled: Callable[[str], Path]) -> float:
-    """Samples a second of kernel A of the arm in C, on two threads."""
-    command = [str(compiled("arm_monte_carlo")), "10000000", "2", "5"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    found = re.search(r"^A .*?([\d.]+) Msamples/s", said, re.MULTILINE)
-    assert found is not None
-    return 1e6 * float(found[1])
-
-
 def arm(samples: int) -> Any:
     changes = [
         f"reliability.samples={samples}",
@@ -41,13 +30,6 @@ def arm(samples: int) -> Any:
         "reliability.methods=[monte_carlo]",
     ]
     return mechdesign.load(CONFIGS / "two_link_arm.yaml", overrides=changes)
-
-
-def test_arm_against_c(benchmark: Any, floor: float) -> None:
-    study = arm(ARM_SAMPLES)
-    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=5, warmup_rounds=1)
-    rate = ARM_SAMPLES / benchmark.stats["min"]
-    benchmark.extra_info.update(samples_per_second=rate, of_the_floor=rate / floor)
 
 
 def processor() -> float:
@@ -189,31 +171,6 @@ reliability:
 optimize: {method: search, variables: {l1: {from: 35, to: 45}, tol: {from: 0.01, to: 0.03}}, minimize: [{result}]}
 """
 DESIGNS = 100
-
-
-def five_bar_deviations(l1: Any, l2: float, tol: Any) -> Any:
-    """sqrt(sum (J_i sigma_i)^2) of the same outputs, poses and sources, by hand: shape (2, designs, 10)."""
-    theta1, theta2 = np.radians(np.linspace(90, 126, 10)), np.radians(80.0)
-    e1, e2 = np.exp(1j * theta1), np.exp(1j * theta2)
-    b, d = l1[:, None] * e1, 50 + l1[:, None] * e2
-    half = 0.5 * (d - b)
-    c = b + half + 1j * half / np.abs(half) * np.sqrt(l2**2 - np.abs(half) ** 2)
-    u, v = (c - b) / l2, (c - d) / l2
-    cross = u.real * v.imag - u.imag * v.real
-
-    def moved(one: Any, other: Any) -> Any:
-        """Of C, where it moves so far along both upper links."""
-        return np.stack([one * v.imag - other * u.imag, other * u.real - one * v.real]) / cross
-
-    def dot(a: Any, z: Any) -> Any:
-        return a.real * z.real + a.imag * z.imag
-
-    sigma, drive = (tol / 3)[:, None], np.radians(0.03) / 3
-    parts = [
-        moved(dot(u, e1), 0) * sigma, moved(0, dot(v, e2)) * sigma, moved(1, 0) * sigma, moved(0, 1) * sigma,
-        moved(0, v.real) * (0.02 / 3), moved(dot(u, 1j * b), 0) * drive, moved(0, dot(v, 1j * (d - 50))) * drive,
-    ]  # fmt: skip
-    return np.sqrt(sum(part**2 for part in parts))
 
 
 @pytest.mark.parametrize(("result", "limits"), [

@@ -1,12 +1,10 @@
-"""All designs of the 2-RRR's grid, beside brute force in C where a compiler and its source are at hand."""
+"""All designs of the 2-RRR's grid, single regions, and batches of them."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,26 +24,8 @@ STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"
 DESIGNS = 4556
 
 
-@pytest.fixture(scope="session")
-def floor(compiled: Callable[[str], Path]) -> float | None:
-    """Seconds of one processor for the C program's 200 x 300 midpoint nodes a design; None where it is not at hand."""
-    try:
-        program = str(compiled("workspace_sums"))
-    except pytest.skip.Exception:
-        return None
-    return min(_child_seconds([program], {"OMP_NUM_THREADS": "1"}) for _ in range(3))
-
-
-def _child_seconds(command: Sequence[str], environment: Mapping[str, str]) -> float:
-    """Processor time of a command."""
-    before = os.times()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **environment})
-    after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
-
-
-def test_all_designs_against_c(benchmark: Any, floor: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Processor time of the whole grid to 1e-4, and nodes a design of its integrals, beside the C sums of the same."""
+def test_all_designs(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time of the whole grid to 1e-4, and nodes a design of its integrals."""
     study = mechdesign.load(STUDY)
     nodes, seconds = [], []
     on_rays = Local.on_rays
@@ -64,8 +44,6 @@ def test_all_designs_against_c(benchmark: Any, floor: float | None, monkeypatch:
     result = benchmark.pedantic(all_designs, rounds=3)
     assert result.counts["designs"] == DESIGNS
     benchmark.extra_info.update(seconds=min(seconds), nodes_a_design=sum(nodes) / len(seconds) / DESIGNS)
-    if floor is not None:
-        benchmark.extra_info.update(floor=floor, of_the_floor=min(seconds) / floor)
 
 
 def test_one_region(benchmark: Any) -> None:

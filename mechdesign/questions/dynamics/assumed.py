@@ -26,6 +26,11 @@ def assumed(study: Study) -> list[Caution]:
     if (moves or any(section.gravity)) and (centers := ", ".join(_centers(study))):
         message = f"centres of mass that are left out are the middles of joints: {centers}; give 'center'"
         warnings.append(Caution("assumed", message))
+    acting = any(_masses(study)) or section.loads or study.mechanism.description.springs
+    if study.dynamics is not None and moves and not acting:
+        warnings.append(
+            Caution("assumed", "no link has a mass, and no load or spring acts: efforts and forces are zero")
+        )
     if moves and (points := ", ".join(_points(study))):
         message = f"without 'inertia' these are point masses, with no moment of inertia of their own: {points}"
         warnings.append(Caution("assumed", message))
