@@ -98,6 +98,12 @@ def test_the_points_of_a_sketch_from_which_lengths_are_measured_are_dragged_as_i
     done = dragged(drawn, {}, Drag("B", 80 + 62j, row=18, resolution=0.01))
     assert done.changes == pytest.approx({"mechanism.sketch.B.0": 80.0, "mechanism.sketch.B.1": 62.0}, abs=0.02)
     assert altered(drawn, done.changes).sizes["rocker.length"] == pytest.approx(math.hypot(20, 62), abs=0.03)
+    # No length changes in silence, and only those are told that the drag has changed.
+    drag = {"point": "B", "to": [80, 62], "row": 18}
+    words = Session(drawn).move({**MOVE, "changes": {"mechanism.sketch.D.0": 101.0}, "drag": drag})["words"]
+    assert {text.split(" = ")[0] for text in words} == {
+        "sketch.B.0", "sketch.B.1", "rod.B.x", "rod.P.x", "rod.P.y", "rocker.length",
+    }  # fmt: skip
 
 
 def test_the_pin_of_a_slider_moves_its_guide_across_and_a_link_along():

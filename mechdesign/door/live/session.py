@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -40,6 +40,7 @@ _ORDER, _LONG = (
 )
 _MOST_ROWS = 20_000  # poses that a page draws
 _MOST_PAGES = 16  # whose answers are kept: those that asked last
+_ALIKE = 1e-9  # lengths and angles that differ by less are the same
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
 _REACH = 0.6  # of a slider to both sides, as a part of the number
 _WAY = 0.3  # of a slider of a number that is zero, as a part of the mechanism's size
@@ -232,12 +233,18 @@ class Session:
         now = altered(study, changes)
         own = now if study is self.study else altered(self.study, self._own(changes))
         drawing, tracks = posed(now, steps(str(asked.get("rows")), count) / ROWS, sheet, study)
-        told, entries = [name for name in names if name != TURNED], saving.overrides(self.study, own)
-        if any(map(is_entry, changes)):
-            # What is measured in the sketch changes with it, and none of it in silence.
-            told += [name for name in now.parameters.measured if not math.isclose(now.sizes[name], study.sizes[name])]
         return {"changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
-                "set": entries, "words": [self._in_words(now, name) for name in told]}  # fmt: skip
+                "set": saving.overrides(self.study, own), "words": [*self._words(names, changes, now)]}  # fmt: skip
+
+    def _words(self, names: Sequence[str], changes: Mapping[str, float], now: Study) -> Iterator[str]:
+        """What a drag has changed, in words: its numbers, and what is measured in a sketch that it has moved."""
+        drawn = {*filter(is_entry, names)}
+        if drawn:
+            before = altered(self.shown, {name: value for name, value in changes.items() if name not in drawn})
+        for name in (*names, *(free_numbers(self.shown) if drawn else ())):
+            moved = name in names or not math.isclose(now.sizes[name], before.sizes[name], abs_tol=_ALIKE)
+            if name != TURNED and moved:
+                yield self._in_words(now, name)
 
     @np.errstate(all="ignore")
     def assembly(self, asked: Mapping[str, Any]) -> dict[str, Any]:
