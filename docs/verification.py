@@ -37,7 +37,7 @@ def agreement(row: Row) -> str:
 
 def cells(row: Row, letter: str = "") -> list[str]:
     """A number as a line of a page's table; the letter is that of its note."""
-    label = f"`{row.label}`" + (f" ({row.unit})" if row.unit else "")
+    label = (row.label if row.named else f"`{row.label}`") + (f" ({row.unit})" if row.unit else "")
     label += f", largest difference of {row.count}" if row.count > 1 else ""
     ours = shown(row.ours) + (f"{{sup}}`{letter}`" if letter else "")
     difference = "" if row.bound else f"{row.difference:.1e}" if row.difference else "0"
