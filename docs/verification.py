@@ -90,6 +90,13 @@ def page(case: Case, rows: Sequence[Row]) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
+def work(case: Case) -> str:
+    """The book, paper or program that a case is from, without the place in it; else what it is compared with."""
+    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w|"
+                      r"Lecture notes|Reference numbers)", case.source)  # fmt: skip
+    return found[1] if found else f"{case.evidence}, of no book"
+
+
 def overview(ran: Mapping[str, Sequence[Row]]) -> str:
     """The page of all cases."""
     every = [cases()[name] for name in ran]
@@ -113,6 +120,7 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
         "```sh\npython docs/verification.py\n```",
         "runs them all and prints the tables of this manual; with names, the cases of these names.",
         table(["question", *EVIDENCE, "cases"], *lines),
+        "[Below](#sources) they are counted by their sources.",
         "\n".join(f"- *{evidence}*: {words}" for evidence, words in EVIDENCE.items()),
         "The difference of a case is its largest, as a part of the largest number compared. Of printed numbers it is "
         "mostly that of their rounding. Intervals of samples, limits and misprints have none.",
@@ -126,6 +134,11 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
             worst = f"{max(row.part for row in rows):.0e}"
             lines.append([f"[{case.title}]({case.name}.md)", case.source, case.evidence, number, worst])
         parts += [f"## {question}", table(["case", "source", "compared with", "numbers", "difference"], *lines)]
+    works: dict[str, list[float]] = {}
+    for case in every:
+        works.setdefault(work(case), []).append(max(row.part for row in ran[case.name]))
+    lines = [[name, str(len(parts_of)), f"{max(parts_of):.0e}"] for name, parts_of in sorted(works.items())]
+    parts += ["## Sources", table(["source", "cases", "largest difference"], *lines)]
     return "\n\n".join(parts) + "\n"
 
 
