@@ -52,6 +52,7 @@ class Row:
     count: int = 1  #: of rows of a table that were compared, of which this differs most
     scale: float = 1.0  #: of which the difference is a part
     agrees: bool = False
+    named: bool = False  #: by words, not by its expression
     note: str = ""  #: why the printed number is another one
     bound: str = ""  #: the interval or limit that ours lies within
 
@@ -262,7 +263,7 @@ def _compared(check: Mapping[str, Any], names: Names, units: Mapping[str, str], 
         agrees &= not abs(ours[worst] - float(printed)) <= half_unit(printed)
         told = np.full(ours.shape, float(printed))
     return Row(_label(check) + variant, units.get(check["of"], ""), told[worst], ours[worst], printed, len(ours), scale,
-               agrees, note, bound)  # fmt: skip
+               agrees, "name" in check, note, bound)  # fmt: skip
 
 
 def _label(check: Mapping[str, Any]) -> str:
@@ -320,7 +321,7 @@ def _matrix(table: str, columns: Any, rows: Sequence[Any], notes: Sequence[Any])
     for row in rows:
         for (label, column), printed in zip(every.items(), row["printed"].split(), strict=True):
             at = {**row.get("at", {}), **column.get("at", {})}
-            check = {"table": table, "name": f"{label}, {row['name']}", **column, "at": at}
+            check = {"table": table, "name": f"{label}, {row['name']}", **column, "at": at, "set": row.get("set", {})}
             if printed.startswith("<"):
                 yield {**check, "at_most": float(printed[1:])}
             elif printed != "-":

@@ -10,7 +10,7 @@ import platform
 import re
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import scipy
@@ -37,8 +37,10 @@ def agreement(row: Row) -> str:
 
 def cells(row: Row, letter: str = "") -> list[str]:
     """A number as a line of a page's table; the letter is that of its note."""
-    label = f"`{row.label}`" + (f" ({row.unit})" if row.unit else "")
-    label += f", largest difference of {row.count}" if row.count > 1 else ""
+    label = row.label if row.named else f"`{row.label}`"
+    label += f" ({row.unit})" if row.unit and not row.label.endswith(")") else ""
+    if row.count > 1:
+        label += f", all {row.count} rows" if row.bound else f", largest difference of {row.count}"
     ours = shown(row.ours) + (f"{{sup}}`{letter}`" if letter else "")
     difference = "" if row.bound else f"{row.difference:.1e}" if row.difference else "0"
     return [label, row.bound or row.printed or shown(row.expected), ours, difference, agreement(row)]
@@ -90,6 +92,18 @@ def page(case: Case, rows: Sequence[Row]) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
+def largest(differences: Iterable[float]) -> str:
+    """The largest of some differences, in words."""
+    return f"{max(differences):.0e}".replace("0e+00", "0")
+
+
+def work(case: Case) -> str:
+    """The book, paper or program that a case is from, without the place in it; else what it is compared with."""
+    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w|"
+                      r"Lecture notes|Reference numbers)", case.source)  # fmt: skip
+    return found[1] if found else f"{case.evidence}, of no book"
+
+
 def overview(ran: Mapping[str, Sequence[Row]]) -> str:
     """The page of all cases."""
     every = [cases()[name] for name in ran]
@@ -113,6 +127,7 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
         "```sh\npython docs/verification.py\n```",
         "runs them all and prints the tables of this manual; with names, the cases of these names.",
         table(["question", *EVIDENCE, "cases"], *lines),
+        "[Below](#sources) they are counted by their sources.",
         "\n".join(f"- *{evidence}*: {words}" for evidence, words in EVIDENCE.items()),
         "The difference of a case is its largest, as a part of the largest number compared. Of printed numbers it is "
         "mostly that of their rounding. Intervals of samples, limits and misprints have none.",
@@ -123,9 +138,14 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
             rows = ran[case.name]
             noted = sum(bool(row.note) for row in rows)
             number = f"{len(rows)}" + (f", {noted} with notes" if noted else "")
-            worst = f"{max(row.part for row in rows):.0e}"
+            worst = largest(row.part for row in rows)
             lines.append([f"[{case.title}]({case.name}.md)", case.source, case.evidence, number, worst])
         parts += [f"## {question}", table(["case", "source", "compared with", "numbers", "difference"], *lines)]
+    works: dict[str, list[float]] = {}
+    for case in every:
+        works.setdefault(work(case), []).append(max(row.part for row in ran[case.name]))
+    lines = [[name, str(len(differences)), largest(differences)] for name, differences in sorted(works.items())]
+    parts += ["## Sources", table(["source", "cases", "largest difference"], *lines)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -23,8 +23,9 @@ def test_case(name: str) -> None:
         # What the site shows of results/ is what comes out today.
         shown = list(case.rows(recorded=True))
         assert verification.wrong(case, shown) == []
-        alone = [(one.ours, other.ours) for one, other in zip(shown, rows, strict=True) if one.count == 1]
-        assert [one for one, _ in alone] == pytest.approx([other for _, other in alone], rel=1e-9, abs=1e-15)
+        gaps = [abs(one.ours - other.ours) / (one.scale or 1.0) for one, other in zip(shown, rows, strict=True)
+                if one.count == 1]  # fmt: skip
+        assert max(gaps, default=0.0) < 1e-9
 
 
 def test_every_question_has_cases_from_elsewhere_and_none_is_without_a_source() -> None:

@@ -8,15 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from helpers.tolerances import HALVES
 
 import mechdesign
 
-# Half a standard tolerance of IT5 to IT12, mm, of sizes above 30 to 50 mm, 50 to 80 mm and 80 to 120 mm.
-HALVES = {
-    40: [5.5e-3, 8e-3, 12.5e-3, 19.5e-3, 31e-3, 50e-3, 80e-3, 125e-3],
-    60: [6.5e-3, 9.5e-3, 15e-3, 23e-3, 37e-3, 60e-3, 95e-3, 150e-3],
-    100: [7.5e-3, 11e-3, 17.5e-3, 27e-3, 43.5e-3, 70e-3, 110e-3, 175e-3],
-}
 NAMES = [f"IT{number}" for number in range(5, 13)]
 # An error that is the sum of a, b and c, and that of the motor.
 SUM = """
