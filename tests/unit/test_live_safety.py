@@ -99,6 +99,11 @@ def test_a_name_of_another_host_that_leads_here_is_refused(server):
     assert answered(server, [PAGE, f"Host: localhost:{server.server_port}"], host=False) == 200
 
 
+def test_a_browser_does_not_name_the_port_of_http(server, monkeypatch):
+    monkeypatch.setattr(server, "server_port", 80)
+    assert server.hosts == ("127.0.0.1", "localhost")
+
+
 def test_a_body_of_a_million_bytes_is_read_and_one_byte_more_is_not(server):
     # A million blanks are no JSON.
     assert answered(server, [POST, "Content-Length: 1000000"], b" " * 1_000_000) == 400

@@ -17,6 +17,7 @@ from contextlib import suppress
 from functools import partial
 from hmac import compare_digest
 from http import HTTPStatus
+from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -68,7 +69,9 @@ class LiveServer(ThreadingHTTPServer):
     @property
     def hosts(self) -> tuple[str, str]:
         """What a browser may call this server."""
-        return f"{_HOST}:{self.server_port}", f"localhost:{self.server_port}"
+        # The port of HTTP is not named.
+        port = "" if self.server_port == HTTP_PORT else f":{self.server_port}"
+        return f"{_HOST}{port}", f"localhost{port}"
 
     def start(self) -> None:
         """Serve in a thread of its own, until `close`."""
