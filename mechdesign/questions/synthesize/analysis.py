@@ -67,10 +67,10 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
             solutions.append(replace(one, made=judged(study, study_data(study, task, one, study.name))))
             progress.update(1)
         told.append(f"the best {len(solutions)} are judged" if len(solutions) != 1 else "the best is judged")
-    solutions, scores = ranked(solutions, section.rank, task.size)
+    solutions, scores = ranked(solutions, section.rank, task.size, section.solutions)
     if not solutions:
         raise _none(study, task, pools, conditions, told)
-    result = _answer(study, task, solutions[: section.solutions], scores, told)
+    result = _answer(study, task, solutions, scores, told)
     counts = {"linkages": sum(len(pool.way) for pool in pools), "kept": len(result.main)}
     return replace(result, counts=counts)
 

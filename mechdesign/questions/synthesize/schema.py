@@ -275,7 +275,7 @@ class SynthesisSection(fields.Model):
     Example: {error: 2, transmission: 1}
     """
     solutions: Annotated[int, fields.whole(1, 1000)] = 20
-    """How many are kept. Example: 10"""
+    """How many are kept; by error those that do the task exactly before others. Example: 10"""
     evaluations: Annotated[int, fields.whole(100, 100_000_000)] | None = None
     """How many linkages are sampled. Left out: 30,000 of each kind and assembly for a closed path, 4,000 for
     an open one, 1,500 pairs of dyads of each kind for a body. Example: 100000

@@ -271,9 +271,9 @@ def rounded(error: float, size: float) -> float:
 
 
 def ranked(
-    solutions: Sequence[Solution], weights: Mapping[str, float], size: float
+    solutions: Sequence[Solution], weights: Mapping[str, float], size: float, most: int
 ) -> tuple[list[Solution], list[float]]:
-    """Solutions in their order, best first and those with a defect last, and their scores from 0 to 1."""
+    """The best solutions, at most so many, those with a defect last, and their scores from 0 to 1."""
     measures: dict[str, Callable[[Solution], float]] = {
         "error": lambda one: -rounded(one.error, size), "yield": lambda one: one.made.share,
         "transmission": lambda one: one.transmission, "size": lambda one: -one.size,
@@ -293,4 +293,8 @@ def ranked(
         turn[*places[k], solutions[k].kind.name] += 1
         turns[k] = turn[*places[k], solutions[k].kind.name]
     order = sorted(range(len(solutions)), key=lambda k: (places[k], turns[k], -solutions[k].transmission))
-    return [solutions[k] for k in order], [float(total[k]) for k in order]
+    if {*weights} == {"error"}:
+        # Exact ones are kept, behind others where they have a defect.
+        exact = sorted(range(len(order)), key=lambda place: rounded(solutions[order[place]].error, size) > 0)
+        order = [order[place] for place in sorted(exact[:most])]
+    return [solutions[k] for k in order[:most]], [float(total[k]) for k in order[:most]]
