@@ -41,8 +41,8 @@ def lines(path: Path) -> list[str]:
 
 @pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.name)
 def test_every_command_line_of_a_shown_file_is_one(path: Path) -> None:
-    found = [re.match(r"\s*(?:exec )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
-    commands = [shlex.split(line[1]) for line in found if line]
+    calls = [re.match(r"\s*(?:exec )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
+    commands = [shlex.split(call[1]) for call in calls if call]
     assert len(commands) >= 2
     for command, *arguments in commands:
         assert command in GROUP.commands

@@ -7,7 +7,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.door.reference.sources import indices as indices_told
+from mechdesign.door.reference.sources import indices as reference_of_indices
 from mechdesign.door.report.tables import to_csv
 from mechdesign.drawing.pictures import figures
 from mechdesign.questions.workspace import indices
@@ -70,8 +70,8 @@ def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
 
 def test_the_reference_has_the_whole_sentence_of_a_new_index(reach: Path) -> None:
     reach.with_name("remote.py").write_text(FILE.replace("from the origin.", "\nfrom the origin.", 1))
-    (told,) = (entry.text for entry in indices_told() if entry.word == "remote")
-    assert told == "Reach: distance of the workspace's point from the origin."
+    (text,) = (entry.text for entry in reference_of_indices() if entry.word == "remote")
+    assert text == "Reach: distance of the workspace's point from the origin."
 
 
 def test_what_a_new_index_needs_is_checked(reach: Path) -> None:
