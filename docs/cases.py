@@ -90,7 +90,7 @@ class Names(dict[str, Any]):
         built = {"column": columns.__getitem__, "point": lambda at: columns[f"{at}.x"] + 1j * columns[f"{at}.y"]}
         self.others = (columns, built, *others, vars(np))
         dotted = sorted((name for name in columns if "." in name), key=len, reverse=True)
-        self.dotted = re.compile(rf"(?<![\w.])({'|'.join(map(re.escape, dotted)) or '(?!)'})(?![\w.]|\()")
+        self.dotted = re.compile(rf"(?<![\w.'])({'|'.join(map(re.escape, dotted)) or '(?!)'})(?![\w.]|\()")
 
     def value(self, expression: Any) -> Any:
         """Of an expression of Python, in which names of columns have their dots; numbers are themselves."""
