@@ -90,7 +90,7 @@ class Names(dict[str, Any]):
         built = {"column": columns.__getitem__, "point": lambda at: columns[f"{at}.x"] + 1j * columns[f"{at}.y"]}
         self.others = (columns, built, *others, vars(np))
         dotted = sorted((name for name in columns if "." in name), key=len, reverse=True)
-        self.dotted = re.compile(rf"(?<![\w.])({'|'.join(map(re.escape, dotted)) or '(?!)'})(?![\w.]|\()")
+        self.dotted = re.compile(rf"(?<![\w.'])({'|'.join(map(re.escape, dotted)) or '(?!)'})(?![\w.]|\()")
 
     def value(self, expression: Any) -> Any:
         """Of an expression of Python, in which names of columns have their dots; numbers are themselves."""
@@ -233,7 +233,8 @@ def _compared(check: Mapping[str, Any], names: Names, units: Mapping[str, str], 
     """A check carried out, with the row that differs most."""
     ours = np.atleast_1d(names.value(check["of"]))
     printed, note, bound = check.get("printed", ""), check.get("misprint", ""), ""
-    told = np.broadcast_to(names.value(check.get("expected", float(printed or "nan"))), ours.shape)
+    given = check.get("expected", check.get("at_most", float(printed or "nan")))
+    told = np.broadcast_to(names.value(given), ours.shape)
     scale = float(names.value(check["size"]) if "size" in check else np.abs(told).max())
     if "between" in check:
         low, high = (np.broadcast_to(names.value(end), ours.shape) for end in check["between"])
@@ -241,7 +242,6 @@ def _compared(check: Mapping[str, Any], names: Names, units: Mapping[str, str], 
         worst = int(np.argmin(good))
         bound = f"{shown(told[worst])} in {low[worst]:.6g} to {high[worst]:.6g}"
     elif "at_most" in check:
-        told = np.broadcast_to(names.value(check["at_most"]), ours.shape)
         good, worst = ours <= told, int(np.argmax(ours - told))
         bound = f"at most {shown(told[worst])}"
     else:

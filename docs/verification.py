@@ -176,6 +176,9 @@ def pages() -> dict[str, str]:
 def main() -> int:
     """Run the cases of these names, or all, and print their tables."""
     differs = []
+    if unknown := [name for name in sys.argv[1:] if name not in cases()]:
+        print(f"no case {', '.join(unknown)}; there are {', '.join(cases())}", file=sys.stderr)
+        return 2
     for name in sys.argv[1:] or cases():
         rows = list(cases()[name].rows())
         print(f"{cases()[name].title} ({name})")

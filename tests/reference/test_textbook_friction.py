@@ -37,6 +37,30 @@ dynamics:
 """
 
 
+INCLINE = """
+mechanism:
+  parameters: {beta: 25}
+  links: {ground: {O: [0, 0]}, block: {B: [0, 0], C: [10, 0]}}
+  joints: {plane: {prismatic: [ground, block], direction: beta, point: B}}
+  drives: {way: {slide: plane}}
+  friction: {plane: {coefficient: 0.3}}
+kinematics:
+  sweep: {way: {from: 0, to: 20, step: 10}}
+  loads: [{at: B, force: [0, -100]}]
+"""
+
+
+def test_what_a_load_alone_does_not_draw_back_is_said_to_lock_itself() -> None:
+    slopes = [answer(WEDGE, f"mechanism.parameters.alpha={alpha}") for alpha in (3, 5, 6, 20)]
+    assert ["self_locking" in kinds(result) for result in slopes] == [True, True, False, False]
+    assert "face" in slopes[0].warnings[0].message
+    flat = answer(INCLINE, "mechanism.parameters.beta=16", question="kinematics")
+    assert kinds(flat) == ["self_locking"]
+    turning = answer(INCLINE, "kinematics.loads=[{at: C, force: [0, -100]}]", question="kinematics")
+    assert kinds(turning) == ["incomplete"]
+    assert "give its 'length'" in turning.warnings[0].message
+
+
 def test_a_wedge_jams_where_its_slope_and_the_angle_of_friction_make_a_right_angle() -> None:
     limit = 90 - np.degrees(np.arctan(0.1))
     below, above = (answer(WEDGE, f"mechanism.parameters.alpha={limit + by}") for by in (-0.01, 0.01))
