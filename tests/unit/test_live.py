@@ -106,6 +106,24 @@ def test_the_points_of_a_sketch_from_which_lengths_are_measured_are_dragged_as_i
     }  # fmt: skip
 
 
+@pytest.mark.slow
+def test_where_the_motion_places_a_point_the_others_follow_the_hand_and_it_stays():
+    links = (
+        "{ground: {A: [-50, 0], B: [50, 0]}, left: [A, D, 90], rod: [D, P, 120], right: [B, E, 90], arm: [E, P, 120]}"
+    )
+    sketch = "{D: [-90, 80], E: [90, 80], P: [0, 160]}"
+    path = "{P.x: [-10, 0, 10], P.y: [150, 150, 150]}"
+    robot = load(
+        text=f"mechanism: {{links: {links}, drives: [left, right], sketch: {sketch}}}\nkinematics: {{path: {path}}}"
+    )
+    stays = dragged(robot, {}, Drag("P", 5 + 160j, row=1, resolution=0.01))
+    assert (stays.changes, stays.why) == ({}, "the motion of the study says where P is")
+    done = dragged(robot, {}, Drag("D", -95 + 90j, row=1, resolution=1e-6))
+    # From A and P, which stay, to the hand.
+    reach = {"left.length": abs(-95 + 90j + 50), "rod.length": abs(-95 + 90j - 150j)}
+    assert done.changes == pytest.approx(reach, abs=1e-5)
+
+
 def test_the_pin_of_a_slider_moves_its_guide_across_and_a_link_along():
     slider = load(CONFIGS / "gallery/offset_slider_crank.yaml")
     done = dragged(slider, {}, Drag("B", 5 + 1.3j, row=3, resolution=1e-6))

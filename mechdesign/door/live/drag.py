@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,8 @@ _ALIKE = 0.02  # part of a way that may be missed where fewer numbers are change
 _BLIND = 1e-6  # derivative of a place by a length from which on the length moves it
 _FULL = 0.05  # sine of the angle of two ways from which on they span the plane, and part of the longest that counts
 _SAME = 1e-6  # of the mechanism's size: between first and last pose of a motion that goes round
-_BESIDE = 1e-3  # of a row of the motion, and part of a number of the sketch, by which derivatives are taken
+_STEP = 1e-6  # part of a number by which a derivative is taken where it is known by solving alone
+_BESIDE = 1e-3  # of a row of the motion, by which derivatives along it are taken
 TURNED = ""  # stands for the place of the motion among the numbers that a drag changes
 
 
@@ -64,15 +66,16 @@ class Dragged:
 
 @dataclass(frozen=True)
 class _Pose:
-    """A design of a study with its drives as the motion has them at one pose."""
+    """A design of a study, by what it changes of it, with its drives as the motion has them at one pose."""
 
     study: Study
+    changes: Mapping[str, float]
     row: float
     configuration: Configuration
     values: Mapping[str, float] = field(default_factory=dict)  # of the drives, in radians and lengths
 
     @classmethod
-    def of(cls, study: Study, row: float) -> _Pose:
+    def of(cls, study: Study, row: float, changes: Mapping[str, float] = MappingProxyType({})) -> _Pose:
         """The pose at a place of the motion."""
         poses = replace(study.motions["kinematics"], picked=(np.zeros(1, dtype=np.intp), np.array([row])))
         configuration = solve_rows(study.motion(poses), np.zeros(1, dtype=np.intp))
@@ -80,15 +83,18 @@ class _Pose:
         drives = {
             name: float(np.ravel(configuration.value(mechanism.coordinate(name)))[0]) for name in mechanism.drives
         }
-        return cls(study, row, configuration, drives)
+        return cls(study, changes, row, configuration, drives)
 
     def with_values(self, original: Study, changes: Mapping[str, float], row: float | None = None) -> _Pose:
-        """Another design of the original at the same values of the drives, or at another pose of its motion."""
+        """Another design of the original at the same values of the drives, or at another pose of its motion.
+
+        Where the motion gives other coordinates than the drives, such as a point, it is the same pose of that.
+        """
         study = altered(original, changes)
-        if row is not None:
-            return self.of(study, row)
+        if row is not None or not _by_drives(original):
+            return self.of(study, self.row if row is None else row, changes)
         given = [np.array([value]) for value in self.values.values()]
-        return replace(self, study=study, configuration=study.mechanism.forward.solve(given, {}))
+        return replace(self, study=study, changes=changes, configuration=study.mechanism.forward.solve(given, {}))
 
     @property
     def valid(self) -> bool:
@@ -102,6 +108,11 @@ class _Pose:
     def at(self, point: str) -> complex:
         """Where a point is."""
         return complex(self.configuration.point(point)[0])
+
+
+def _by_drives(study: Study) -> bool:
+    """Whether the motion gives the values of the drives."""
+    return study.motions["kinematics"].values.keys() == {*study.mechanism.drives}
 
 
 @lru_cache(4)
@@ -153,10 +164,10 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
     MechdesignError
         If the changes so far make no study.
     """
-    pose = _Pose.of(altered(original, changes), drag.row)
+    pose = _Pose.of(altered(original, changes), drag.row, changes)
     if not pose.valid:
         return Dragged(changes, drag.row, why=f"the pose {pose.why}")
-    ways = {name: way for name, way in _ways(original, pose, changes, drag) if abs(way).max() > _BLIND}
+    ways = {name: way for name, way in _ways(original, pose, drag) if abs(way).max() > _BLIND}
     names: tuple[str, ...] = ()
     if _driven(pose.study, drag.point) and not _spans(ways):
         ways |= _turning(original, pose, drag.point, drag.row)
@@ -170,6 +181,8 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
     names = names or _fewest(ways, drag.target - pose.at(drag.point))
     if not names:
         locked = " that is not locked" if drag.locked else ""
+        if f"{drag.point}.x" in original.motions["kinematics"].values:
+            return Dragged(changes, drag.row, why=f"the motion of the study says where {drag.point} is")
         return Dragged(changes, drag.row, why=f"no number{locked} of its links moves {drag.point} at this pose")
     begin = {name: drag.row if name == TURNED else value_of(pose.study, name) for name in names}
     pose, values, why = _newton(original, changes, pose, begin, drag)
@@ -193,7 +206,7 @@ def _newton(
         missing = drag.target - pose.at(drag.point)
         if abs(missing) <= tolerance:
             return pose, values, ""
-        ways = dict(_ways(original, pose, changes, drag, [name for name in values if name != TURNED]))
+        ways = dict(_ways(original, pose, drag, [name for name in values if name != TURNED]))
         ways |= _turning(original, pose, drag.point, values[TURNED]) if TURNED in values else {}
         if ways.keys() != values.keys():
             break
@@ -222,7 +235,7 @@ def _newton(
 
 
 def _ways(
-    original: Study, pose: _Pose, changes: Mapping[str, float], drag: Drag, only: Collection[str] | None = None
+    original: Study, pose: _Pose, drag: Drag, only: Collection[str] | None = None
 ) -> Iterator[tuple[str, Complexes]]:  # fmt: skip
     """Where a point goes by each number of its links and guides, per unit of the number; the preferred ones first."""
     study, mechanism = pose.study, pose.study.mechanism
@@ -251,20 +264,35 @@ def _ways(
     node = mechanism.graph.node(drag.point)
     nodes = mechanism.linearize(pose.configuration).sensitivity(places).nodes[node]
     by_place = dict(zip(places, np.broadcast_to(nodes, (len(places), 1)), strict=True))
+    exact = _by_drives(original)
     kept = [name for name in drag.held if name] if len(drag.held) == 2 else ()
     ways: list[tuple[int, str, Complexes]] = []
     drawn = _drawn(original, drag.point)
     for name in only if only is not None else kept or [*drawn, *free_numbers(original)]:
         if name in drag.locked or name in original.fixed or (name in study.parameters.measured and drawn):
             continue
-        slopes = _slopes(original, changes, study, name)
+        slopes = _slopes(original, pose, name)
         moved = [place for place in slopes if place in by_place]
         if moved or only is not None:
-            way = sum((by_place[place] * slopes[place] for place in moved), start=np.zeros(1, dtype=complex))
+            if exact:
+                way = sum((by_place[place] * slopes[place] for place in moved), start=np.zeros(1, dtype=complex))
+            else:
+                way = _way(original, pose, drag.point, name)
             ways.append(
                 (-1 if name in drag.held else 0 if name in drawn else min(map(rank, moved), default=2), name, way)
             )
     yield from ((name, way) for _, name, way in (ways if only is not None else sorted(ways, key=lambda way: way[0])))
+
+
+def _way(original: Study, pose: _Pose, point: str, name: str) -> Complexes:
+    """Where a point goes by a number at a pose whose motion does not give the drives; by a difference."""
+    value = value_of(pose.study, name)
+    step = _STEP * (abs(value) or pose.study.mechanism.size)
+    try:
+        there = pose.with_values(original, {**pose.changes, name: value + step})
+    except MechdesignError:
+        return np.full(1, np.nan + 0j)
+    return np.array([(there.at(point) - pose.at(point)) / step])
 
 
 def _drawn(study: Study, point: str) -> list[str]:
@@ -275,15 +303,14 @@ def _drawn(study: Study, point: str) -> list[str]:
     return [f"{SKETCH}.{point}.{axis}" for axis in (0, 1)] if measured and point in written else []
 
 
-def _slopes(original: Study, changes: Mapping[str, float], study: Study, name: str) -> Mapping[str, Number]:
+def _slopes(original: Study, pose: _Pose, name: str) -> Mapping[str, Number]:
     """Derivative of every place that follows a number; of one of the sketch by reading the study beside."""
+    study = pose.study
     if not is_entry(name):
         return study.parameters.derivatives(name)
-    value, beside = value_of(study, name), _BESIDE * study.mechanism.size
-    there = altered(original, {**changes, name: value + beside}).mechanism.nominal
-    return {
-        place: (there[place] - here) / beside for place, here in study.mechanism.nominal.items() if there[place] != here
-    }
+    value, beside = value_of(study, name), _STEP * study.mechanism.size
+    now, there = study.mechanism.nominal, altered(original, {**pose.changes, name: value + beside}).mechanism.nominal
+    return {place: (there[place] - here) / beside for place, here in now.items() if there[place] != here}
 
 
 def _driven(study: Study, point: str) -> bool:
