@@ -537,7 +537,7 @@
       go(pose) { const place = passing(pose); if (place !== null) choose(place); return place !== null; },
       seek(row) { choose(placed(row)); },
       value: name => readout.text(data.given.find(([own]) => own === name)[2], Math.min(at, last)),
-      words: () => words.textContent, at: () => at, row: here, data: () => data,
+      words: () => words.textContent, row: here, data: () => data,
       point: name => [between(moved.x[name], Math.min(at, last)), between(moved.y[name], Math.min(at, last))],
       again() { begin(true); show(at); },
       take(next, markup, entire) {
