@@ -103,6 +103,7 @@ def test_of_many_points_it_is_told_how_many_count() -> None:
     assert "134 of 401 points count, evenly chosen" in solved(task).notes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("conditions", [{"lengths": {"crank": [1e6, 1e7]}}, {"pivots": [[0, 0], [0, 0]]}])
 def test_a_path_with_conditions_that_contradict_each_other_says_so(conditions: Any) -> None:
     task = {"path": {"points": SQUARE}, "evaluations": 100, **conditions}

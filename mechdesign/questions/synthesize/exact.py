@@ -16,7 +16,7 @@ from mechdesign.questions.synthesize.bounds import Bounds
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.paths import Points, Starts
 
-_ROUNDS = 40
+_ROUNDS = 60
 # Steps are shortened to this part of a dimension, but of small ones of this part of the task, and to a radian.
 _LARGEST, _SMALL = 0.3, 0.3
 # Gaps below this part of the task's size are rounding.
