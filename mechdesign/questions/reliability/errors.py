@@ -133,7 +133,7 @@ def _freed(limit: Limit, components: Floats, offset: Floats, by_drive: Floats, n
     pair = [*limit.channels]
     speed = by_drive[pair]
     square = np.where(np.isfinite(limit.high) & (speed**2 > 0).any(axis=0), (speed**2).sum(axis=0), np.inf)
-    away = nominal[pair] + offset[pair] - np.stack(limit.middle)
+    away = nominal[pair] + offset[pair] - np.stack(np.broadcast_arrays(*limit.middle, offset[0])[:2])
     components -= by_drive[:, None] * (np.einsum("cp,czp->zp", speed, components[pair]) / square)
     offset -= by_drive * ((speed * away).sum(axis=0) / square)
 

@@ -342,25 +342,26 @@ def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQ
 def _targets(study: Study, name: str, limit: ErrorLimit, poses: Poses) -> Floats:
     """Targets of a limit by its coordinates, shape (1 or 2, poses), in the study's units; nan where there is none.
 
-    Of several, one for each pose, places between the poses have none.
+    One for all has shape (1 or 2,). Of several, one for each pose, places between the poses have none.
 
     Raises
     ------
     StudyError
         Where they are not as many as poses.
     """
-    targets = limit.targets or ()
-    count = math.prod(poses.rule.grid)
-    if len(targets) not in (1, count):
-        message = f"{len(targets)} targets for {count} poses: give one for all, or one for each"
-        raise StudyError((study.problem(message, "reliability", "limits", name, "target"),))
-    size = 1 if limit.radius is None else 2
+    targets, size = limit.targets or (), 1 if limit.radius is None else 2
     parts = [target if isinstance(target, tuple) else (np.nan if target is None else target,) * size
              for target in targets]  # fmt: skip
+    if len(parts) == 1:
+        return np.stack(np.broadcast_arrays(*parts[0]))
+    count = math.prod(poses.rule.grid)
+    if len(parts) != count:
+        where = f"{count} poses: give one for all, or one for each" if count else "a region: give one for all"
+        message = f"{len(parts)} targets for {where}"
+        raise StudyError((study.problem(message, "reliability", "limits", name, "target"),))
     table = np.stack([np.broadcast_arrays(*row, np.empty(poses.count))[:-1] for row in parts])
-    at = 0.0 * poses.numbers if len(targets) == 1 else poses.numbers
-    row = np.round(at).astype(np.intp)
-    return np.where(at == row, table[row, :, np.arange(poses.count)].T, np.nan)
+    row = np.round(poses.numbers).astype(np.intp)
+    return np.where(poses.numbers == row, table[row, :, np.arange(poses.count)].T, np.nan)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
