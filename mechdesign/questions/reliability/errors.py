@@ -21,7 +21,8 @@ from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cau
 from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel, force_model, pace
 from mechdesign.questions.reliability.lengths import model_of
-from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, ask
+from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.question import ReliabilityQuestion, ask
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Sources
