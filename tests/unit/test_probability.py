@@ -12,8 +12,8 @@ from mechdesign.ground.numerics.statistics import rectangle_failure
 from mechdesign.questions.reliability.circles import disc_failure, disc_failures
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial
 from mechdesign.questions.reliability.first_order import correlation
+from mechdesign.questions.reliability.limits import Limit
 from mechdesign.questions.reliability.probability import estimated_failure, failure_probability
-from mechdesign.questions.reliability.question import Limit
 
 
 def quadrant(h: float, k: float, rho: float) -> float:

@@ -76,6 +76,12 @@ def test_with_free_timing_the_distance_from_the_path_counts_whenever_it_is_passe
     assert table["reliability"][0] == pytest.approx(share(0.1, 0.3), abs=0.006)
 
 
+def test_one_target_is_that_of_all_poses() -> None:
+    """A circle of 50 mm passes it whenever, by as much as the crank's length deviates."""
+    table = asked("A: {radius: 0.3, target: [[50.1, 0]], timing: free}", poses="[-1, 1]").tables["reliability"]
+    assert table["reliability"][:2] == pytest.approx([share(0.1, 0.3)] * 2, abs=0.006)
+
+
 @pytest.mark.parametrize(
     ("limit", "words"),
     [
@@ -104,3 +110,12 @@ def test_limits_of_single_poses_are_marks_in_the_picture_of_errors() -> None:
     upper = np.nanmax(np.concatenate([line.get_ydata() for line in limits]).astype(float))
     assert upper == pytest.approx(0.5)
     assert {line.get_marker() for line in limits} == {"_"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("more", "tolerance"), [("", 0.2 / norm.ppf(0.99) * 3), (", grades: true", 0.125)])
+def test_tolerances_are_allocated_for_a_circle_about_a_target(more: str, tolerance: float) -> None:
+    """0.2 mm are left inwards of a target 0.1 mm farther out; IT12 is the coarsest grade that is finer."""
+    allocate = f"allocate: {{reliability: 0.99, cost: {{crank.length: 1}}{more}"
+    table = asked(f"A: {{radius: 0.3, target: [[50.1, 0], null]}}}}\n  {allocate}").tables["allocation"]
+    assert table["allocated"][0] == pytest.approx(tolerance, rel=1e-3)

@@ -147,7 +147,7 @@ class Capable:
         result = methods.run(method, task)
         mean, covariance = result.moments(task)
         sigma = np.sqrt(np.diagonal(covariance[poses], axis1=1, axis2=2).T)
-        value = _cpk(task.question.at(task.nominal[:, poses]), mean[:, poses], sigma)
+        value = _cpk(task.question.take(poses).at(task.nominal[:, poses]), mean[:, poses], sigma)
         counts = np.array([result.sums[pose].valid for pose in poses])
         # [Bissell, How reliable is your capability index?, 1990]
         half = WIDTH * np.sqrt(1.0 / (9.0 * counts) + value**2 / (2.0 * (counts - 1)))

@@ -234,7 +234,8 @@ def _simulated(model: ToleranceModel, scales: Floats, method: str) -> Simulated:
 def _shares(model: ToleranceModel, scales: Floats) -> Floats:
     """Share of each source in the sum of limited variances, each over its limit squared, shape (poses, sources)."""
     poses = [setting.pose for setting in model.task.settings]
-    question, linear = model.task.question.at(model.task.nominal[:, poses]), model.linear(scales).take(poses)
+    linear = model.linear(scales).take(poses)
+    question = model.task.question.take(poses).at(model.task.nominal[:, poses])
     weights = np.zeros((len(question.channels), len(poses)))
     for limit in question.limits:
         weights[[*limit.channels]] += 1.0 / np.maximum(np.minimum(abs(limit.low), abs(limit.high)), _NARROWEST) ** 2

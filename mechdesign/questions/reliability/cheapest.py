@@ -159,7 +159,7 @@ class ToleranceModel:
         poses = np.tile(poses, many)
         sources = self.task.sources.widened(factors)
         linear, closing = (replace(part.take(poses), sources=sources) for part in (self.task.linear, self.task.closing))
-        return self.aim.by_model(self.task.question.at(self.task.nominal[:, poses]), linear, closing)
+        return self.aim.by_model(self.task.question.take(poses).at(self.task.nominal[:, poses]), linear, closing)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Cost of the allocated tolerances, and its derivatives by x = log(factor)."""

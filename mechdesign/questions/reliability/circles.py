@@ -10,7 +10,7 @@ from scipy.special import erfcx, ndtr
 
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.numerics.statistics import MAX_DEVIATION, outside
-from mechdesign.questions.reliability.question import Limit
+from mechdesign.questions.reliability.limits import Limit
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.

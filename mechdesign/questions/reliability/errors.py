@@ -21,7 +21,8 @@ from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cau
 from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel, force_model, pace
 from mechdesign.questions.reliability.lengths import model_of
-from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion, ask
+from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.question import ReliabilityQuestion, ask
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Sources
@@ -133,7 +134,7 @@ def _freed(limit: Limit, components: Floats, offset: Floats, by_drive: Floats, n
     pair = [*limit.channels]
     speed = by_drive[pair]
     square = np.where(np.isfinite(limit.high) & (speed**2 > 0).any(axis=0), (speed**2).sum(axis=0), np.inf)
-    away = nominal[pair] + offset[pair] - np.stack(limit.middle)
+    away = nominal[pair] + offset[pair] - np.stack(np.broadcast_arrays(*limit.middle, offset[0])[:2])
     components -= by_drive[:, None] * (np.einsum("cp,czp->zp", speed, components[pair]) / square)
     offset -= by_drive * ((speed * away).sum(axis=0) / square)
 

@@ -20,7 +20,8 @@ from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import Channel, Limit, columns_among
+from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.question import Channel, columns_among
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
 

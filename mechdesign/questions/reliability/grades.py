@@ -133,7 +133,7 @@ def _conditions(choices: _Choices) -> tuple[list[Floats], Floats] | None:
     if own or sources.correlation is not None or any(scalars[k].law.moments[0] != scalars[k].law.mean for k in free):
         return None
     poses = [setting.pose for setting in model.task.settings]
-    linear, question = model.task.linear.take(poses), model.task.question.at(model.task.nominal[:, poses])
+    linear, question = model.task.linear.take(poses), model.task.question.take(poses).at(model.task.nominal[:, poses])
     bands = [side for limit in question.limits for side in limit.box]
     mean, parts = linear.shift(), np.nan_to_num(linear.share() * (linear.deviation() ** 2)[:, None])
     variances: list[list[Floats]] = [[] for _ in free]
@@ -145,6 +145,9 @@ def _conditions(choices: _Choices) -> tuple[list[Floats], Floats] | None:
         most.append(widest**2 * (1.0 + _ROUNDING) - held)
         for column, source in zip(variances, free, strict=True):
             column.append(parts[output][source])
-    by_grade = [np.multiply.outer(np.concatenate(column), steps**2)
+    # A pose without a target bounds nothing.
+    bounds = np.concatenate(most)
+    bounded = np.isfinite(bounds)
+    by_grade = [np.multiply.outer(np.concatenate(column)[bounded], steps**2)
                 for column, steps in zip(variances, model.steps, strict=True)]  # fmt: skip
-    return by_grade, np.concatenate(most)
+    return by_grade, bounds[bounded]

@@ -17,7 +17,8 @@ import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
-from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
+from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.question import ReliabilityQuestion
 
 # Length of a mean vector, in deviations of its components, up to which its length has a law of its own. Beyond it the
 # vector turns by less than 2 degrees, and its length is linear to 1/60 of a deviation.

@@ -23,7 +23,7 @@ from mechdesign.questions.reliability.circles import (
 )
 from mechdesign.questions.reliability.engine.problem import CONFIDENCE
 from mechdesign.questions.reliability.first_order import FirstOrder, correlation
-from mechdesign.questions.reliability.question import Limit
+from mechdesign.questions.reliability.limits import Limit
 
 # Points of a lattice.
 _LATTICE_POINTS = 8191

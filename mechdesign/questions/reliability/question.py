@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.ground.cautions import Caution
-from mechdesign.ground.errors import MechanismError, StudyError
+from mechdesign.ground.errors import MechanismError
 from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.mechanism import Mechanism
@@ -21,8 +20,8 @@ from mechdesign.motion.rows import Poses
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.reliability.corners import Bend, bends, vector_of
 from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends
-from mechdesign.questions.reliability.laws import at_rows
-from mechdesign.questions.reliability.schema.limits import SUFFIXES, ErrorLimit, split_order
+from mechdesign.questions.reliability.limits import Limit, targets_of
+from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS as QUANTITIES
@@ -87,61 +86,6 @@ def _judged(found: Iterable[Bend]) -> tuple[Bend, ...]:
         replace(bend, arguments=tuple(Channel.of(argument, alone=True) for argument in bend.arguments))
         for bend in found
     )
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Limits low <= error <= high of a channel, or of two: of the distance of their errors from the middle of a circle
-    or ring.
-
-    Either end may be infinite, and it and the middle an array of poses. If `absolute`, they limit the value of the
-    channel itself, or the middle is a place. If `free`, the drive of a made mechanism stands where its point comes
-    nearest to the middle.
-    """
-
-    channels: tuple[int, ...]
-    low: Any
-    high: Any
-    absolute: bool = False
-    middle: tuple[Any, Any] = (0.0, 0.0)
-    free: bool = False
-
-    @property
-    def round(self) -> bool:
-        """Whether it is a circle or ring."""
-        return len(self.channels) > 1
-
-    @property
-    def box(self) -> list[tuple[int, Any, Any]]:
-        """Each channel with its lowest and highest error, those of a circle by itself."""
-        if not self.round:
-            return [(self.output, self.low, self.high)]
-        return [(k, part - self.high, part + self.high) for k, part in zip(self.channels, self.middle, strict=True)]
-
-    def distance(self, errors: Floats) -> Floats:
-        """Distance of errors, shape (channels, n), from the middle of the circle."""
-        x, y = self.away(errors)
-        return np.asarray(np.hypot(x, y))
-
-    @property
-    def origin(self) -> str:
-        """From where a circle counts, in words."""
-        return "the target" if np.any(self.middle) else "no error"
-
-    def away(self, errors: Floats) -> tuple[Floats, Floats]:
-        """The vector from the middle of the circle to errors, shape (channels, n)."""
-        (one, other), (x, y) = self.channels, self.middle
-        return errors[one] - x, errors[other] - y
-
-    @property
-    def output(self) -> int:
-        """The first of its channels."""
-        return self.channels[0]
-
-    def at(self, poses: Any) -> Limit:
-        """The limit at one pose or some, by an index of the arrays of poses."""
-        x, y = (at_rows(part, poses) for part in self.middle)
-        return replace(self, low=at_rows(self.low, poses), high=at_rows(self.high, poses), middle=(x, y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +260,7 @@ def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQ
     places = {(channel.output, channel.order): k for k, channel in enumerate(channels)}
     asked = []
     for base, order, limit in limits:
-        targets = None if limit.targets is None else _targets(study, base, limit, poses)
+        targets = None if limit.targets is None else targets_of(study, base, limit, poses)
         if limit.radius is not None:
             circle = Limit((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius)
             if targets is not None:
@@ -337,30 +281,6 @@ def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQ
     if not limited:
         pair = [k for k, channel in enumerate(channels) if channel.order in (0, last)]
     return ReliabilityQuestion(tuple(channels), tuple(asked), (pair[0], pair[1]) if len(pair) == 2 else None)
-
-
-def _targets(study: Study, name: str, limit: ErrorLimit, poses: Poses) -> Floats:
-    """Targets of a limit by its coordinates, shape (1 or 2, poses), in the study's units; nan where there is none.
-
-    Of several, one for each pose, places between the poses have none.
-
-    Raises
-    ------
-    StudyError
-        Where they are not as many as poses.
-    """
-    targets = limit.targets or ()
-    count = math.prod(poses.rule.grid)
-    if len(targets) not in (1, count):
-        message = f"{len(targets)} targets for {count} poses: give one for all, or one for each"
-        raise StudyError((study.problem(message, "reliability", "limits", name, "target"),))
-    size = 1 if limit.radius is None else 2
-    parts = [target if isinstance(target, tuple) else (np.nan if target is None else target,) * size
-             for target in targets]  # fmt: skip
-    table = np.stack([np.broadcast_arrays(*row, np.empty(poses.count))[:-1] for row in parts])
-    at = 0.0 * poses.numbers if len(targets) == 1 else poses.numbers
-    row = np.round(at).astype(np.intp)
-    return np.where(at == row, table[row, :, np.arange(poses.count)].T, np.nan)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

@@ -20,7 +20,8 @@ from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
 from mechdesign.questions.reliability.first_order import derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.question import Limit, ReliabilityQuestion
+from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.sources import Made, Sources
 
 # Samples of a chunk.

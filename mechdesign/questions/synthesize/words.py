@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from mechdesign.ground.errors import counted
 from mechdesign.ground.numerals import numeral, printed
 from mechdesign.ground.results import Table
@@ -30,10 +32,11 @@ def linkage(table: Table, row: int, error: float) -> list[str]:
     words = [f"{in_words(str(table['kind'][row]))}" + (f" ({table['class'][row]})" if table["class"][row] else "")]
     words.append(f"error {with_unit('error', error)}")
     words.append(f"transmission angle {with_unit('transmission_angle', float(table['transmission_angle'][row]))}")
-    if "yield" in table:
+    # What comes nearest is not judged.
+    if "yield" in table and np.isfinite(table["yield"][row]):
         share, low, high = (numeral(float(table[name][row]), _DIGITS) for name in ("yield", "yield_low", "yield_high"))
         words.append(f"yield {share} ({low} to {high})")
-    if "peak_effort" in table:
+    if "peak_effort" in table and np.isfinite(table["peak_effort"][row]):
         words.append(f"peak effort {with_unit('peak_effort', float(table['peak_effort'][row]))}")
     defects = str(table["defects"][row])
     return [*words, f"defect: {defects}" if defects else "no defect"]
