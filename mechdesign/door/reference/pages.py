@@ -57,8 +57,8 @@ def _of_page(place: str, text: str) -> _Page:
     indexed = re.findall(r"```\{index\} (.+)", text)
     prose = re.sub(r"(?ms)^```.*?^```$", "", text)
     paragraphs = (" ".join(_MARKUP.sub(r"\1", part).split()) for part in re.split(r"\n\s*\n|\n(?=[-#] )", prose))
-    # Of a path of links alone nothing is shown.
-    shown = tuple(part for part in paragraphs if part and not part.startswith(("#", "!", "|")))
+    # Of a path of links alone nothing is shown, and the names of tests say nothing about a word.
+    shown = tuple(part for part in paragraphs if part and not part.startswith(("#", "!", "|", "Test:", "Tests:")))
     return _Page(place, headings[0] if headings else place, "\n".join((*headings[1:], *indexed)), shown)
 
 
