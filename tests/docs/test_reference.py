@@ -113,7 +113,15 @@ dynamics: {gravity: [0, -9.81 m/s^2], rates: {arm: 10}, flywheel: {fluctuation: 
         FOUR_BAR, "mechanism.friction={B: {coefficient: 0.1, radius: 2}}",
         "kinematics={poses: [{crank: 30}], outputs: [B], loads: [{at: B, force: [1, 0]}]}",
     )  # fmt: skip
+    guided = study_of("""
+units: {length: mm}
+synthesis:
+  body: [{x: 0, y: 0, angle: 0}, {x: 20, y: 5, angle: 20}, {x: 35, y: 15, angle: 45}, {x: 40, y: 30, angle: 75}]
+  solutions: 1
+  judge: {loads: [{at: A, force: [0, -10]}]}
+""")
     return (
+        ("guided", mechdesign.synthesize(guided), guided),
         ("motion in time", mechdesign.dynamics(fall), fall),
         ("flywheel and modes", mechdesign.dynamics(turn), turn),
         ("friction", mechdesign.kinematics(rubbed), rubbed),

@@ -81,7 +81,8 @@ def test_curves_and_paths_before_are_dashed_under_those_now():
     curves = [line for axes in found["motion"].axes for line in axes.lines if line.get_linestyle() == "--"]
     for name in ("C.x", "C.y_velocity", "rocker.angle"):
         if name in table:
-            assert any(np.array_equal(line.get_ydata(), table[name]) for line in curves), name
+            # A curve passes every row, and places between them.
+            assert any(np.isin(table[name], line.get_ydata()).all() for line in curves), name
     for name in ("motion", "paths"):
         words = [text.get_text() for text in found[name].legends[-1].get_texts()]
         assert sum(text.endswith(("(now)", "(before)")) for text in words) == 2
