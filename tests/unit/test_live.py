@@ -394,6 +394,7 @@ def test_the_other_assembly_is_one_of_the_sketch_and_the_next_is_the_studys_own_
     assert next_assembly(study, changes)[0] == {"rocker.length": 61.0}
 
 
+@pytest.mark.slow
 def test_poses_that_cannot_be_assembled_are_counted_as_in_the_verdict_however_many_are_drawn():
     text = FOUR_BAR.replace("step: 10", "step: 5").replace("rocker.angle, at_most: 160", "rocker.angle, at_most: 400")
     changes = {"rod.length": 80.9, "rocker.length": 36.5}

@@ -101,7 +101,8 @@ def _answer(
         file = f"{name.replace(' ', '_')}.yaml"
         fault = "; ".join(faults(solution.defects, solution.elsewhere))
         # It stays true where a hand changes the file, and names no file.
-        heading = [f"{FOUND} {name} of {study.name}: {words[number - 1]}", *([f"It missed: {missed}"] if missed else []),
+        heading = [f"{FOUND} {name} of {study.name}: {words[number - 1]}",
+                   *([f"It missed: {missed}"] if missed else []),
                    *([f"In its assembly it did not move through its task: {fault}"] if fault else [])]  # fmt: skip
         data.append(study_data(study, task, solution, f"{study.name}, {name}"))
         files |= study_files(file, solution.kind, data[-1], heading)
