@@ -20,7 +20,7 @@ from mechdesign.mechanism.model import Description
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
-PLATES = -0.8  # layer of plates, the lowest
+PLATES, PATHS = -0.8, -0.7  # layer of plates, the lowest, and that which paths of points begin above them
 PIN = 3.6  # radius of a joint
 GROUND_HEIGHT = 13.0
 SLIDER_SIZE = (22.0, 13.0)  # along its guide and across
@@ -175,7 +175,7 @@ def mechanism_shapes(scene: Still) -> list[Shape]:
     for rank, (name, body) in enumerate(bodies(scene)):
         if len(body) > 2:
             # A smaller plate lies on a larger one, all of them below paths and bars.
-            layer = PLATES + 0.1 * (1 - 0.5**rank)
+            layer = PLATES + (PATHS - PLATES) * (1 - 0.5**rank)
             shapes += [Line(body, shade, width, layer, name, filled=True)
                        for shade, width in ((colors[name], BAR), (lighter(colors[name]), BAR - 2.4))]  # fmt: skip
         elif len(body) == 2:

@@ -398,3 +398,40 @@ def test_the_server_answers_a_plain_client_within_one_connection(tmp_path):
             assert json.load(answer)["names"] == []
     finally:
         assert server.close() == 0
+
+
+def test_what_a_hand_has_changed_of_a_linkage_is_there_again_when_it_is_clicked_again(live):
+    task = live(TASK)
+    page = task.page
+    page.locator(".moving-grid button").first.click()
+    page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
+    task.drag("A", 30, 20)
+    names = page.locator(".live-number.changed").evaluate_all("rows => rows.map(row => row.dataset.name)")
+    changed = {name: task.value(name) for name in names}
+    assert changed
+    page.get_by_role("link", name="the linkages of the task").click()
+    page.wait_for_selector(".moving-grid button")
+    assert [tile.endswith("changed") for tile in page.locator(".moving-grid button").all_inner_texts()].index(True) == 0
+    page.locator(".moving-grid button").first.click()
+    page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
+    assert {name: task.value(name) for name in names} == changed
+    expect(page.get_by_role("button", name="Undo")).to_be_enabled()
+
+
+def test_locks_grid_and_curves_outlast_a_new_version_of_the_file_and_what_it_has_otherwise_is_told(live):
+    bar = live()
+    page, curves = bar.page, bar.page.locator("[data-chart] select")
+    page.get_by_label("lock rod.length").check()
+    page.locator(".live-grid").fill("5")
+    curves.nth(0).select_option(index=2)
+    field = page.locator("[data-name='rocker.length'] input[type=number]")
+    field.fill("50")
+    field.press("Tab")
+    bar.answered(page)
+    bar.path.write_text(bar.path.read_text().replace("[D, B, 60]", "[D, B, 62]"))
+    bar.session.reload()
+    expect(page.locator(".live-said")).to_contain_text("The file has rocker.length 62, yours 50 stays.")
+    assert bar.value("rocker.length") == 50
+    assert page.get_by_label("lock rod.length").is_checked()
+    assert page.locator(".live-grid").input_value() == "5"
+    assert curves.nth(0).input_value() == "2"

@@ -356,3 +356,25 @@ def test_numbers_at_a_pose_are_written_as_key_numbers_are() -> None:
     ]
     assert (float(cells[2].text), cells[2].unit) == (0.0, "")
     assert [column.cells for column in readable(table.columns, table.columns)][2] == ["0", "0"]
+
+
+def test_targets_and_paths_of_points_lie_on_the_plates_and_below_the_pins():
+    text = """\
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: {O: [0, 0], Q: [40, 0], P: [30, 25]}}
+  drives: [arm]
+  targets: {P: [[30, 25], [0, 40], [-30, -25]]}
+kinematics: {path: {arm: [0, 60, 180]}, outputs: [P]}
+"""
+    study = load(text=text)
+    part = moving(study, mechdesign.kinematics(study), handled=True)
+    root = ElementTree.fromstring(part.drawing)
+    (goals,) = (path for path in root if path.get("class") == "moving-goals")
+    dots = [complex(*map(float, dot.removesuffix("h0").split())) for dot in goals.get("d").split("M")[1:]]
+    corner, scale = complex(*part.data["corner"]), part.data["scale"]
+    assert [corner + dot.conjugate() / scale for dot in dots] == pytest.approx([30 + 25j, 40j, -30 - 25j], abs=0.05)
+    order = list(root)
+    plates = [k for k, part in enumerate(order) if any(inner.get("d", "").endswith("z") for inner in part)]
+    traces = [k for k, part in enumerate(order) if part.get("class") == "moving-trace"]
+    pins = [k for k, part in enumerate(order) if any(inner.tag == "circle" for inner in part)]
+    assert max(plates) < min(traces) < max(traces) < order.index(goals) < min(pins)

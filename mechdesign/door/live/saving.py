@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import reduce
 from operator import getitem
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 from mechdesign.ground.errors import StudyError
 from mechdesign.ground.files import flowing, proper, replace
+from mechdesign.questions.synthesize.analysis import FOUND
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
 from mechdesign.study.text.document import KeyPath, dotted, in_yaml, leaves, plain
@@ -17,6 +19,8 @@ from mechdesign.study.variants import edited, in_text
 
 _NOWHERE = frozenset('\\:*?"<>|')  # characters that some systems do not have in names of files
 _WRITABLE = 0o222
+_LONG = 1e9  # from which whole numbers keep their point, or their power of ten
+_CHANGED = "# Changed by hand; before that:\n"
 
 
 def file_names(study: Study) -> dict[str, str]:
@@ -29,7 +33,7 @@ def file_names(study: Study) -> dict[str, str]:
 
 def overrides(study: Study, changed: Study) -> list[str]:
     """What is otherwise in a changed study, as `--set` takes it, by the entries of the study."""
-    now, data = dict(leaves(plain(study.resolved))), plain(changed.resolved)
+    now, data = dict(leaves(plain(study.resolved))), _short(changed.resolved)
     entries = dict[KeyPath, Any]()
     for keys, value in leaves(data):
         # What has parts now and had none is given whole.
@@ -76,13 +80,24 @@ def _written(study: Study, changed: Study, path: Path, *, own: bool, replacing: 
             raise StudyError(f"{name} was changed since it was read here; nothing was written")
         if not replacing:
             return {"exists": name}
-    data = changed.resolved
-    text = in_text(study, data).encode()
-    again = load_bytes(text, path, (), None, study.folder)
+    data = _short(changed.resolved)
+    text = in_text(study, data)
+    if text.startswith(f"# {FOUND}") and data != plain(study.resolved):
+        text = f"{_CHANGED}{text}"
+    again = load_bytes(text.encode(), path, (), None, study.folder)
     if any(not math.isclose(value, again.sizes[key], rel_tol=1e-12, abs_tol=1e-300)
            for key, value in changed.sizes.items()):  # fmt: skip
         raise StudyError("the changed study could not be written so that it reads the same; nothing was written")
-    replace(path, [text])
+    replace(path, [text.encode()])
     if mode is not None:
         path.chmod(mode)
     return {"saved": name, "comments": edited(study, data) is not None}
+
+
+def _short(data: Any) -> Any:
+    """Plain data with whole numbers as a hand writes them, without a point."""
+    if isinstance(data, Mapping):
+        return {key: _short(value) for key, value in data.items()}
+    if isinstance(data, float) and data.is_integer() and abs(data) < _LONG:
+        return int(data)
+    return [*map(_short, data)] if isinstance(data, list) else data

@@ -28,6 +28,7 @@ from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.door.report.page.tracks import ROWS, steps
 from mechdesign.drawing.before import Before
 from mechdesign.ground.errors import MechdesignError, StudyError, explain
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.progress import Progress
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.look import ask
@@ -232,9 +233,13 @@ class Session:
             raise AskedError
         now = altered(study, changes)
         own = now if study is self.study else altered(self.study, self._own(changes))
-        drawing, tracks = posed(now, steps(str(asked.get("rows")), count) / ROWS, sheet, study)
-        return {"changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
-                "set": saving.overrides(self.study, own), "words": [*self._words(names, changes, now)]}  # fmt: skip
+        rows = steps(str(asked.get("rows")), count) / ROWS
+        drawing, tracks = posed(now, rows, sheet, study)
+        return {
+            "changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
+            "missing": _missing(rows, tracks["gaps"]), "set": saving.overrides(self.study, own),
+            "words": [*self._words(names, changes, now)],
+        }  # fmt: skip
 
     def _words(self, names: Sequence[str], changes: Mapping[str, float], now: Study) -> Iterator[str]:
         """What a drag has changed, in words: its numbers, and what is measured in a sketch that it has moved."""
@@ -363,6 +368,16 @@ class Session:
             if turn > page.turn:
                 page.turn, page.answers, page.parts = turn, {}, {}
         return page, turn
+
+
+def _missing(rows: Floats, gaps: Sequence[tuple[int, int, str]]) -> str:
+    """Where a motion cannot be assembled, in words: by the poses of its table, not by all that are drawn."""
+    if not gaps:
+        return ""
+    poses = rows == np.rint(rows)
+    lost = sum(int(poses[first : end + 1].sum()) for first, end, _ in gaps)
+    share = f"{lost} of {int(poses.sum())} poses" if lost else "between two poses"
+    return f"{share}: {gaps[0][2].removesuffix(' here')}"
 
 
 def _drawn(stage: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
+import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -54,7 +54,7 @@ class TaskSession(Session):
     def _take(self, study: Study) -> None:
         if study.synthesis is None:
             raise StudyError("the study has no task any more: start mechdesign live again for its mechanism")
-        self.study, self._searches, self._counter = study, dict[str, Result](), itertools.count(1)
+        self.study, self._searches = study, dict[str, Result]()
         if study.is_task:
             self.linkages.pop(_OWN, None)
         elif _OWN in self.linkages:
@@ -101,19 +101,20 @@ class TaskSession(Session):
             If the page has asked something newer.
         """
         changes = changes_of(asked)
+        key = repr(sorted(changes.items()))
         with self._watched(asked) as (_, progress):
-            study = altered(self.study, changes)
-            try:
-                result = ask(study, _QUESTION, progress=progress)
-            except AssemblyError as error:
-                if error.result is None:
-                    raise
-                result = error.result
-            progress.look()
+            study, result = altered(self.study, changes), self._searches.get(key)
+            if result is None:
+                try:
+                    result = ask(study, _QUESTION, progress=progress)
+                except AssemblyError as error:
+                    if error.result is None:
+                        raise
+                    result = error.result
+                progress.look()
+                self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
             with DRAWING, style.context("paper"):
                 part = solutions(study, result, f"{_QUESTION}-trade")
-        key = str(next(self._counter))
-        self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
         whole: dict[str, Any] | None = None
         if part is not None:
             count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
@@ -122,6 +123,7 @@ class TaskSession(Session):
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
         return {
             "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
+            "linkages": [f"linkage/{_name(text)}/" for text in result.files.values()],
             "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
@@ -135,18 +137,22 @@ class TaskSession(Session):
         drawn = DrawnSolutions.of(result)
         if row not in range(len(drawn.data)):
             raise AskedError
-        name = f"{key}-{row:.0f}"
+        file, text = [*result.files.items()][int(row)]
+        name = _name(text)
         if name not in self.linkages:
             study = drawn.linkage(int(row))
-            file = [*result.files][int(row)]
             path = study.folder.path / f"{self.study.label.rpartition('/')[2]}_{file}"
-            text = result.files[file].replace(f"mechdesign run {file} ", f"mechdesign run {path.name} ")
             self.linkages[name] = Session(dataclasses.replace(study, path=path, text=text.encode()))
             self.linkages[name].taken = True
             taken = [other for other in self.linkages if other != _OWN]
             for other in taken[:-_MOST_LINKAGES]:
                 self.linkages.pop(other).ended = True
         return {"to": f"linkage/{name}/"}
+
+
+def _name(text: str) -> str:
+    """What a linkage is called in its address: the same whenever a search finds it, so that its page keeps changes."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _drawing(study: Study) -> tuple[Canvas | None, str]:

@@ -115,8 +115,8 @@ def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
 
 
 def _fields(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as data; the unit of a limit that is a bare number is left out."""
-    return {name: value for name, value in asdict(verdict).items() if value or name != "limit_unit"}
+    """A verdict as data; the unit of a limit that is a bare number, and a reason that there is not, are left out."""
+    return {name: value for name, value in asdict(verdict).items() if value or name not in ("limit_unit", "reason")}
 
 
 def compose(

@@ -59,6 +59,7 @@ class Verdict:
     margin: float = float("nan")  #: of the worst row to the limit, negative beyond it
     unit: str = ""  #: of `worst` and `margin`
     note: str = ""  #: which poses or parts of a motion it does not speak of
+    reason: str = ""  #: why it is not met whatever the value: what cannot be assembled, or has no value
     limit_unit: str = ""  #: unit in which the nearer limit is written; empty where it is a bare number
 
     @property
@@ -340,7 +341,8 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     value, margin = float(judged.values[0]), float(judged.margins[0])
     scopes = [chosen.table.scope for chosen in terms.parts]
     missing = [gap for chosen in terms.parts for gap in chosen.gaps]
-    met = margin >= 0 and (not missing or requirement.unassembled is not None)
+    needed = missing if requirement.unassembled is None else []
+    met = margin >= 0 and not needed
     notes = [POSES_ONLY] if any(chosen.isolated for chosen in terms.parts) else []
     courses = [course for chosen in terms.parts for course in chosen.courses.values() if chosen.requests[0].integral]
     notes += dict.fromkeys(f"mean over {course.means_over}, not time" for course in courses if course.means_over)
@@ -349,7 +351,8 @@ def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Cho
     least = [chosen.column.rpartition(".")[2] for chosen in terms.parts if chosen.statistic in ("", "min")]
     notes += [f"an overlap of {-value:.6g} {terms.unit}".rstrip()] * (value < 0 and CLEARANCE in least)
     note = "; ".join([*notes, *dict.fromkeys(filter(None, [*lacking, *missing, *ends]))])
-    return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note)
+    reason = "" if met else "; ".join(dict.fromkeys(filter(None, [*lacking, *needed])))
+    return Verdict(in_words(requirement), met, value, place, margin, terms.unit, note, reason)
 
 
 def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: str) -> Verdict:

@@ -54,6 +54,7 @@ class _Verdict(BaseModel):
     unit: str
     note: str
     limit_unit: str = ""
+    reason: str = ""
 
 
 class WrittenManifest(BaseModel):

@@ -23,6 +23,8 @@ from mechdesign.study import Study
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 
+FOUND = "Found by synthesize as"  # how the comment begins under which the study of a linkage stands
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnSolutions(Drawn):
@@ -97,11 +99,11 @@ def _answer(
     for number, solution in enumerate(solutions, 1):
         name = "nearest" if missed else f"solution {number}"
         file = f"{name.replace(' ', '_')}.yaml"
-        title = "Nearest to" if missed else f"Solution {number} of"
         fault = "; ".join(faults(solution.defects, solution.elsewhere))
-        heading = [f"{title} {study.name}: {words[number - 1]}", *([f"It misses: {missed}"] if missed else []),
-                   *([f"In the assembly of this file it does not move through its task: {fault}"] if fault else []),
-                   f"Its report: mechdesign run {file} --report"]  # fmt: skip
+        # It stays true where a hand changes the file, and names no file.
+        heading = [f"{FOUND} {name} of {study.name}: {words[number - 1]}",
+                   *([f"It missed: {missed}"] if missed else []),
+                   *([f"In its assembly it did not move through its task: {fault}"] if fault else [])]  # fmt: skip
         data.append(study_data(study, task, solution, f"{study.name}, {name}"))
         files |= study_files(file, solution.kind, data[-1], heading)
     drawn = DrawnSolutions(

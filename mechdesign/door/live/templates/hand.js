@@ -9,12 +9,15 @@ function openHand(about, react) {
   const dialog = find("dialog"), page = crypto.randomUUID();
   const rows = new Map(all(".live-number").map(row => [row.dataset.name, row]));
   const buttons = Object.fromEntries(all("[data-do]").map(button => [button.dataset.do, button]));
+  const locks = new Map([...rows].map(([name, row]) => [name, row.querySelector("[type=checkbox]")]).filter(([, lock]) => lock));
   const dark = new CSSStyleSheet(), colours = new Map();
   document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
-  let past = [], future = [], ended = false;
+  let past = [], future = [], ended = false, notice = ""; // of the file, until the hand changes something else
 
   const text = value => String(Number(value.toPrecision(7)));
   const base = name => rows.has(name) ? Number(rows.get(name).querySelector("input").dataset.value) : about.entries?.[name];
+
+  const stored = () => JSON.parse(sessionStorage.getItem(KEEP) || "{}");
 
   const own = {
     changes: {}, set: [], held: false, rows, page, keeping: () => ({}), kept: {},
@@ -32,7 +35,7 @@ function openHand(about, react) {
     },
 
     // What the page says: of the server and the file above, of the hand beside it.
-    tell(text) { said.textContent = text; },
+    tell(text) { said.textContent = [notice, text].filter(Boolean).join(" "); },
     warn(text) { message.textContent = text; message.hidden = !text; },
     beside(text, wrong) {
       words.textContent = text;
@@ -77,6 +80,7 @@ function openHand(about, react) {
     // One entry of the history for each gesture, with the changes before it.
     remember(before) {
       if (JSON.stringify(before) !== JSON.stringify(own.changes)) {
+        notice = "";
         past = [...past, before].slice(-MOST);
         future = [];
       }
@@ -143,6 +147,11 @@ function openHand(about, react) {
       }, 500);
       return () => { on = false; clearInterval(timer); state.textContent = ""; };
     },
+
+    locked: () => [...locks].filter(([, lock]) => lock.checked).map(([name]) => name),
+
+    // Whether the hand has left changes on the page of an address.
+    left: address => Object.keys(stored()[new URL(address, location).pathname]?.changes || {}).length > 0,
 
     begin() {
       own.fill();
@@ -240,24 +249,29 @@ function openHand(about, react) {
   }
 
   // After a new version of the file what the hand has changed stays, with its history, as far as the file has it still.
-  const kept = JSON.parse(sessionStorage.getItem(KEEP) || "{}")[location.pathname];
+  const kept = stored()[location.pathname];
   if (kept) {
     const names = Object.keys(kept.base), gone = names.filter(name => base(name) === undefined);
     const now = entry => Object.fromEntries(names.filter(name => !gone.includes(name))
       .map(name => [name, entry[name] ?? kept.base[name]]).filter(([name, value]) => value !== base(name)));
     const differ = (entry, k, entries) => !k || JSON.stringify(entry) !== JSON.stringify(entries[k - 1]);
-    own.changes = now(kept.changes);
+    // What the hand has put back is the file's again.
+    own.changes = Object.fromEntries(Object.entries(now(kept.changes)).filter(([name]) => name in kept.changes));
     past = [...kept.past.map(now), own.changes].filter(differ).slice(0, -1);
     future = [own.changes, ...kept.future.map(now).reverse()].filter(differ).slice(1).reverse();
     own.kept = kept;
-    if (gone.length) {
-      own.tell(`Undo goes on without ${gone.join(", ")}: the file has no such number any more.`);
-      buttons.undo.title = said.textContent;
-    }
+    const lost = gone.length ? [`Undo goes on without ${gone.join(", ")}: the file has no such number any more.`] : [];
+    const held = Object.keys(own.changes).filter(name => base(name) !== kept.base[name])
+      .map(name => `The file has ${name} ${text(base(name))}, yours ${text(own.changes[name])} stays.`);
+    if (lost.length) buttons.undo.title = lost[0];
+    notice = [...lost, ...held].join(" ");
+    own.tell("");
+    grid.value = kept.grid ?? grid.value;
+    for (const name of kept.locked || []) if (locks.has(name)) locks.get(name).checked = true;
   }
   addEventListener("pagehide", () => {
-    const touched = [own.changes, ...past, ...future].flatMap(Object.keys), pages = JSON.parse(sessionStorage.getItem(KEEP) || "{}");
-    pages[location.pathname] = {changes: own.changes, past, future, base: Object.fromEntries(touched.map(name => [name, base(name)])), ...own.keeping()};
+    const touched = [own.changes, ...past, ...future].flatMap(Object.keys), pages = stored();
+    pages[location.pathname] = {changes: own.changes, past, future, locked: own.locked(), grid: grid.value, base: Object.fromEntries(touched.map(name => [name, base(name)])), ...own.keeping()};
     sessionStorage.setItem(KEEP, JSON.stringify(pages));
   });
   return own;

@@ -66,9 +66,7 @@
             answer.words.push(moving.words());
           }
           own.fill();
-          const lost = answer.data.gaps.reduce((sum, [first, end]) => sum + end - first + 1, 0);
-          const gaps = lost ? `${lost} of ${poses} poses: ${answer.data.gaps[0][2].replace(" here", "")}` : "";
-          own.beside([...answer.words, answer.why, gaps].filter(Boolean).join("\n"), Boolean(answer.why));
+          own.beside([...answer.words, answer.why, answer.missing].filter(Boolean).join("\n"), Boolean(answer.why));
         } catch (error) {
           own.lost(error);
           break;
@@ -147,7 +145,7 @@
       const [x, y] = moving.point(point), {corner, scale} = moving.data();
       return [corner[0] + x / scale, corner[1] - y / scale];
     };
-    const locked = () => [...own.rows].filter(([, part]) => part.querySelector("[type=checkbox]").checked).map(([name]) => name);
+    const locked = own.locked;
 
     function drag(point, to, near) {
       move({drag: {point, to: own.snapped(to), row: gesture.row, locked: locked(), held: gesture.held, near}, gesture});
@@ -213,7 +211,14 @@
     });
 
     if (own.kept.row !== undefined) moving.seek(own.kept.row);
-    own.keeping = () => ({row: moving.row()});
+    // Curves are chosen by their labels, as far as there still are such.
+    const picks = [...document.querySelectorAll("[data-chart] select")];
+    picks.forEach((select, k) => {
+      const option = [...select.options].find(({textContent}) => textContent === own.kept.picks?.[k]);
+      if (option) select.value = option.value;
+    });
+    picks[0]?.dispatchEvent(new Event("change"));
+    own.keeping = () => ({row: moving.row(), picks: picks.map(select => select.selectedOptions[0]?.textContent)});
     own.begin();
     if (Object.keys(own.changes).length) move({}); else ask();
   }

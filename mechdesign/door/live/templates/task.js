@@ -66,6 +66,10 @@
       const figure = stage.querySelector("figure");
       figure.dispatchEvent(new Event("moving-new", {bubbles: true}));
       if (still) figure.moving.stop();
+      for (const [k, tile] of [...room.querySelectorAll(`.${TAKE} button`)].entries()) {
+        if (!own.left(answer.linkages[k])) continue;
+        tile.append(Object.assign(document.createElement("span"), {className: "live-changed", textContent: "changed"}));
+      }
       figure.addEventListener("moving-chosen", () => { if (!stage.hidden) { at = figure.moving.sheet(); place(); } });
       look();
     }

@@ -194,10 +194,7 @@ def chosen(layer: Element, sheet: Canvas, sweep: Sweep) -> None:
     """A design in its first valid pose, and the paths of its points."""
     scene = sweep.first
     assert scene is not None
-    sketcher = Sketcher(layer, sheet, scene)
-    for look in path_looks(sweep):
-        sketcher.trace(look.path, look.color, look.width, look.share)
-    sketcher.draw()
+    Sketcher(layer, sheet, scene).draw(path_looks(sweep))
 
 
 def numbers_of(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,6 +25,7 @@ from mechdesign.drawing.scene import Still
 from mechdesign.drawing.shapes import Dashes, Line, Shape, Strut, Symbol
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.kinematics.figures.paths import PathLook
 
 # Width, greatest height and margin of a drawing, in its own units of about one point on paper.
 WIDTH = 520.0
@@ -86,9 +87,20 @@ class Sketcher:
     def __init__(self, root: Element, sheet: Canvas, scene: Still) -> None:
         self.root, self.sheet, self.scene = root, sheet, scene
 
-    def draw(self) -> None:
-        """The mechanism without its names."""
-        for shape in sorted(shapes.mechanism_shapes(self.scene), key=lambda shape: shape.layer):
+    def draw(self, paths: Iterable[PathLook] = (), goals: Iterable[Complexes] = ()) -> None:
+        """The mechanism without its names; the paths of points, and places that these shall pass, lie on its plates."""
+        ordered = sorted(shapes.mechanism_shapes(self.scene), key=lambda shape: shape.layer)
+        plates = sum(shape.layer < shapes.PATHS for shape in ordered)
+        self._shapes(ordered[:plates])
+        for path in paths:
+            self._trace(path)
+        for places in goals:
+            dots = "".join(f"M{_pair(place)}h0" for place in self.sheet.all(places).tolist())
+            add(self.root, "path", **{"class": "moving-goals"}, d=dots, stroke=to_hex(style.VERMILION), stroke_width=6)
+        self._shapes(ordered[plates:])
+
+    def _shapes(self, drawn: Iterable[Shape]) -> None:
+        for shape in drawn:
             if isinstance(shape, Symbol):
                 self._symbol(shape)
             elif isinstance(shape, Strut):
@@ -153,10 +165,10 @@ class Sketcher:
             way = "".join(f"M{'L'.join(line)}" for line in lines)
             add(parent, "path", d=way, stroke_width=symbol.width, **look)
 
-    def trace(self, places: Complexes, color: str, width: float, share: float) -> None:
+    def _trace(self, path: PathLook) -> None:
         """The path of a point; the script may hide it."""
-        add(self.root, "path", **{"class": "moving-trace"}, d=self.sheet.path(places), stroke=color,
-            stroke_width=width, opacity=share)  # fmt: skip
+        add(self.root, "path", **{"class": "moving-trace"}, d=self.sheet.path(path.path), stroke=path.color,
+            stroke_width=path.width, opacity=path.share)  # fmt: skip
 
     def names(self, scenes: Sequence[Still], *, links: bool = True) -> None:
         """Names of the points and of the links, each where it covers least, averaged over some poses of the motion.

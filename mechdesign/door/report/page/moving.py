@@ -54,7 +54,7 @@ from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
 from mechdesign.questions.kinematics.figures.curves import motion_curves
-from mechdesign.questions.kinematics.figures.paths import path_looks
+from mechdesign.questions.kinematics.figures.paths import goals_of, path_looks
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.study import Study
@@ -158,7 +158,9 @@ def _motion(
     if sheet is None:
         # Guides reach farther than points.
         ends = [end for scene in scenes for guide in scene.guides for end in guide.ends]
-        reached = np.concatenate([whole.extent, ends, *([earlier.extent] if earlier else [])])
+        reached = np.concatenate(
+            [whole.extent, ends, *goals_of(study).values(), *([earlier.extent] if earlier else [])]
+        )
         if handled:
             middle, wide, tall = extent(reached)
             reached = middle + _HAND_ROOM * complex(wide, tall) * np.array([-0.5, 0.5])
@@ -270,14 +272,9 @@ def _drawing(
     if earlier is not None and earlier.first is not None:
         under = add(root, "g", **{"class": "moving-part moving-before"}, opacity=0.6, stroke_linecap="butt")
         dashed(under, DASHES, _DASHED)
-        before = Sketcher(under, sheet, earlier.first)
-        for look in path_looks(earlier):
-            before.trace(look.path, COLOR, look.width, look.share)
-        before.draw()
+        Sketcher(under, sheet, earlier.first).draw(look._replace(color=COLOR) for look in path_looks(earlier))
     sketcher = Sketcher(root, sheet, scene)
-    for look in path_looks(whole):
-        sketcher.trace(look.path, look.color, look.width, look.share)
-    sketcher.draw()
+    sketcher.draw(path_looks(whole), goals_of(study).values())
     if not plain:
         sketcher.names(scenes)
         sketcher.ruler(study.units.label("length"))

@@ -30,6 +30,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.study import Study
+from mechdesign.study.schema.targets import Target
 
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
@@ -76,24 +77,21 @@ def paths_panel(sweep: Sweep, more: Sequence[PanelMark] = (), before: Before | N
     The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some. A study before it
     lies under it in grey dashes.
     """
-    targets = (*sweep.study.targets.values(), *sweep.study.curves.values())
     dotted = {"marker": "o", "color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (1, 2.5)), "markersize": 3,
               "zorder": 3.7}  # fmt: skip
     marks: list[PanelMark] = []
-    goals = []
-    for target in targets:
-        if target.table is not None and len(target.coordinates) == 2:
-            goals.append(target.table[:, -2] + 1j * target.table[:, -1])
-            # Between the points of a curve nothing is asked.
-            look = dotted if target.closed is None else dotted | {"linestyle": "none", "markersize": 4.5}
-            marks.append(Trace(goals[-1].real, goals[-1].imag, look=look))
+    goals = goals_of(sweep.study)
+    for target, places in goals.items():
+        # Between the points of a curve nothing is asked.
+        look = dotted if target.closed is None else dotted | {"linestyle": "none", "markersize": 4.5}
+        marks.append(Trace(places.real, places.imag, look=look))
     count = len(sweep.mechanism.description.links) - 1
     _, ghosts = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     marks += [Posed(still, ghost=True) for still in sweep.scene.some(np.unique(some[1 : -1 if sweep.closed else None]))]
     marks += [*both_named(before), *path_marks(sweep)]
-    shows, names = [sweep.extent, *goals], _path_names(sweep)
+    shows, names = [sweep.extent, *goals.values()], _path_names(sweep)
     if before is not None:
         earlier = Sweep.of(DrawnMotion.of(before.result).shown)
         marks += sweep_marks(earlier)
@@ -104,6 +102,13 @@ def paths_panel(sweep: Sweep, more: Sequence[PanelMark] = (), before: Before | N
         names += _step_names(sweep, steps)
     marks += [*more, Posed(sweep.first, more=names)]
     return drawn_plane(marks, np.concatenate(shows), sweep.study, followed=True)
+
+
+def goals_of(study: Study) -> dict[Target, Complexes]:
+    """The places that points shall pass, by the targets and curves of a study."""
+    targets = (*study.targets.values(), *study.curves.values())
+    return {target: target.table[:, -2] + 1j * target.table[:, -1] for target in targets
+            if target.table is not None and len(target.coordinates) == 2}  # fmt: skip
 
 
 class Steps(NamedTuple):
