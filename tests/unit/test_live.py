@@ -56,6 +56,17 @@ def test_a_pivot_follows_the_hand_by_its_two_coordinates(study):
     assert done.why == ""
 
 
+def test_where_the_pose_cannot_be_assembled_a_pivot_still_follows_the_hand(study):
+    # Rod and rocker reach 150 mm from the crank's pin, which stands at (0, 30).
+    back = dragged(study, {"ground.D.x": 400.0}, Drag("D", 120 + 5j, row=9, resolution=0.01))
+    assert back.changes == {"ground.D.x": 120.0, "ground.D.y": 5.0}
+    assert back.why == ""
+    away = dragged(study, {"ground.D.x": 400.0}, Drag("D", 300 + 0j, row=9, locked=["ground.D.y"], resolution=0.01))
+    assert (away.changes, away.why) == ({"ground.D.x": 300.0}, "the pose cannot be assembled")
+    pin = dragged(study, {"ground.D.x": 400.0}, Drag("B", 80 + 50j, row=9, resolution=0.01))
+    assert (pin.names, pin.why) == ((), "the pose cannot be assembled")
+
+
 def test_the_pin_of_a_rocker_follows_by_two_lengths_that_two_circles_give(study):
     # At row 9 the crank stands upright.
     done = dragged(study, {}, Drag("B", 90 + 70j, row=9, resolution=1e-6))

@@ -55,13 +55,14 @@ class Drag:
 class Dragged:
     """Numbers of a study after a drag, those that the hand changes, and why the point does not follow it, if so.
 
-    `row` is the pose where the drives have gone with the hand.
+    `row` is the pose where the drives have gone with the hand; `across` is what changes further away from their way.
     """
 
     changes: Mapping[str, float]
     row: float
     names: tuple[str, ...] = ()
     why: str = ""
+    across: str = ""
 
 
 @dataclass(frozen=True)
@@ -166,17 +167,17 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
     """
     pose = _Pose.of(altered(original, changes), drag.row, changes)
     if not pose.valid:
-        return Dragged(changes, drag.row, why=f"the pose {pose.why}")
+        return _pivoted(original, pose, drag)
     ways = {name: way for name, way in _ways(original, pose, drag) if abs(way).max() > _BLIND}
     names: tuple[str, ...] = ()
     if _driven(pose.study, drag.point) and not _spans(ways):
+        far = max((abs(way[0]) for way in ways.values()), default=0.0)
+        names = tuple(name for name, way in ways.items() if abs(way[0]) >= _FULL * far)[:1]
         ways |= _turning(original, pose, drag.point, drag.row)
         if TURNED in ways and not set(drag.held).difference([TURNED]):
             turned = _newton(original, changes, pose, {TURNED: drag.row}, drag)[0]
             if abs(turned.at(drag.point) - drag.target) <= drag.near:
-                return Dragged(changes, turned.row, (TURNED,))
-        far = max((abs(way[0]) for name, way in ways.items() if name != TURNED), default=0.0)
-        names = tuple(name for name, way in ways.items() if name != TURNED and abs(way[0]) >= _FULL * far)[:1]
+                return Dragged(changes, turned.row, (TURNED,), across="".join(names))
         names += (TURNED,) if TURNED in ways else ()
     names = names or _fewest(ways, drag.target - pose.at(drag.point))
     if not names:
@@ -194,6 +195,30 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
     except MechdesignError:
         rounded = values
     return Dragged({**changes, **rounded}, pose.row, names, why)
+
+
+def _pivoted(original: Study, pose: _Pose, drag: Drag) -> Dragged:
+    """The pivot that a hand holds where it is wanted: it has a place, also where the pose cannot be assembled."""
+    now, ways = pose.study.mechanism.nominal, dict[str, Complexes]()
+    at = [f"{GROUND}.{drag.point}.{axis}" for axis in "xy"]
+    for name in [*_drawn(original, drag.point), *free_numbers(original)] if now.keys() >= {*at} else ():
+        slopes = _slopes(original, pose, name)
+        if name not in drag.locked and not slopes.keys().isdisjoint(at):
+            ways[name] = np.array([complex(*(float(slopes.get(place, 0.0)) for place in at))])
+    missing = drag.target - complex(*(now[place] for place in at)) if ways else 0j
+    names = tuple(ways)[:2]
+    if not names:
+        return Dragged(pose.changes, drag.row, why=f"the pose {pose.why}")
+    matrix = np.column_stack([_parts(ways[name]) for name in names])
+    step = np.linalg.lstsq(matrix, _parts(np.array([missing])), rcond=1e-6)[0]
+    values = {
+        name: _rounded(original, name, value_of(pose.study, name) + change, drag.resolution)
+        for name, change in zip(names, step.tolist(), strict=True)
+        if abs(ways[name][0] * change) > drag.resolution
+    }
+    changes = {**pose.changes, **values}
+    there = _Pose.of(altered(original, changes), drag.row, changes)
+    return Dragged(changes, drag.row, names, "" if there.valid else f"the pose {there.why}")
 
 
 def _newton(

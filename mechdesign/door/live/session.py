@@ -157,10 +157,11 @@ class Session:
         """The page of the study as it is in the file."""
         study, part = self.study, moving(self.shown, self._first, handled=True)
         assert part is not None
-        questions = self._questions()
+        questions, points = self._questions(), self._handles()
         about = {
             "version": self.version, "questions": self._quickest(), "long": _LONG,
-            "length": study.units.label("length"), **saving.file_names(study), "points": self._handles(),
+            "length": study.units.label("length"), **saving.file_names(study), "points": points,
+            "pivots": [point for point in points if GROUND in study.mechanism.graph.links_at(point)],
             "step": float(f"{study.mechanism.size / 100:.1g}"), "mistake": self.mistake, "entries": self._entries(),
         }  # fmt: skip
         return rendered(
@@ -214,7 +215,7 @@ class Session:
         study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked, self.shown.mechanism.size)
         self._page(asked)
         names: tuple[str, ...] = ()
-        why, row = "", None
+        why, row, hint = "", None, ""
         if (drag := asked.get("drag")) is not None:
             if not isinstance(drag, Mapping):
                 raise AskedError
@@ -228,6 +229,10 @@ class Session:
                 raise AskedError
             done = dragged(study, changes, hand)
             changes, names, why, row = dict(done.changes), done.names, done.why, done.row
+            if done.across:
+                hint = (
+                    f"along its way it is driven; pull further across it for {done.across.removeprefix('mechanism.')}"
+                )
         count = int(number_of(asked.get("poses")))
         if not 0 < count <= _MOST_ROWS:
             raise AskedError
@@ -236,9 +241,9 @@ class Session:
         rows = steps(str(asked.get("rows")), count) / ROWS
         drawing, tracks = posed(now, rows, sheet, study)
         return {
-            "changes": changes, "names": names, "why": why, "row": row, "drawing": drawing, "data": titled(tracks),
-            "missing": _missing(rows, tracks["gaps"]), "set": saving.overrides(self.study, own),
-            "words": [*self._words(names, changes, now)],
+            "changes": changes, "names": names, "why": why, "row": row, "hint": hint, "drawing": drawing,
+            "data": titled(tracks), "missing": _missing(rows, tracks["gaps"]),
+            "set": saving.overrides(self.study, own), "words": [*self._words(names, changes, now)],
         }  # fmt: skip
 
     def _words(self, names: Sequence[str], changes: Mapping[str, float], now: Study) -> Iterator[str]:

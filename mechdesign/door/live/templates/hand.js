@@ -3,6 +3,7 @@
 // `react` is called when another change than a drag was made.
 function openHand(about, react) {
   const RETRY = 2000; // milliseconds until the page asks a server that is not there again
+  const SERIES = 1000; // milliseconds within which presses of keys on a ring are one gesture
   const KEEP = "mechdesign-live", MOST = 500; // what outlasts a new version of the file, and gestures that it holds
   const find = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
   const words = find(".live-hand"), said = find(".live-said"), message = find(".live-message"), grid = find(".live-grid");
@@ -12,7 +13,7 @@ function openHand(about, react) {
   const locks = new Map([...rows].map(([name, row]) => [name, row.querySelector("[type=checkbox]")]).filter(([, lock]) => lock));
   const dark = new CSSStyleSheet(), colours = new Map();
   document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
-  let past = [], future = [], ended = false, notice = ""; // of the file, until the hand changes something else
+  let past = [], future = [], ended = false, series = null, notice = ""; // of the file, until the hand changes something else
 
   const text = value => String(Number(value.toPrecision(7)));
   const base = name => rows.has(name) ? Number(rows.get(name).querySelector("input").dataset.value) : about.entries?.[name];
@@ -20,7 +21,7 @@ function openHand(about, react) {
   const stored = () => JSON.parse(sessionStorage.getItem(KEEP) || "{}");
 
   const own = {
-    changes: {}, set: [], held: false, rows, page, keeping: () => ({}), kept: {},
+    changes: {}, set: [], held: false, rows, page, keeping: () => ({}), kept: {}, settled: async () => {},
     base,
     value: name => own.changes[name] ?? base(name),
 
@@ -77,11 +78,11 @@ function openHand(about, react) {
       for (const name of Object.keys(values)) if (values[name] === base(name)) delete own.changes[name];
     },
 
-    // One entry of the history for each gesture, with the changes before it.
+    // One entry of the history for each gesture, with the changes before it; what goes on with a gesture gives the same.
     remember(before) {
       if (JSON.stringify(before) !== JSON.stringify(own.changes)) {
         notice = "";
-        past = [...past, before].slice(-MOST);
+        if (past.at(-1) !== before) past = [...past, before].slice(-MOST);
         future = [];
       }
       own.fill();
@@ -92,6 +93,14 @@ function openHand(about, react) {
       return size > 0 ? place.map(value => Math.round(value / size) * size) : place;
     },
     step: event => (Number(grid.value) || about.step) * (event.shiftKey ? 10 : 1),
+
+    // Presses of keys on a ring that follow one another: one gesture, with the changes before it.
+    presses(ring) {
+      const now = performance.now();
+      if (series?.ring !== ring || now - series.last > SERIES) series = {ring, before: {...own.changes}};
+      series.last = now;
+      return series;
+    },
 
     // A pointer holds a ring until it lets go: `moved` gets how far it is from where it took it, in pixels.
     grasp(event, ring, moved, done) {
@@ -131,6 +140,7 @@ function openHand(about, react) {
       ring.setAttribute("role", "button");
       ring.setAttribute("aria-label", `${label}: drag it, or use the arrow keys`);
       circle.setAttribute("r", radius);
+      ring.addEventListener("blur", () => { series = null; });
       ring.append(circle);
       parent.append(ring);
       return ring;
@@ -159,10 +169,26 @@ function openHand(about, react) {
     },
   };
 
-  function restore(to) {
-    own.changes = {...to};
+  // Another change than a drag was made: what was said of the one before holds no more.
+  function changed(words) {
+    series = null;
     own.fill();
+    own.tell(words);
     react();
+  }
+
+  // The changes of a step of the history, and what it gives in words.
+  async function restore(title, button, step) {
+    await own.settled();
+    if (own.held || button.disabled) return;
+    const before = own.changes;
+    own.changes = {...step()};
+    const names = Object.keys({...before, ...own.changes}).filter(name => own.value(name) !== (before[name] ?? base(name)));
+    const words = name => {
+      const row = rows.get(name), [label, unit] = row ? ["label span", ".unit"].map(part => row.querySelector(part).textContent) : [name.replace("mechanism.", ""), ""];
+      return `${label} = ${text(own.value(name))} ${unit}`.trim();
+    };
+    changed(`${title}: ${names.map(words).join(", ")}`);
   }
 
   // Fields and sliders: a gesture ends when the field is left or the slider let go.
@@ -173,8 +199,7 @@ function openHand(about, react) {
       before ??= {...own.changes};
       if (value === "" || !isFinite(value)) return;
       own.put({[name]: Number(value)});
-      own.fill();
-      react();
+      changed("");
     };
     const done = () => { if (before) own.remember(before); before = null; own.fill(); };
     field.addEventListener("input", () => input(field.value));
@@ -207,9 +232,9 @@ function openHand(about, react) {
   }
 
   const actions = {
-    undo() { future.push({...own.changes}); restore(past.pop()); },
-    redo() { past.push({...own.changes}); restore(future.pop()); },
-    reset() { past.push({...own.changes}); future = []; restore({}); },
+    undo: () => restore("Undone", buttons.undo, () => { future.push({...own.changes}); return past.pop(); }),
+    redo: () => restore("Redone", buttons.redo, () => { past.push({...own.changes}); return future.pop(); }),
+    reset: () => restore("Reset", buttons.reset, () => { past.push({...own.changes}); future = []; return {}; }),
     async copy() {
       const words = own.set.map(text => `--set '${text.replaceAll("'", "'\\''")}'`).join(" ");
       try { await navigator.clipboard.writeText(words); own.tell(`Copied: ${words}`); } catch { own.tell(words); }
@@ -224,10 +249,10 @@ function openHand(about, react) {
   };
   for (const name in actions) buttons[name].addEventListener("click", actions[name]);
   document.addEventListener("keydown", event => {
-    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=number], input[type=text]")) return;
-    const button = buttons[event.shiftKey ? "redo" : "undo"];
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.matches("input[type=number], input[type=text]")) return;
     event.preventDefault();
-    if (!button.disabled) button.click();
+    actions[event.shiftKey || key === "y" ? "redo" : "undo"]();
   });
 
   // Waits for a change of the file: a new version makes the page anew, a mistake is told.

@@ -3,11 +3,12 @@
   const REST = 150; // milliseconds after which a hand rests
   const LONG = 1000; // until questions are asked that make designs of their own
   const RING = 13; // radius of a handle in the drawing
-  const NEAR = 6; // units of the drawing beside a crank's circle within which a hand turns the crank alone
+  const NEAR = 4; // pixels beside a crank's circle within which a hand turns the crank alone
+  const REACHED = 1; // units of the drawing by which a point may miss a wanted place that it has reached
 
   function start() {
     const about = JSON.parse(document.getElementById("live-data").textContent), figure = document.getElementById("kinematics-moving");
-    const moving = figure.moving, drawing = moving.drawing, own = openHand(about, () => move({}));
+    const moving = figure.moving, drawing = moving.drawing, own = openHand(about, () => { drop(); move({}); });
     const sections = new Map([...document.querySelectorAll("[data-question]")].map(part => [part.dataset.question, part]));
     const marks = Object.assign(document.createElement("datalist"), {id: "live-marks"});
     figure.append(marks);
@@ -25,7 +26,7 @@
         if (field.value !== "" && !moving.go({[name]: Number(field.value)})) own.tell(`${name} = ${field.value} is no pose of the motion`);
       });
     }
-    let turn = 0, timer = 0, running = false, next = null, asking = null, gesture = null;
+    let turn = 0, timer = 0, running = false, waiting = [], asking = null, gesture = null;
 
     function unitOf(name) { return (moving.data().given.find(([own]) => own === name) || ["", ""])[1]; }
 
@@ -34,9 +35,15 @@
       return [...corner, scale, width, height];
     };
 
-    // Positions: one request under way, and the newest next. What they say of the motion before holds no more.
+    // A gesture that was undone, or overtaken by another change, does not come back.
+    function drop() {
+      if (gesture) gesture.over = true;
+      gesture = null;
+    }
+
+    // Positions: one request under way, and the newest of a gesture next. What they say of the motion before holds no more.
     function move(job) {
-      next = job;
+      waiting = [...waiting.filter(one => one.gesture && one.gesture !== job.gesture), job];
       if (asking) asking.abort();
       clearTimeout(timer);
       for (const part of document.querySelectorAll(".live-answer, .live-pictures, [data-numbers], [data-chart]")) part.setAttribute("aria-busy", "true");
@@ -46,33 +53,40 @@
 
     async function run() {
       running = true;
-      while (next) {
-        const job = next, {poses, rows: places} = moving.data();
-        next = null;
+      while (waiting.length) {
+        const {drag, gesture: mine} = waiting.shift(), {poses, rows: places} = moving.data();
+        if (mine?.over) continue;
         try {
-          const answer = await own.post("move", {...job, poses, rows: places, sheet: sheet(), turn: ++turn});
+          // A drag goes on from the pose and the numbers of the last answer, which may be newer than the pointer's place.
+          const asked = drag && {drag: {...drag, row: mine.row, held: mine.held}};
+          const answer = await own.post("move", {...asked, poses, rows: places, sheet: sheet(), turn: ++turn});
+          if (mine?.over) continue;
           if (answer.wrong) { own.beside(answer.wrong, true); continue; }
-          // A gesture that was undone meanwhile does not come back.
-          if (job.drag && job.gesture !== gesture) continue;
-          if (job.drag) {
+          if (drag) {
             own.changes = answer.changes;
-            if (answer.names.length) gesture.held = answer.names;
+            if (answer.names.length) mine.held = answer.names;
           }
           own.set = answer.set;
           moving.take(answer.data, answer.drawing);
-          if (job.drag && answer.names.includes("")) {
-            gesture.row = answer.row;
+          if (drag && answer.names.includes("")) {
+            mine.row = answer.row;
             moving.seek(answer.row);
             answer.words.push(moving.words());
           }
           own.fill();
-          own.beside([...answer.words, answer.why, answer.missing].filter(Boolean).join("\n"), Boolean(answer.why));
+          own.beside([...answer.words, answer.hint, answer.why, answer.missing].filter(Boolean).join("\n"), Boolean(answer.why));
         } catch (error) {
           own.lost(error);
           break;
         }
       }
       running = false;
+      rest();
+    }
+
+    // When the hand rests, everything is asked; a point that it has brought out of the drawing is brought back.
+    function rest() {
+      clearTimeout(timer);
       timer = setTimeout(() => ask(!gesture && outside()), REST);
     }
 
@@ -148,40 +162,54 @@
     const locked = own.locked;
 
     function drag(point, to, near) {
-      move({drag: {point, to: own.snapped(to), row: gesture.row, locked: locked(), held: gesture.held, near}, gesture});
+      move({drag: {point, to, locked: locked(), near}, gesture});
     }
 
-    // Until the last place of the hand is answered.
+    // Until the last place of the hand is answered; whether its gesture holds.
     async function settled() {
       const mine = gesture;
-      while (running) await new Promise(resolve => setTimeout(resolve, 5));
+      while (mine && running) await new Promise(resolve => setTimeout(resolve, 5));
       if (gesture === mine) gesture = null;
+      if (mine && outside()) rest();
+      return Boolean(mine && !mine.over);
     }
+    own.settled = settled;
 
     function grasp(event, point, ring) {
       if (event.button) return;
-      moving.stop();
-      const at = here(point);
-      gesture = {row: moving.row(), held: []};
+      const mine = gesture = {row: row(point), held: []}, at = here(point);
       own.grasp(event, ring, (across, down) => {
-        const scale = moving.data().scale * drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width;
-        drag(point, [at[0] + across / scale, at[1] - down / scale], NEAR);
+        if (mine.over) return;
+        const pixels = drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width, scale = moving.data().scale * pixels;
+        drag(point, own.snapped([at[0] + across / scale, at[1] - down / scale]), NEAR / pixels);
       }, settled);
     }
 
     const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
-    async function keyed(event, point) {
+    // The pose from which a hand takes a point; where it cannot be assembled only pivots have a place, and of the others
+    // the ring stands where the nearest pose has it.
+    function row(point) {
+      moving.stop();
+      if (!about.pivots.includes(point)) moving.near(point);
+      return moving.row();
+    }
+
+    async function keyed(event, point, ring) {
       const way = arrows[event.key];
       if (!way) return;
       event.preventDefault();
       event.stopPropagation();
-      if (running) return;
-      moving.stop();
-      const step = own.step(event), before = {...own.changes}, [x, y] = here(point);
-      gesture = {row: moving.row(), held: []};
-      drag(point, [x + way[0] * step, y + way[1] * step], 0);
-      await settled();
-      own.remember(before);
+      const begin = row(point), step = own.step(event), at = here(point), presses = own.presses(ring);
+      gesture = presses.gesture ??= {held: []};
+      // Presses add up on the place that is wanted; where the point could not go there they begin anew from where it is.
+      if (!running) {
+        gesture.row = begin;
+        if (presses.to && Math.hypot(presses.to[0] - at[0], presses.to[1] - at[1]) * moving.data().scale > REACHED) presses.to = at;
+      }
+      gesture.row ??= begin;
+      presses.to = own.snapped((presses.to ?? at).map((value, k) => value + way[k] * step));
+      drag(point, presses.to, 0);
+      if (await settled()) own.remember(presses.before);
     }
 
     // Rings at the points that a hand may move.
@@ -190,7 +218,7 @@
     for (const point of about.points) {
       const ring = own.ring(handles, `point ${point}`, RING);
       ring.setAttribute("data-at", point);
-      ring.addEventListener("keydown", event => keyed(event, point));
+      ring.addEventListener("keydown", event => keyed(event, point, ring));
       ring.addEventListener("pointerdown", event => grasp(event, point, ring));
     }
     drawing.append(handles);

@@ -149,7 +149,7 @@
         if (!way) return;
         event.preventDefault();
         event.stopPropagation();
-        const before = {...own.changes}, from = names.map(own.value);
+        const {before} = own.presses(ring), from = names.map(own.value);
         if (turning) {
           const step = Math.PI / 180 / about.turn * (event.shiftKey ? 10 : 1) * (way[0] < 0 || way[1] > 0 ? 1 : -1);
           own.put({[names[0]]: Number((from[0] + step).toPrecision(10))});

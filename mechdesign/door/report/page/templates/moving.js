@@ -38,6 +38,13 @@
     return values[k] + part * (turn ? step - turn * Math.round(step / turn) : step);
   }
 
+  // The pose nearest to a place of the motion at which a track has a value; the place itself where it has one, or none.
+  function present(values, at) {
+    if (isFinite(between(values, at))) return at;
+    const poses = [...values.keys()].filter(k => isFinite(values[k])).sort((a, b) => Math.abs(a - at) - Math.abs(b - at));
+    return poses.length ? poses[0] : at;
+  }
+
   function make(name, attributes, parent) {
     const element = document.createElementNS(SVG, name);
     for (const key in attributes) element.setAttribute(key, attributes[key]);
@@ -116,7 +123,8 @@
     const x = track(data.x, PLACES), y = track(data.y, PLACES), turn = track(data.turn, TURNS);
     const parts = [...drawing.querySelectorAll("[data-at]")].filter(own).map(group => {
       const {at, turn: link, offset} = group.dataset;
-      return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number)];
+      const stays = group.closest(".moving-stays") !== null;
+      return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number), stays];
     });
     const struts = [...drawing.querySelectorAll("[data-from]")].filter(own).map(path => {
       const {from, to, way} = path.dataset;
@@ -125,8 +133,10 @@
     return {
       x, y,
       show(at) {
-        for (const [group, x, y, turn, offset] of parts) {
-          let px = between(x, at), py = between(y, at);
+        for (const [group, x, y, turn, offset, stays] of parts) {
+          // What a hand holds stays in its reach.
+          const pose = stays ? present(x, at) : at;
+          let px = between(x, pose), py = between(y, pose);
           const finite = isFinite(px), angle = turn ? between(turn, at, 360) : 0;
           group.classList.toggle("moving-gone", !finite);
           if (!finite) continue;
@@ -538,7 +548,15 @@
       seek(row) { choose(placed(row)); },
       value: name => readout.text(data.given.find(([own]) => own === name)[2], Math.min(at, last)),
       words: () => words.textContent, row: here, data: () => data,
-      point: name => [between(moved.x[name], Math.min(at, last)), between(moved.y[name], Math.min(at, last))],
+      point(name) {
+        const pose = present(moved.x[name], Math.min(at, last));
+        return [between(moved.x[name], pose), between(moved.y[name], pose)];
+      },
+      near(name) {
+        // Not at the border of what can be assembled: a little rounding makes it impossible there.
+        const values = moved.x[name], inner = values.map((value, k) => value + (values[k - 1] ?? 0) + (values[k + 1] ?? 0));
+        if (gap(Math.round(at))) choose(present(inner.some(isFinite) ? inner : values, at));
+      },
       again() { begin(true); show(at); },
       take(next, markup, entire) {
         const row = here(), room = html("template", {innerHTML: markup}), fresh = room.content.firstChild;

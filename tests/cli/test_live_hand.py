@@ -1,0 +1,135 @@
+"""What a quick or careless hand does on the live page, in a real browser."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+
+try:
+    from playwright.sync_api import expect
+except ImportError:
+    expect = None
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def slow(live):
+    """A page whose positions take longer than a hand and its keys."""
+    bar = live()
+    move = bar.session.move
+
+    def late(asked):
+        time.sleep(0.06)
+        return move(asked)
+
+    bar.session.move = late
+    bar.page.locator(".live-grid").fill("1")
+    return bar
+
+
+def field(bar, name):
+    return bar.page.locator(f"[data-name='{name}'] input").first
+
+
+def type_in(bar, name, value):
+    field(bar, name).fill(value)
+    field(bar, name).blur()
+    bar.answered(bar.page)
+
+
+@pytest.mark.nightly
+def test_the_end_of_a_quick_pull_at_a_cranks_pin_sets_angle_and_length(slow):
+    drive = slow.page.get_by_role("spinbutton", name="theta deg")
+    drive.fill("60")
+    drive.blur()
+    x, y = slow.middle("A")
+    way = complex(math.cos(math.pi / 3), math.sin(math.pi / 3))
+    target = 30 * way + 12 / slow.scale * way
+    slow.page.mouse.move(x, y)
+    slow.page.mouse.down()
+    for k in range(1, 11):
+        slow.page.mouse.move(x + 1.2 * k * way.real, y - 1.2 * k * way.imag)
+        slow.page.wait_for_timeout(9)
+    slow.page.wait_for_timeout(400)
+    # The crank reaches the point of the grid that is nearest to the hand.
+    reached = abs(complex(round(target.real), round(target.imag)))
+    expect(slow.page.locator(".live-hand")).to_contain_text(f"crank.length = {reached:.2f} mm")
+    slow.page.mouse.up()
+    slow.answered(slow.page)
+    assert slow.value("crank.length") == pytest.approx(reached, abs=0.02)
+
+
+def test_within_four_pixels_of_its_circle_a_cranks_pin_turns_alone_and_says_how_its_length_is_changed(live):
+    bar = live()
+    x, y = bar.middle("A")
+    bar.page.mouse.move(x, y)
+    bar.page.mouse.down()
+    bar.page.mouse.move(x + 3, y)
+    expect(bar.page.locator(".live-hand")).to_contain_text("pull further across it for crank.length")
+    assert bar.value("crank.length") == 30
+    bar.page.mouse.move(x + 6, y)
+    expect(bar.page.locator(".live-hand")).to_contain_text("crank.length = ")
+    bar.page.mouse.up()
+    bar.answered(bar.page)
+    assert bar.value("crank.length") == pytest.approx(30 + 6 / bar.scale, abs=0.2)
+
+
+@pytest.mark.nightly
+def test_quick_presses_of_an_arrow_key_add_up_to_one_step_of_the_history(slow):
+    slow.page.locator(".live-handle[data-at=D]").focus()
+    for _ in range(6):
+        slow.page.keyboard.press("ArrowRight")
+    expect(field(slow, "ground.D.x")).to_have_value("106")
+    said = slow.page.locator(".live-said")
+    slow.page.keyboard.press("Control+z")
+    expect(field(slow, "ground.D.x")).to_have_value("100")
+    # What was said of the drag holds no more.
+    expect(said).to_have_text("Undone: ground.D.x = 100 mm")
+    slow.page.keyboard.press("Control+y")
+    expect(field(slow, "ground.D.x")).to_have_value("106")
+    expect(said).to_have_text("Redone: ground.D.x = 106 mm")
+    slow.page.wait_for_timeout(1100)
+    slow.page.locator(".live-handle[data-at=D]").focus()
+    slow.page.keyboard.press("ArrowLeft")
+    expect(field(slow, "ground.D.x")).to_have_value("105")
+    slow.page.keyboard.press("Control+z")
+    expect(field(slow, "ground.D.x")).to_have_value("106")
+
+
+@pytest.mark.nightly
+def test_where_a_pose_cannot_be_assembled_a_pivot_is_dragged_back(live):
+    bar = live()
+    # Rod and rocker reach 150 mm: with D 400 mm away no pose is left, and its ring stays where it was.
+    type_in(bar, "ground.D.x", "400")
+    bar.drag("D", 10 * bar.scale, 0)
+    assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
+    # At 170 mm the pin A at 60 deg is too far away, and rings of the nearest pose that can be assembled stay.
+    drive = bar.page.get_by_role("spinbutton", name="theta deg")
+    type_in(bar, "ground.D.x", "170")
+    drive.fill("170")
+    drive.blur()
+    expect(bar.page.locator(".moving-words")).to_contain_text("cannot be assembled")
+    for point in "OADBP":
+        assert bar.page.locator(f".live-handle[data-at={point}]").is_visible()
+    x, y = bar.middle("B")
+    bar.page.mouse.move(x, y)
+    bar.page.mouse.down()
+    bar.page.mouse.move(x - 10, y, steps=3)
+    expect(bar.page.locator(".live-hand")).to_contain_text("rocker.length = ")
+    bar.page.mouse.up()
+
+
+@pytest.mark.nightly
+def test_a_pivot_that_was_let_go_outside_the_drawing_is_brought_back_into_it(live):
+    bar = live()
+    frame = bar.page.locator("#kinematics-moving svg").first.bounding_box()
+    _, y = bar.middle("D")
+    bar.drag("D", 0, frame["y"] + frame["height"] + 30 - y)
+    bar.page.wait_for_timeout(400)
+    bar.answered(bar.page)
+    frame = bar.page.locator("#kinematics-moving svg").first.bounding_box()
+    _, y = bar.middle("D")
+    assert frame["y"] < y < frame["y"] + frame["height"]
