@@ -488,3 +488,23 @@ def test_a_notebook_shows_the_page_in_a_frame():
             assert b"ground.D.x" in page.read()
     finally:
         frame.close()
+
+
+@pytest.mark.slow
+def test_a_task_shows_where_no_pivot_may_lie_numbers_its_points_and_has_fields_for_its_conditions(tmp_path):
+    path = tmp_path / "stirrer.yaml"
+    path.write_text(
+        "synthesis: {path: {points: [[55, 60], [50, 72], [38, 78]]}, transmission: {at_least: 30},\n"
+        "  lengths: {crank: [15, 60 mm]}, keep_out: {x: [0, 70], y: [20, 90]}, evaluations: 100}\n"
+    )
+    session = session_of(load(path), lambda: load(path))
+    page = session.page().decode()
+    wide, tall = map(float, re.search(r'<rect x="\S+" y="\S+" width="(\S+)" height="(\S+)"', page).groups())
+    assert wide == pytest.approx(tall, abs=0.02)
+    assert re.findall(r"paint-order=\"stroke\">(\d)</text>", page)[:3] == ["1", "2", "3"]
+    names = re.findall(r'data-name="synthesis\.([^"]*)"', page)
+    # The other end of the crank's range has its unit, and is text.
+    assert names[:4] == ["transmission.at_least", "lengths.crank.0", "keep_out.x.0", "keep_out.x.1"]
+    changed = altered(session.study, {"synthesis.transmission.at_least": 40.0, "synthesis.keep_out.x.1": 60.0})
+    assert changed.synthesis.transmission.at_least == 40
+    assert overrides(session.study, changed) == ["synthesis.transmission.at_least=40", "synthesis.keep_out.x.1=60"]

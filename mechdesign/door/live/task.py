@@ -31,11 +31,13 @@ from mechdesign.questions.synthesize.declared import FOUR_BAR
 from mechdesign.questions.synthesize.tasks import task_of
 from mechdesign.questions.synthesize.words import task as task_in_words
 from mechdesign.study import Study
+from mechdesign.study.text.document import dotted, leaves, plain
 
 _QUESTION = "synthesize"
 _MOST_HANDLES = 60  # points of a task that are dragged; more are those of a drawn curve
 _MOST_ANSWERS, _MOST_LINKAGES = 20, 30  # that are kept, the newest
 _OWN = "own"  # name of the page of the study's own mechanism
+_CONDITIONS = {"transmission": "angle", "lengths": "length", "keep_out": "length"}  # whose numbers have fields
 _REACH, _TURN = 0.5, 90.0  # of sliders to both sides: as a part of the task's size, and in degrees
 
 
@@ -161,9 +163,10 @@ def _drawing(study: Study) -> tuple[Canvas | None, str]:
     task = task_of(study, study.synthesis)
     if not len(task.points):
         return None, ""
-    sheet = Canvas.around(task.points)
+    corners = [complex(x, y) for box in study.synthesis.keep_out for x in box.x for y in box.y]
+    sheet = Canvas.around(np.concatenate([task.points, corners]))
     root = sheet.root("the task")
-    mark_task(root, sheet, task.points, task.directions)
+    mark_task(root, sheet, study.synthesis, task.points, task.directions)
     return sheet, tostring(root, encoding="unicode")
 
 
@@ -195,6 +198,13 @@ def _groups(study: Study, handles: list[dict[str, Any]], size: float) -> Iterato
                 number_field(f"{TASK}.function.{key}.{k}", f"{key} {k + 1}", value, unit, reaches[unit])
                 for key, value, unit in zip(("input", "output"), pair, units, strict=True)
             ]  # fmt: skip
+    for key, kind in _CONDITIONS.items():
+        unit, written = study.units.label(kind), leaves({key: plain(study.resolved[TASK]).get(key, {})})
+        # What is written with its unit, or follows a parameter, stays text.
+        numbers = {dotted(keys): float(value) for keys, value in written if isinstance(value, int | float)}
+        if numbers:
+            yield key, [number_field(f"{TASK}.{name}", name, value, unit, reaches[unit])
+                        for name, value in numbers.items()]  # fmt: skip
     for handle in handles:
         yield (
             handle["label"],
