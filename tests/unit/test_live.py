@@ -417,6 +417,8 @@ def test_poses_that_cannot_be_assembled_are_counted_as_in_the_verdict_however_ma
     moved = session.move({**MOVE, "changes": changes, "poses": 145, "rows": halves, "sheet": sheet})
     assert moved["missing"] == f"{lost} of 73 poses: cannot be assembled"
     row = session.answer({**MOVE, "changes": changes, "question": "kinematics", "sheet": None})["html"]
+    # 30 + 100 > 80.9 + 36.5
+    assert re.search("four-bar O A B D</dt>.*triple-rocker.*no link can turn fully", row, re.DOTALL)
     assert f"not met: {lost} of 73 poses" in row.partition("<table")[2].partition("</table>")[0]
 
 
