@@ -460,6 +460,7 @@ def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_o
     assert before[0].startswith("# Found by synthesize as solution 1 of Tray: four-bar")
     assert after[:2] == ["# Changed by hand; before that:", before[0]]
     assert not any(".yaml" in line for line in before + after if line.startswith("#"))
+    assert answer["tiles"][0] == [0, to]
     # Who comes back finds the same search, and the same page of each linkage.
     monkeypatch.setattr("mechdesign.door.live.task.ask", None)
     again = session.actions["answer"]({**asked, "turn": 2})

@@ -122,10 +122,11 @@ class TaskSession(Session):
             count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
             whole = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
         content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
+        rows = [] if whole is None else [one["number"] - 1 for one in whole["data"]["choices"]]
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
         return {
             "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
-            "linkages": [f"linkage/{_name(text)}/" for text in result.files.values()],
+            "tiles": [[row, f"linkage/{_name(_files(result)[row][1])}/"] for row in rows],
             "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
@@ -139,7 +140,7 @@ class TaskSession(Session):
         drawn = DrawnSolutions.of(result)
         if row not in range(len(drawn.data)):
             raise AskedError
-        file, text = [*result.files.items()][int(row)]
+        file, text = _files(result)[int(row)]
         name = _name(text)
         if name not in self.linkages:
             study = drawn.linkage(int(row))
@@ -150,6 +151,11 @@ class TaskSession(Session):
             for other in taken[:-_MOST_LINKAGES]:
                 self.linkages.pop(other).ended = True
         return {"to": f"linkage/{name}/"}
+
+
+def _files(result: Result) -> list[tuple[str, str]]:
+    """Names and texts of the studies of the solutions, best first, without the files that these read."""
+    return [(name, text) for name, text in result.files.items() if name.startswith(("solution_", "nearest"))]
 
 
 def _name(text: str) -> str:
