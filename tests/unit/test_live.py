@@ -461,6 +461,7 @@ def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_o
     assert after[:2] == ["# Changed by hand; before that:", before[0]]
     assert not any(".yaml" in line for line in before + after if line.startswith("#"))
     assert answer["tiles"][0] == [0, to]
+    assert "angle 0 to 75 deg" in answer["words"][0]
     # Who comes back finds the same search, and the same page of each linkage.
     monkeypatch.setattr("mechdesign.door.live.task.ask", None)
     again = session.actions["answer"]({**asked, "turn": 2})

@@ -127,7 +127,7 @@ class TaskSession(Session):
         return {
             "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
             "tiles": [[row, f"linkage/{_name(_files(result)[row][1])}/"] for row in rows],
-            "stage": fragment("task_stage.html.j2", PACKAGE, **content),
+            "words": [*task_in_words(study)], "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
 

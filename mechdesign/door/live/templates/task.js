@@ -60,6 +60,7 @@
       own.fill();
       search = answer.search;
       tiles = answer.tiles;
+      document.querySelector("#task ul").replaceChildren(...answer.words.map(textContent => Object.assign(document.createElement("li"), {textContent})));
       own.colour("linkages", answer.dark);
       room.innerHTML = answer.html;
       if (!answer.stage.trim()) return;
