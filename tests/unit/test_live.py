@@ -417,6 +417,8 @@ def test_poses_that_cannot_be_assembled_are_counted_as_in_the_verdict_however_ma
     moved = session.move({**MOVE, "changes": changes, "poses": 145, "rows": halves, "sheet": sheet})
     assert moved["missing"] == f"{lost} of 73 poses: cannot be assembled"
     row = session.answer({**MOVE, "changes": changes, "question": "kinematics", "sheet": None})["html"]
+    # 30 + 100 > 80.9 + 36.5
+    assert re.search("four-bar O A B D</dt>.*triple-rocker.*no link can turn fully", row, re.DOTALL)
     assert f"not met: {lost} of 73 poses" in row.partition("<table")[2].partition("</table>")[0]
 
 
@@ -458,6 +460,8 @@ def test_a_task_is_searched_anew_with_dragged_positions_and_a_linkage_is_taken_o
     assert before[0].startswith("# Found by synthesize as solution 1 of Tray: four-bar")
     assert after[:2] == ["# Changed by hand; before that:", before[0]]
     assert not any(".yaml" in line for line in before + after if line.startswith("#"))
+    assert answer["tiles"][0] == [0, to]
+    assert "angle 0 to 75 deg" in answer["words"][0]
     # Who comes back finds the same search, and the same page of each linkage.
     monkeypatch.setattr("mechdesign.door.live.task.ask", None)
     again = session.actions["answer"]({**asked, "turn": 2})
@@ -488,3 +492,23 @@ def test_a_notebook_shows_the_page_in_a_frame():
             assert b"ground.D.x" in page.read()
     finally:
         frame.close()
+
+
+@pytest.mark.slow
+def test_a_task_shows_where_no_pivot_may_lie_numbers_its_points_and_has_fields_for_its_conditions(tmp_path):
+    path = tmp_path / "stirrer.yaml"
+    path.write_text(
+        "synthesis: {path: {points: [[55, 60], [50, 72], [38, 78]]}, transmission: {at_least: 30},\n"
+        "  lengths: {crank: [15, 60 mm]}, keep_out: {x: [0, 70], y: [20, 90]}, evaluations: 100}\n"
+    )
+    session = session_of(load(path), lambda: load(path))
+    page = session.page().decode()
+    wide, tall = map(float, re.search(r'<rect x="\S+" y="\S+" width="(\S+)" height="(\S+)"', page).groups())
+    assert wide == pytest.approx(tall, abs=0.02)
+    assert re.findall(r"paint-order=\"stroke\">(\d)</text>", page)[:3] == ["1", "2", "3"]
+    names = re.findall(r'data-name="synthesis\.([^"]*)"', page)
+    # The other end of the crank's range has its unit, and is text.
+    assert names[:4] == ["transmission.at_least", "lengths.crank.0", "keep_out.x.0", "keep_out.x.1"]
+    changed = altered(session.study, {"synthesis.transmission.at_least": 40.0, "synthesis.keep_out.x.1": 60.0})
+    assert changed.synthesis.transmission.at_least == 40
+    assert overrides(session.study, changed) == ["synthesis.transmission.at_least=40", "synthesis.keep_out.x.1=60"]

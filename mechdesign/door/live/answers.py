@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -31,6 +31,10 @@ DRAWING = threading.Lock()  # held where Matplotlib's settings, which are those 
 _MOVE = ("kinematics", "dynamics")
 _STAGED = ("motion", "paths")  # pictures in whose place the mechanism moves
 _MOST_PICTURES = 2  # of a question
+_MOST_CLASSES = 2  # four-bars and slider-cranks whose class is among the key numbers
+# Links that turn fully against the frame, by Grashof's class.
+_TURNING = {"double-crank": ("input", "output"), "crank-rocker": ("input",), "double-rocker": ("coupler",),
+            "rocker-crank": ("output",), "triple-rocker": (), "crank-slider": ("input",)}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,8 @@ class ChangedAnswer:
     @cached_property
     def numbers(self) -> list[Headline]:
         """The key numbers: those of the turn that is shown where the study does not ask how it moves."""
-        return [*headlines((self.result or self.motion).seen)]
+        seen = (self.result or self.motion).seen
+        return [*_classes(seen), *headlines(seen)]
 
     def part(self, first: Before | None, sheet: Canvas | None) -> dict[str, Any] | None:
         """The mechanism moving over its first motion, as plain data; None where nothing moves."""
@@ -84,6 +89,15 @@ class ChangedAnswer:
                     look()
                     drawn[name] = picture_of(self.question, name, gallery[name])
         return drawn
+
+
+def _classes(result: Result) -> Iterator[Headline]:
+    """Classes of the four-bars and slider-cranks of a motion, with the links that turn fully, where there are few."""
+    table = result.tables.get("loops")
+    for row in table if table is not None and len(table) <= _MOST_CLASSES else ():
+        turning = [str(row[role]) for role in _TURNING.get(str(row["class"]), ())]
+        words = f"{' and '.join(turning)} can turn fully" if turning else "no link can turn fully"
+        yield Headline(f"{row['kind']} {row['joints']}", str(row["class"]), note=words * (row["class"] in _TURNING))
 
 
 def staged(parts: Mapping[str, dict[str, Any]]) -> dict[str, Any] | None:

@@ -31,11 +31,13 @@ from mechdesign.questions.synthesize.declared import FOUR_BAR
 from mechdesign.questions.synthesize.tasks import task_of
 from mechdesign.questions.synthesize.words import task as task_in_words
 from mechdesign.study import Study
+from mechdesign.study.text.document import dotted, leaves, plain
 
 _QUESTION = "synthesize"
 _MOST_HANDLES = 60  # points of a task that are dragged; more are those of a drawn curve
 _MOST_ANSWERS, _MOST_LINKAGES = 20, 30  # that are kept, the newest
 _OWN = "own"  # name of the page of the study's own mechanism
+_CONDITIONS = {"transmission": "angle", "lengths": "length", "keep_out": "length"}  # whose numbers have fields
 _REACH, _TURN = 0.5, 90.0  # of sliders to both sides: as a part of the task's size, and in degrees
 
 
@@ -120,11 +122,12 @@ class TaskSession(Session):
             count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
             whole = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
         content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
+        rows = [] if whole is None else [one["number"] - 1 for one in whole["data"]["choices"]]
         drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
         return {
             "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
-            "linkages": [f"linkage/{_name(text)}/" for text in result.files.values()],
-            "stage": fragment("task_stage.html.j2", PACKAGE, **content),
+            "tiles": [[row, f"linkage/{_name(_files(result)[row][1])}/"] for row in rows],
+            "words": [*task_in_words(study)], "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
 
@@ -137,7 +140,7 @@ class TaskSession(Session):
         drawn = DrawnSolutions.of(result)
         if row not in range(len(drawn.data)):
             raise AskedError
-        file, text = [*result.files.items()][int(row)]
+        file, text = _files(result)[int(row)]
         name = _name(text)
         if name not in self.linkages:
             study = drawn.linkage(int(row))
@@ -148,6 +151,11 @@ class TaskSession(Session):
             for other in taken[:-_MOST_LINKAGES]:
                 self.linkages.pop(other).ended = True
         return {"to": f"linkage/{name}/"}
+
+
+def _files(result: Result) -> list[tuple[str, str]]:
+    """Names and texts of the studies of the solutions, best first, without the files that these read."""
+    return [(name, text) for name, text in result.files.items() if name.startswith(("solution_", "nearest"))]
 
 
 def _name(text: str) -> str:
@@ -161,9 +169,10 @@ def _drawing(study: Study) -> tuple[Canvas | None, str]:
     task = task_of(study, study.synthesis)
     if not len(task.points):
         return None, ""
-    sheet = Canvas.around(task.points)
+    corners = [complex(x, y) for box in study.synthesis.keep_out for x in box.x for y in box.y]
+    sheet = Canvas.around(np.concatenate([task.points, corners]))
     root = sheet.root("the task")
-    mark_task(root, sheet, task.points, task.directions)
+    mark_task(root, sheet, study.synthesis, task.points, task.directions)
     return sheet, tostring(root, encoding="unicode")
 
 
@@ -195,6 +204,13 @@ def _groups(study: Study, handles: list[dict[str, Any]], size: float) -> Iterato
                 number_field(f"{TASK}.function.{key}.{k}", f"{key} {k + 1}", value, unit, reaches[unit])
                 for key, value, unit in zip(("input", "output"), pair, units, strict=True)
             ]  # fmt: skip
+    for key, kind in _CONDITIONS.items():
+        unit, written = study.units.label(kind), leaves({key: plain(study.resolved[TASK]).get(key, {})})
+        # What is written with its unit, or follows a parameter, stays text.
+        numbers = {dotted(keys): float(value) for keys, value in written if isinstance(value, int | float)}
+        if numbers:
+            yield key, [number_field(f"{TASK}.{name}", name, value, unit, reaches[unit])
+                        for name, value in numbers.items()]  # fmt: skip
     for handle in handles:
         yield (
             handle["label"],

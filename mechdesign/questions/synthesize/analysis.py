@@ -57,7 +57,7 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
         seed = study.seed if section.seed is None else section.seed
     random = np.random.default_rng(seed)
     task = task_of(study, section)
-    conditions = Conditions(section, task.centre, task.size, task.factor)
+    conditions = Conditions(section, task.centre, task.size, task.factor, progress)
     pools = [*_pools(task, random, conditions, progress)]
     solutions = distinct([solution for pool in pools for solution in conditions.solutions(pool)], task.size)
     told = [*conditions.told, *_told(pools, solutions, conditions, seed)]
@@ -83,7 +83,6 @@ def _pools(task: Task, random: np.random.Generator, conditions: Conditions, prog
     for pool in task.pools(random, conditions):
         progress.update(0)
         yield pool
-    progress.update(1)
 
 
 def _answer(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.ground.progress import NULL, Progress
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.mechanism import Variant
@@ -122,8 +123,10 @@ class Solution:
 class Conditions:
     """What linkages must keep, and how many were dropped for each."""
 
-    def __init__(self, section: SynthesisSection, centre: complex, size: float, factor: float) -> None:
-        self.section, self.centre, self.size, self.factor = section, centre, size, factor
+    def __init__(
+        self, section: SynthesisSection, centre: complex, size: float, factor: float, progress: Progress = NULL
+    ) -> None:
+        self.section, self.centre, self.size, self.factor, self.progress = section, centre, size, factor, progress
         far = size, section.bounds.reach, factor
         #: where the frame has room for pivots, and the body for pins
         self.sites = Site.of(section.pivots, centre, *far), Site.of(section.pins, 0j, *far)

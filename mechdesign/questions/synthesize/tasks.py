@@ -238,6 +238,8 @@ class PathTask(_Task):
         wide = self.section.model_copy(update={"lengths": {}, "pivots": None, "transmission": None})
         others = replace(self, section=wide), Site(site.centre, site.size, site.reach), list[str]()
         for task, room, told in ((self, site, conditions.told), others):
+            if not pools:
+                conditions.progress.start(sum(len(kind.begun) for kind in self.kinds), "assemblies searched")
             for kind in self.kinds if not pools else ():
                 pools += task.of_kind(kind, task.bound(kind, room), random, conditions, told)
         yield from pools
@@ -265,6 +267,7 @@ class PathTask(_Task):
             fits = paths.fits(kind, modes, self.path, start, bound, whole=few and not alone)
             passes = fits.costs <= (EXACT * self.size) ** 2 * points
             exact.append(paths.Starts(fits.values[passes], fits.angles[passes], fits.numbers[passes]))
+            conditions.progress.update(1)
             if not len(fits.costs):
                 continue
             rows = conditions.begun(kind, fits.values, np.argsort(fits.costs, kind="stable"), MOST)

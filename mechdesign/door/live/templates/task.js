@@ -9,7 +9,7 @@
     const state = document.querySelector(".live-state"), room = document.querySelector(".live-answer"), stage = document.querySelector(".live-stage");
     const own = openHand(about, () => { place(); soon(); });
     const alone = document.querySelector(".live-alone"), button = document.querySelector("[data-do=alone]");
-    let turn = 0, timer = 0, asking = null, search = "", drawing = stage.querySelector("svg"), at = about.sheet, rings = [];
+    let turn = 0, timer = 0, asking = null, search = "", tiles = [], drawing = stage.querySelector("svg"), at = about.sheet, rings = [];
 
     // The task alone, where its points lie close together beside a linkage.
     button?.addEventListener("click", () => {
@@ -59,6 +59,8 @@
       own.set = answer.set;
       own.fill();
       search = answer.search;
+      tiles = answer.tiles;
+      document.querySelector("#task ul").replaceChildren(...answer.words.map(textContent => Object.assign(document.createElement("li"), {textContent})));
       own.colour("linkages", answer.dark);
       room.innerHTML = answer.html;
       if (!answer.stage.trim()) return;
@@ -67,7 +69,7 @@
       figure.dispatchEvent(new Event("moving-new", {bubbles: true}));
       if (still) figure.moving.stop();
       for (const [k, tile] of [...room.querySelectorAll(`.${TAKE} button`)].entries()) {
-        if (!own.left(answer.linkages[k])) continue;
+        if (!own.left(tiles[k][1])) continue;
         tile.append(Object.assign(document.createElement("span"), {className: "live-changed", textContent: "changed"}));
       }
       figure.addEventListener("moving-chosen", () => { if (!stage.hidden) { at = figure.moving.sheet(); place(); } });
@@ -80,7 +82,7 @@
       if (!tile) return;
       event.stopPropagation();
       try {
-        const answer = await own.post("take", {search, row: [...tile.parentNode.children].indexOf(tile)});
+        const answer = await own.post("take", {search, row: tiles[[...tile.parentNode.children].indexOf(tile)][0]});
         if (answer.wrong) own.warn(answer.wrong); else location.assign(answer.to);
       } catch (error) { own.lost(error); }
     }, true);

@@ -19,11 +19,13 @@ from mechdesign.ground.results import Result
 from mechdesign.questions.poses import study_poses
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
 from mechdesign.questions.synthesize.figures.solutions import costs, trade
+from mechdesign.questions.synthesize.schema import SynthesisSection
 from mechdesign.questions.synthesize.words import linkage
 from mechdesign.study import Study
 
-# Length of the line that shows the angle of a position, in units of a drawing, and poses in which names keep off links.
-_AXIS, _NAMED_POSES = 24.0, 4
+# In units of a drawing: length of the line that shows the angle of a position, and how far a number is from it and from
+# others; poses in which names keep off links.
+_AXIS, _BESIDE, _NAMED_POSES = 24.0, 18.0, 4
 
 
 def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
@@ -37,12 +39,14 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
     sweeps = [(row, sweep) for row, course in courses for sweep in course if len(sweep.valid) > 1]
     if not sweeps:
         return None
+    section = study.synthesis
+    assert section is not None
     placed = [(row, Canvas.around(np.concatenate([sweep.extent, drawn.places])), sweep) for row, sweep in sweeps]
     choices: list[dict[str, Any]] = []
     fits = fitting(placed)
     for row, sheet, sweep in placed[: len(fits)]:
         layer = Element("g")
-        mark_task(layer, sheet, drawn.places, drawn.directions)
+        mark_task(layer, sheet, section, drawn.places, drawn.directions)
         sketcher = Sketcher(layer, sheet, sweep.scene.some(sweep.valid[:1].tolist())[0])
         sketcher.names(sweep.scene.some(sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()), links=False)
         sketcher.ruler(study.units.label("length"))
@@ -72,11 +76,24 @@ def solutions(study: Study, result: Result, name: str) -> MovingPicture | None:
                          meanings(table), ["solutions", *(["trade"] if beside else [])])  # fmt: skip
 
 
-def mark_task(layer: Element, sheet: Canvas, points: Complexes, directions: Complexes) -> None:
-    """The places of a task's positions, and lines along the body there."""
+def mark_task(layer: Element, sheet: Canvas, task: SynthesisSection, points: Complexes, directions: Complexes) -> None:
+    """The places of a task's positions with their numbers, lines along the body there, and where no pivot may lie."""
+    for box in task.keep_out:
+        (west, east), (south, north) = sorted(box.x), sorted(box.y)
+        corner, wide, high = sheet.at(complex(west, north)), (east - west) * sheet.scale, (north - south) * sheet.scale
+        add(layer, "rect", x=corner.real, y=corner.imag, width=wide, height=high, fill=style.VERMILION,
+            fill_opacity=0.08, stroke=style.VERMILION, stroke_opacity=0.5, stroke_dasharray="4 3")  # fmt: skip
+    numbers: list[complex] = []
+    middle = sheet.all(points).mean() if len(points) else 0j
     for k, place in enumerate(points.tolist()):
         at = sheet.at(place)
         if len(directions):
             end = at + _AXIS * complex(directions[k]).conjugate()
             add(layer, "line", x1=at.real, y1=at.imag, x2=end.real, y2=end.imag, stroke=style.VERMILION, stroke_width=2)
         add(layer, "circle", cx=at.real, cy=at.imag, r=4, fill=style.VERMILION)
+        # Outside of the points, where there is room for it.
+        number = at + _BESIDE * (at - middle) / (abs(at - middle) or 1.0)
+        if all(abs(number - other) > _BESIDE for other in numbers):
+            numbers.append(number)
+            add(layer, "text", str(k + 1), x=number.real, y=number.imag + 3.5, text_anchor="middle", font_size=10,
+                fill=style.VERMILION, stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip

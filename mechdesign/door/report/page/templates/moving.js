@@ -59,7 +59,8 @@
   }
 
   // A number in words that are not broken into lines.
-  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replace(" \u00b7", "\u00b7").replaceAll(" ", "\u00a0");
+  const minus = text => text.replace("-", "\u2212");
+  const said = (name, text, unit) => `${name} = ${minus(text)} ${unit}`.trim().replace(" \u00b7", "\u00b7").replaceAll(" ", "\u00a0");
 
   // A place of the pointer in the units of a drawing.
   function within(drawing, event) {
@@ -170,7 +171,7 @@
       tracks,
       text: (which, at) => text(tracks[which][0], between(tracks[which][1], at)),
       show(at) {
-        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, between(values, at));
+        for (const [cell, decimals, values] of cells) cell.textContent = minus(text(decimals, between(values, at)));
       },
     };
   }
@@ -346,11 +347,11 @@
       const text = (words, looks) => { make("text", looks, drawing).textContent = words; };
       for (const value of ticks(west, east)) {
         make("path", {d: `M${px(value).toFixed(1)} ${TOP}V${BOTTOM + 4}`, class: "moving-line"}, drawing);
-        text(String(value).replace("-", "\u2212"), {x: px(value).toFixed(1), y: BOTTOM + 17, "text-anchor": "middle"});
+        text(minus(String(value)), {x: px(value).toFixed(1), y: BOTTOM + 17, "text-anchor": "middle"});
       }
       for (const value of ticks(south, north)) {
         make("path", {d: `M${LEFT - 4} ${py(value).toFixed(1)}H${RIGHT}`, class: "moving-line"}, drawing);
-        text(String(value).replace("-", "\u2212"), {x: LEFT - 8, y: (py(value) + 3.5).toFixed(1), "text-anchor": "end"});
+        text(minus(String(value)), {x: LEFT - 8, y: (py(value) + 3.5).toFixed(1), "text-anchor": "end"});
       }
       text(across.label, {x: (LEFT + RIGHT) / 2, y: BOTTOM + 36, "text-anchor": "middle"});
       text(up.label, {transform: `translate(14 ${(TOP + BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle"});
