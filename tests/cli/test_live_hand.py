@@ -179,3 +179,29 @@ def test_beside_a_finger_the_numbers_stand_above_left_and_cover_no_ring(live):
         a, b = bar.middle(point)
         assert not (box["x"] < a < right and box["y"] < b < bottom)
     touch("touchEnd")
+
+
+@pytest.mark.nightly
+def test_a_comma_stands_before_decimals_and_what_is_no_number_is_refused_with_a_message(live):
+    bar = live()
+    drawn, said = field(bar, "ground.D.y"), bar.page.locator(".live-said")
+    drawn.select_text()
+    drawn.press_sequentially("3,5")
+    drawn.blur()
+    bar.answered(bar.page)
+    assert bar.value("ground.D.y") == 3.5
+    drawn.press("ArrowUp")
+    drawn.press("Shift+ArrowUp")
+    assert bar.value("ground.D.y") == 14.5
+    drawn.fill("1.234,5")
+    drawn.blur()
+    expect(said).to_have_text("1.234,5 is no number: write it as 3.5 or 3,5")
+    assert bar.value("ground.D.y") == 14.5
+    grid = bar.page.get_by_label("Grid")
+    grid.fill("2,5")
+    bar.page.locator(".live-handle[data-at=D]").focus()
+    bar.page.keyboard.press("ArrowRight")
+    expect(field(bar, "ground.D.x")).to_have_value("102.5")
+    grid.press("ArrowDown")
+    grid.press("Shift+ArrowDown")
+    expect(grid).to_have_value("0")

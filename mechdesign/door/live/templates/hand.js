@@ -37,6 +37,16 @@ function openHand(about, react) {
       return content;
     },
 
+    // The number in a field, after a comma or a point its decimals; NaN where it is none.
+    read(field) {
+      const plain = field.value.trim().replace(",", ".").replace("\u2212", "-");
+      return plain && isFinite(plain) ? Number(plain) : NaN;
+    },
+    write(field, text) {
+      field.value = text;
+      field.setAttribute("aria-valuenow", own.read(field));
+    },
+
     // What the page says: of the server and the file above, of the hand beside it.
     tell(text) { said.textContent = [notice, text].filter(Boolean).join(" "); },
     warn(text) { message.textContent = text; message.hidden = !text; },
@@ -63,7 +73,8 @@ function openHand(about, react) {
       for (const [name, row] of rows) {
         const [field, slider] = row.querySelectorAll("input"), value = own.value(name);
         row.classList.toggle("changed", name in own.changes);
-        if (document.activeElement !== field || Number(field.value) !== value) field.value = text(value);
+        const typed = own.read(field), typing = document.activeElement === field && (isNaN(typed) || typed === value);
+        if (!typing) own.write(field, text(value));
         slider.min = Math.min(slider.min, value);
         slider.max = Math.max(slider.max, value);
         slider.value = value;
@@ -92,10 +103,10 @@ function openHand(about, react) {
     },
 
     snapped(place) {
-      const size = Number(grid.value);
+      const size = own.read(grid);
       return size > 0 ? place.map(value => Math.round(value / size) * size) : place;
     },
-    step: event => (Number(grid.value) || about.step) * (event.shiftKey ? 10 : 1),
+    step: event => (own.read(grid) || about.step) * (event.shiftKey ? 10 : 1),
 
     // Presses of keys on a ring that follow one another: one gesture, with the changes before it.
     presses(ring) {
@@ -214,16 +225,31 @@ function openHand(about, react) {
     let before = null;
     const input = value => {
       before ??= {...own.changes};
-      if (value === "" || !isFinite(value)) return;
-      own.put({[name]: Number(value)});
+      if (!isFinite(value)) return;
+      own.put({[name]: value});
       changed("");
     };
     const done = () => { if (before) own.remember(before); before = null; own.fill(); };
-    field.addEventListener("input", () => input(field.value));
-    slider.addEventListener("input", () => input(slider.value));
+    field.addEventListener("input", () => input(own.read(field)));
+    slider.addEventListener("input", () => input(Number(slider.value)));
     field.addEventListener("change", done);
     slider.addEventListener("change", done);
   }
+  // Of fields for numbers: arrow keys go by one, with Shift by ten; what is no number is refused, and the last one comes back.
+  const numeric = call => event => event.target.matches("[role=spinbutton]") && call(event.target, event);
+  document.addEventListener("keydown", numeric((field, event) => {
+    const way = {ArrowUp: 1, ArrowDown: -1}[event.key], least = Number(field.getAttribute("aria-valuemin") ?? -Infinity);
+    if (!way) return;
+    event.preventDefault();
+    own.write(field, Number(Math.max(least, (own.read(field) || 0) + way * (event.shiftKey ? 10 : 1)).toPrecision(12)));
+    for (const kind of ["input", "change"]) field.dispatchEvent(new Event(kind, {bubbles: true}));
+  }));
+  document.addEventListener("input", numeric(field => { if (isFinite(own.read(field))) field.setAttribute("aria-valuenow", own.read(field)); }));
+  document.addEventListener("change", numeric(field => {
+    if (isFinite(own.read(field))) return;
+    if (field.value.trim()) own.tell(`${field.value} is no number: write it as 3.5 or 3,5`);
+    own.write(field, field.getAttribute("aria-valuenow"));
+  }), true);
   find(".live-numbers").addEventListener("submit", event => event.preventDefault());
 
   // A question with an answer: the name of a file, "" for the study's own, or null.
@@ -268,7 +294,7 @@ function openHand(about, react) {
   for (const name in actions) buttons[name].addEventListener("click", actions[name]);
   document.addEventListener("keydown", event => {
     const key = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.matches("input[type=number], input[type=text]")) return;
+    if (!(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.matches("input[type=text]")) return;
     event.preventDefault();
     actions[event.shiftKey || key === "y" ? "redo" : "undo"]();
   });
