@@ -424,7 +424,7 @@ def test_locks_grid_and_curves_outlast_a_new_version_of_the_file_and_what_it_has
     page.get_by_label("lock rod.length").check()
     page.locator(".live-grid").fill("5")
     curves.nth(0).select_option(index=2)
-    field = page.locator("[data-name='rocker.length'] input[type=number]")
+    field = page.locator("[data-name='rocker.length'] [role=spinbutton]")
     field.fill("50")
     field.press("Tab")
     bar.answered(page)

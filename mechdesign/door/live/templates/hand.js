@@ -335,7 +335,7 @@ function openHand(about, react) {
     if (lost.length) buttons.undo.title = lost[0];
     notice = [...lost, ...held].join(" ");
     own.tell(kept.said);
-    grid.value = kept.grid ?? grid.value;
+    own.write(grid, kept.grid ?? grid.value);
     for (const name of kept.locked || []) if (locks.has(name)) locks.get(name).checked = true;
   }
   addEventListener("pagehide", () => {
