@@ -55,7 +55,7 @@ def test_a_hand_at_the_study_in_the_readme(benchmark, browser, tmp_path) -> None
         page.goto(server.stderr.readline().partition("live at ")[2].split()[0])
         page.wait_for_selector("#kinematics .live-answer:not([aria-busy])")
         page.evaluate(WATCH)
-        field = page.locator("[data-name='rocker.length'] input[type=number]")
+        field = page.locator("[data-name='rocker.length'] [role=spinbutton]")
 
         def answer() -> None:
             count = page.evaluate("noted.answer.length")

@@ -133,3 +133,75 @@ def test_a_pivot_that_was_let_go_outside_the_drawing_is_brought_back_into_it(liv
     frame = bar.page.locator("#kinematics-moving svg").first.bounding_box()
     _, y = bar.middle("D")
     assert frame["y"] < y < frame["y"] + frame["height"]
+
+
+@pytest.mark.nightly
+def test_what_was_saved_is_said_until_the_next_change_and_a_refused_save_leaves_the_mistake_told(live):
+    bar = live()
+    type_in(bar, "rocker.length", "64")
+    bar.page.get_by_role("button", name="Save into bar.yaml").click()
+    with bar.page.expect_navigation():
+        bar.page.get_by_role("button", name="Save", exact=True).click()
+    bar.answered(bar.page)
+    said = bar.page.locator(".live-said")
+    expect(said).to_have_text("Saved into bar.yaml.")
+    bar.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    type_in(bar, "rocker.length", "66")
+    expect(said).to_have_text("")
+    bar.page.get_by_role("button", name="Copy as --set").click()
+    expect(said).to_have_text("Copied one change as --set.")
+    assert "rocker" in bar.page.evaluate("navigator.clipboard.readText()")
+    bar.path.write_text(bar.path.read_text().replace("[O, A, 30]", "[O, A, x30]"))
+    bar.session.reload()
+    message = bar.page.locator(".live-message")
+    expect(message).to_contain_text("bar.yaml:")
+    bar.page.get_by_role("button", name="Save into bar.yaml").click()
+    bar.page.get_by_role("button", name="Save", exact=True).click()
+    expect(message).to_contain_text("Not saved: ")
+    expect(message).to_contain_text("bar.yaml:")
+
+
+@pytest.mark.nightly
+def test_beside_a_finger_the_numbers_stand_above_left_and_cover_no_ring(live):
+    bar = live(viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True)
+    x, y = bar.middle("D")
+    session = bar.page.context.new_cdp_session(bar.page)
+    touch = lambda kind, *points: session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [*points]})  # noqa: E731
+    touch("touchStart", {"x": x, "y": y})
+    for k in range(1, 6):
+        touch("touchMove", {"x": x + 2 * k, "y": y})
+    expect(bar.page.locator(".live-hand")).to_contain_text("ground.D.x")
+    box = bar.page.locator(".live-hand").bounding_box()
+    right, bottom = box["x"] + box["width"], box["y"] + box["height"]
+    assert right < x + 10 or box["x"] > x + 10
+    assert bottom < y
+    for point in "OABP":
+        a, b = bar.middle(point)
+        assert not (box["x"] < a < right and box["y"] < b < bottom)
+    touch("touchEnd")
+
+
+@pytest.mark.nightly
+def test_a_comma_stands_before_decimals_and_what_is_no_number_is_refused_with_a_message(live):
+    bar = live()
+    drawn, said = field(bar, "ground.D.y"), bar.page.locator(".live-said")
+    drawn.select_text()
+    drawn.press_sequentially("3,5")
+    drawn.blur()
+    bar.answered(bar.page)
+    assert bar.value("ground.D.y") == 3.5
+    drawn.press("ArrowUp")
+    drawn.press("Shift+ArrowUp")
+    assert bar.value("ground.D.y") == 14.5
+    drawn.fill("1.234,5")
+    drawn.blur()
+    expect(said).to_have_text("1.234,5 is no number: write it as 3.5 or 3,5")
+    assert bar.value("ground.D.y") == 14.5
+    grid = bar.page.get_by_label("Grid")
+    grid.fill("2,5")
+    bar.page.locator(".live-handle[data-at=D]").focus()
+    bar.page.keyboard.press("ArrowRight")
+    expect(field(bar, "ground.D.x")).to_have_value("102.5")
+    grid.press("ArrowDown")
+    grid.press("Shift+ArrowDown")
+    expect(grid).to_have_value("0")

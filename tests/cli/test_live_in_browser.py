@@ -67,10 +67,10 @@ def test_keys_move_a_point_by_the_grid_and_what_cannot_be_assembled_is_said(live
     bar.page.locator(".live-grid").fill("5")
     bar.page.locator(".live-handle[data-at=D]").focus()
     bar.page.keyboard.press("ArrowRight")
-    expect(bar.page.locator("[data-name='ground.D.x'] input[type=number]")).to_have_value("105")
+    expect(bar.page.locator("[data-name='ground.D.x'] [role=spinbutton]")).to_have_value("105")
     bar.page.wait_for_timeout(50)
     bar.page.keyboard.press("Shift+ArrowRight")
-    expect(bar.page.locator("[data-name='ground.D.x'] input[type=number]")).not_to_have_value("105")
+    expect(bar.page.locator("[data-name='ground.D.x'] [role=spinbutton]")).not_to_have_value("105")
     # Rod and rocker reach 150 mm from the crank's pin, 30 mm from O along the line to D.
     assert 105 < bar.value("ground.D.x") <= 180
     for _ in range(4):
@@ -82,7 +82,7 @@ def test_keys_move_a_point_by_the_grid_and_what_cannot_be_assembled_is_said(live
 @pytest.mark.nightly
 def test_a_number_in_a_field_and_a_slider_do_the_same_as_a_hand(live):
     bar = live()
-    field = bar.page.locator("[data-name='rocker.length'] input[type=number]")
+    field = bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")
     field.fill("70")
     field.blur()
     bar.answered(bar.page)
@@ -124,7 +124,7 @@ def test_a_saved_file_makes_the_page_anew_and_a_mistake_is_told_while_the_last_a
     bar.page.get_by_role("slider", name="pose of the motion").fill("40")
     bar.path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
     bar.session.reload()
-    expect(bar.page.locator("[data-name='rocker.length'] input[type=number]")).to_have_value("64")
+    expect(bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("64")
     bar.answered(bar.page)
     # What the hand has changed stays, as does the pose, and nothing is wrong any more.
     assert abs(int(bar.page.get_by_role("slider", name="pose of the motion").input_value()) - 40) <= 1
@@ -154,7 +154,7 @@ def test_two_pages_do_not_disturb_each_other(live, browser):
     other = bar.open(browser)
     bar.drag("D", 10 * bar.scale, 0)
     assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
-    assert other.locator("[data-name='ground.D.x'] input[type=number]").input_value() == "100"
+    assert other.locator("[data-name='ground.D.x'] [role=spinbutton]").input_value() == "100"
     assert len(bar.server.waiting) == 2
     other.close()
 
@@ -197,7 +197,7 @@ def test_a_robot_shows_its_workspace_and_follows_a_drive_that_stands_still(live)
     area = arm.page.locator("#workspace .numbers").inner_text()
     # A ring between 20 and 180 mm: 100530 mm2.
     assert "100\N{NARROW NO-BREAK SPACE}5" in area.replace("\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
-    field = arm.page.locator("[data-name='q2_here'] input[type=number]")
+    field = arm.page.locator("[data-name='q2_here'] [role=spinbutton]")
     field.fill("0")
     field.blur()
     arm.answered(arm.page)
@@ -278,7 +278,7 @@ def test_undo_goes_on_after_the_file_was_changed_in_an_editor_and_says_what_it_l
     bar = live()
     bar.drag("D", 10 * bar.scale, 0)
     moved = bar.value("ground.D.x")
-    field = bar.page.locator("[data-name='rocker.length'] input[type=number]")
+    field = bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")
     field.fill("66")
     field.blur()
     bar.answered(bar.page)
@@ -286,7 +286,7 @@ def test_undo_goes_on_after_the_file_was_changed_in_an_editor_and_says_what_it_l
     edited = FOUR_BAR.replace("[O, A, 30]", "[O, A, 33]")
     bar.path.write_text(edited)
     bar.session.reload()
-    expect(bar.page.locator("[data-name='crank.length'] input[type=number]")).to_have_value("33")
+    expect(bar.page.locator("[data-name='crank.length'] [role=spinbutton]")).to_have_value("33")
     assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 66)
     undo.click()
     assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 60)
@@ -424,7 +424,7 @@ def test_locks_grid_and_curves_outlast_a_new_version_of_the_file_and_what_it_has
     page.get_by_label("lock rod.length").check()
     page.locator(".live-grid").fill("5")
     curves.nth(0).select_option(index=2)
-    field = page.locator("[data-name='rocker.length'] input[type=number]")
+    field = page.locator("[data-name='rocker.length'] [role=spinbutton]")
     field.fill("50")
     field.press("Tab")
     bar.answered(page)

@@ -126,14 +126,14 @@ def test_the_command_serves_until_ctrl_c_and_says_how_many_pages_were_open(brows
             page.wait_for_selector("#kinematics .numbers")
         path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
         for page in pages:
-            expect(page.locator("[data-name='rocker.length'] input[type=number]")).to_have_value("64")
+            expect(page.locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("64")
             page.wait_for_selector("#kinematics .numbers")
         path.unlink()
         path.mkdir()
         expect(pages[0].locator(".live-message")).to_contain_text("bar.yaml")
         path.rmdir()
         path.write_text(FOUR_BAR)
-        expect(pages[0].locator("[data-name='rocker.length'] input[type=number]")).to_have_value("60")
+        expect(pages[0].locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("60")
         assert "ended; 2 pages open" in interrupted(process)
         assert process.returncode == 0
         for page in pages:

@@ -58,7 +58,7 @@ class Live:
         self.answered(self.page)
 
     def value(self, name):
-        return float(self.page.locator(f"[data-name='{name}'] input[type=number]").input_value())
+        return float(self.page.locator(f"[data-name='{name}'] [role=spinbutton]").input_value())
 
     @property
     def scale(self):

@@ -3,6 +3,7 @@
 // `react` is called when another change than a drag was made.
 function openHand(about, react) {
   const RETRY = 2000; // milliseconds until the page asks a server that is not there again
+  const AWAY = 18; // pixels from the pointer to the words beside it
   const SERIES = 1000; // milliseconds within which presses of keys on a ring are one gesture
   const KEEP = "mechdesign-live", MOST = 500; // what outlasts a new version of the file, and gestures that it holds
   const find = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
@@ -14,6 +15,7 @@ function openHand(about, react) {
   const dark = new CSSStyleSheet(), colours = new Map();
   document.adoptedStyleSheets = [...document.adoptedStyleSheets, dark];
   let past = [], future = [], ended = false, series = null, notice = ""; // of the file, until the hand changes something else
+  let pointer = [0, 0, 1], saving = null, lasting = ""; // a save under way, and what it says until the next change
 
   const text = value => String(Number(value.toPrecision(7)));
   const base = name => rows.has(name) ? Number(rows.get(name).querySelector("input").dataset.value) : about.entries?.[name];
@@ -35,6 +37,16 @@ function openHand(about, react) {
       return content;
     },
 
+    // The number in a field, after a comma or a point its decimals; NaN where it is none.
+    read(field) {
+      const plain = field.value.trim().replace(",", ".").replace("\u2212", "-");
+      return plain && isFinite(plain) ? Number(plain) : NaN;
+    },
+    write(field, text) {
+      field.value = text;
+      field.setAttribute("aria-valuenow", own.read(field));
+    },
+
     // What the page says: of the server and the file above, of the hand beside it.
     tell(text) { said.textContent = [notice, text].filter(Boolean).join(" "); },
     warn(text) { message.textContent = text; message.hidden = !text; },
@@ -42,6 +54,7 @@ function openHand(about, react) {
       words.textContent = text;
       words.hidden = !text || !own.held;
       words.classList.toggle("wrong", wrong);
+      stand();
       if (text) own.tell(text.replaceAll("\n", ", "));
     },
     lost(error) {
@@ -60,7 +73,8 @@ function openHand(about, react) {
       for (const [name, row] of rows) {
         const [field, slider] = row.querySelectorAll("input"), value = own.value(name);
         row.classList.toggle("changed", name in own.changes);
-        if (document.activeElement !== field || Number(field.value) !== value) field.value = text(value);
+        const typed = own.read(field), typing = document.activeElement === field && (isNaN(typed) || typed === value);
+        if (!typing) own.write(field, text(value));
         slider.min = Math.min(slider.min, value);
         slider.max = Math.max(slider.max, value);
         slider.value = value;
@@ -89,10 +103,10 @@ function openHand(about, react) {
     },
 
     snapped(place) {
-      const size = Number(grid.value);
+      const size = own.read(grid);
       return size > 0 ? place.map(value => Math.round(value / size) * size) : place;
     },
-    step: event => (Number(grid.value) || about.step) * (event.shiftKey ? 10 : 1),
+    step: event => (own.read(grid) || about.step) * (event.shiftKey ? 10 : 1),
 
     // Presses of keys on a ring that follow one another: one gesture, with the changes before it.
     presses(ring) {
@@ -115,8 +129,8 @@ function openHand(about, react) {
       const follow = move => {
         move.stopPropagation();
         if (move.pointerId !== event.pointerId) return;
-        words.style.left = `${Math.max(0, Math.min(move.clientX + 18, innerWidth - 220))}px`;
-        words.style.top = `${Math.max(0, Math.min(move.clientY + 18, innerHeight - 80))}px`;
+        pointer = [move.clientX, move.clientY, move.pointerType === "mouse" ? 1 : -1];
+        stand();
         moved(move.clientX - event.clientX, move.clientY - event.clientY);
       };
       const end = async move => {
@@ -169,6 +183,20 @@ function openHand(about, react) {
     },
   };
 
+  // The words stand beside the pointer, above left of a finger, and where they cover neither it nor another ring.
+  function stand() {
+    if (words.hidden) return;
+    const [x, y, side] = pointer, {width, height} = words.getBoundingClientRect(), {clientWidth, clientHeight} = document.documentElement;
+    const taken = [...all(".live-handle:not(.held)").map(ring => ring.getBoundingClientRect()), new DOMRect(x - 8, y - 8, 16, 16)];
+    const along = (at, size, way, room) => Math.max(0, Math.min(way > 0 ? at + AWAY : at - AWAY - size, room - size));
+    const spots = [[side, side], [side, -side], [-side, side], [-side, -side]]
+      .map(([across, down]) => [along(x, width, across, clientWidth), along(y, height, down, clientHeight)]);
+    const covers = ([left, top]) => taken.filter(box => left < box.right && box.left < left + width && top < box.bottom && box.top < top + height).length;
+    const [left, top] = spots.reduce((best, spot) => covers(spot) < covers(best) ? spot : best);
+    words.style.left = `${left}px`;
+    words.style.top = `${top}px`;
+  }
+
   // Another change than a drag was made: what was said of the one before holds no more.
   function changed(words) {
     series = null;
@@ -197,16 +225,31 @@ function openHand(about, react) {
     let before = null;
     const input = value => {
       before ??= {...own.changes};
-      if (value === "" || !isFinite(value)) return;
-      own.put({[name]: Number(value)});
+      if (!isFinite(value)) return;
+      own.put({[name]: value});
       changed("");
     };
     const done = () => { if (before) own.remember(before); before = null; own.fill(); };
-    field.addEventListener("input", () => input(field.value));
-    slider.addEventListener("input", () => input(slider.value));
+    field.addEventListener("input", () => input(own.read(field)));
+    slider.addEventListener("input", () => input(Number(slider.value)));
     field.addEventListener("change", done);
     slider.addEventListener("change", done);
   }
+  // Of fields for numbers: arrow keys go by one, with Shift by ten; what is no number is refused, and the last one comes back.
+  const numeric = call => event => event.target.matches("[role=spinbutton]") && call(event.target, event);
+  document.addEventListener("keydown", numeric((field, event) => {
+    const way = {ArrowUp: 1, ArrowDown: -1}[event.key], least = Number(field.getAttribute("aria-valuemin") ?? -Infinity);
+    if (!way) return;
+    event.preventDefault();
+    own.write(field, Number(Math.max(least, (own.read(field) || 0) + way * (event.shiftKey ? 10 : 1)).toPrecision(12)));
+    for (const kind of ["input", "change"]) field.dispatchEvent(new Event(kind, {bubbles: true}));
+  }));
+  document.addEventListener("input", numeric(field => { if (isFinite(own.read(field))) field.setAttribute("aria-valuenow", own.read(field)); }));
+  document.addEventListener("change", numeric(field => {
+    if (isFinite(own.read(field))) return;
+    if (field.value.trim()) own.tell(`${field.value} is no number: write it as 3.5 or 3,5`);
+    own.write(field, field.getAttribute("aria-valuenow"));
+  }), true);
   find(".live-numbers").addEventListener("submit", event => event.preventDefault());
 
   // A question with an answer: the name of a file, "" for the study's own, or null.
@@ -226,8 +269,9 @@ function openHand(about, react) {
       const answer = await own.post("save", {name, replace});
       if (answer.exists) {
         if (await asked(`${answer.exists} is there already. Replace it?`, null) !== null) await save(name, true);
-      } else if (answer.wrong) own.warn(answer.wrong);
-      else own.tell(`Saved as ${answer.saved}${answer.comments ? "" : "; its comments could not be kept"}.`);
+      // A mistake in the file, which is told above, stays there.
+      } else if (answer.wrong) own.warn([`Not saved: ${answer.wrong}`, about.mistake].filter(Boolean).join("\n"));
+      else own.tell(lasting = `Saved ${name ? "as" : "into"} ${answer.saved}${answer.comments ? "" : "; its comments could not be kept"}.`);
     } catch (error) { own.lost(error); }
   }
 
@@ -237,20 +281,20 @@ function openHand(about, react) {
     reset: () => restore("Reset", buttons.reset, () => { past.push({...own.changes}); future = []; return {}; }),
     async copy() {
       const words = own.set.map(text => `--set '${text.replaceAll("'", "'\\''")}'`).join(" ");
-      try { await navigator.clipboard.writeText(words); own.tell(`Copied: ${words}`); } catch { own.tell(words); }
+      try { await navigator.clipboard.writeText(words); own.tell(`Copied ${own.set.length === 1 ? "one change" : `${own.set.length} changes`} as --set.`); } catch { own.tell(words); }
     },
     async saveas() {
       const name = await asked("Save a copy of the study, in its folder", about.copy);
       if (name) save(name, false);
     },
     async save() {
-      if (await asked(`Replace ${about.file} by the study as it is here?`, null) !== null) save("", true);
+      if (await asked(`Replace ${about.file} by the study as it is here?`, null) !== null) await (saving = save("", true));
     },
   };
   for (const name in actions) buttons[name].addEventListener("click", actions[name]);
   document.addEventListener("keydown", event => {
     const key = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.matches("input[type=number], input[type=text]")) return;
+    if (!(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.matches("input[type=text]")) return;
     event.preventDefault();
     actions[event.shiftKey || key === "y" ? "redo" : "undo"]();
   });
@@ -261,7 +305,7 @@ function openHand(about, react) {
       try {
         const now = await (await fetch(`changes/${about.version}/${page}`)).json();
         if (ended) { ended = false; own.warn(about.mistake); react(); }
-        if (now.version !== about.version && !now.mistake) { location.reload(); return; }
+        if (now.version !== about.version && !now.mistake) { await saving; location.reload(); return; }
         if (now.version !== about.version) {
           about.version = now.version;
           own.warn(about.mistake = now.mistake);
@@ -290,13 +334,13 @@ function openHand(about, react) {
       .map(name => `The file has ${name} ${text(base(name))}, yours ${text(own.changes[name])} stays.`);
     if (lost.length) buttons.undo.title = lost[0];
     notice = [...lost, ...held].join(" ");
-    own.tell("");
-    grid.value = kept.grid ?? grid.value;
+    own.tell(kept.said);
+    own.write(grid, kept.grid ?? grid.value);
     for (const name of kept.locked || []) if (locks.has(name)) locks.get(name).checked = true;
   }
   addEventListener("pagehide", () => {
     const touched = [own.changes, ...past, ...future].flatMap(Object.keys), pages = stored();
-    pages[location.pathname] = {changes: own.changes, past, future, locked: own.locked(), grid: grid.value, base: Object.fromEntries(touched.map(name => [name, base(name)])), ...own.keeping()};
+    pages[location.pathname] = {changes: own.changes, past, future, locked: own.locked(), grid: grid.value, base: Object.fromEntries(touched.map(name => [name, base(name)])), said: lasting && said.textContent.endsWith(lasting) ? lasting : "", ...own.keeping()};
     sessionStorage.setItem(KEEP, JSON.stringify(pages));
   });
   return own;

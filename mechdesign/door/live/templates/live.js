@@ -15,15 +15,16 @@
     moving.slider.setAttribute("list", marks.id);
     // A drive has a number as well, where its value is what gives the pose.
     for (const [[name], unit] of moving.data().keys.filter(key => key.length === 1).map(([key]) => [key, unitOf(key[0])]).slice(0, 1)) {
-      const field = Object.assign(document.createElement("input"), {type: "number", step: "any", className: "live-pose"});
+      const field = Object.assign(document.createElement("input"), {type: "text", inputMode: "decimal", role: "spinbutton", autocomplete: "off", className: "live-pose"});
       const label = document.createElement("label");
       label.append(`${name} `, field, ` ${unit}`);
       moving.slider.after(label);
-      const fill = () => { if (document.activeElement !== field) field.value = moving.value(name); };
+      const fill = () => { if (document.activeElement !== field) own.write(field, moving.value(name)); };
       figure.addEventListener("moving-chosen", fill);
       fill();
       field.addEventListener("change", () => {
-        if (field.value !== "" && !moving.go({[name]: Number(field.value)})) own.tell(`${name} = ${field.value} is no pose of the motion`);
+        const value = own.read(field);
+        if (isFinite(value) && !moving.go({[name]: value})) own.tell(`${name} = ${field.value} is no pose of the motion`);
       });
     }
     let turn = 0, timer = 0, running = false, waiting = [], asking = null, gesture = null;
