@@ -170,12 +170,13 @@ def test_what_a_study_says_stays_text(folder, invoke):
     folder.joinpath("<b>.yaml").write_text(SLIDER.replace("Offset slider-crank", json.dumps(HOSTILE)))
     done = invoke("run", "<b>.yaml", "slider.yaml", "--report", "--no-plots")
     assert done.exit_code == 0, done.stderr
-    for path in ("results/<b>/report.html", "results/index.html"):
+    # A folder's name has no letter that a system forbids.
+    for path in ("results/_b_/report.html", "results/index.html"):
         page = Page(path)
         check(page)
         assert not [each for each in page.all("img") if "onerror" in each]
         assert HOSTILE in (page.said("h1") if "report" in path else page.said("a"))
-    assert "%3Cb%3E/report.html" in [each["href"] for each in Page("results/index.html").all("a")]
+    assert "_b_/report.html" in [each["href"] for each in Page("results/index.html").all("a")]
 
 
 @pytest.mark.nightly
