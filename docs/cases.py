@@ -116,7 +116,8 @@ class Columns(dict[str, Array]):
         """From a CSV file of results/."""
         with path.open(encoding="utf-8", newline="") as lines:
             head, *rows = csv.reader(lines)
-        return cls({name: _column(values) for name, values in zip(head, zip(*rows, strict=True), strict=True)})
+        columns = zip(*rows, strict=True) if rows else [()] * len(head)
+        return cls({name: _column(values) for name, values in zip(head, columns, strict=True)})
 
     def chosen(self, check: Mapping[str, Any]) -> Columns:
         """The rows in which columns have the values `at`, or for which `where` is true, or one by its number.
