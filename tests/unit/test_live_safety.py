@@ -18,8 +18,9 @@ from mechdesign import load
 from mechdesign.door.live import server as serving
 from mechdesign.door.live.answers import DRAWING
 from mechdesign.door.live.asked import AskedError
+from mechdesign.door.live.served import OvertakenError
 from mechdesign.door.live.server import LiveServer
-from mechdesign.door.live.session import OvertakenError, Session
+from mechdesign.door.live.session import Session
 from mechdesign.ground.errors import MechdesignError
 
 FOUR_BAR = f"{COMMENTED_FOUR_BAR}kinematics: {{outputs: [P, rocker.angle]}}\n"

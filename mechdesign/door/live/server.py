@@ -22,7 +22,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from mechdesign.door.live.asked import AskedError, asked_in
-from mechdesign.door.live.session import OvertakenError, Session
+from mechdesign.door.live.served import OvertakenError, ServedStudy
 from mechdesign.ground.errors import explain
 
 _HOST = "127.0.0.1"
@@ -53,7 +53,7 @@ class LiveServer(ThreadingHTTPServer):
     allow_reuse_address = True
     request_queue_size = 32
 
-    def __init__(self, session: Session, port: int = 0, *, framed: bool = False) -> None:
+    def __init__(self, session: ServedStudy, port: int = 0, *, framed: bool = False) -> None:
         self.session, self.token, self.framed = session, secrets.token_urlsafe(16), framed
         self.waiting: list[str] = []  # open pages, once for each request by which they wait for a change of the file
         self.connections: set[socket.socket] = set()
@@ -151,14 +151,14 @@ class _Handler(BaseHTTPRequestHandler):
                 server.computing -= 1
                 server.lock.notify_all()
 
-    def _serve(self, answer: Callable[[Session, list[str]], None]) -> None:
+    def _serve(self, answer: Callable[[ServedStudy, list[str]], None]) -> None:
         """Answer a page of ours behind the token by the words of its address; refuse others."""
         try:
             answer(*self._admitted())
         except _RefusedError as refusal:
             self._refuse(refusal.args[0])
 
-    def _got(self, session: Session, words: list[str]) -> None:
+    def _got(self, session: ServedStudy, words: list[str]) -> None:
         if words == [""]:
             try:
                 page, kind = session.page(), "text/html; charset=utf-8"
@@ -172,7 +172,7 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             raise _RefusedError(HTTPStatus.NOT_FOUND)
 
-    def _posted(self, session: Session, words: list[str]) -> None:
+    def _posted(self, session: ServedStudy, words: list[str]) -> None:
         body, actions = self._body(), session.actions
         if len(words) != 1 or words[0] not in actions:
             raise _RefusedError(HTTPStatus.NOT_FOUND)
@@ -188,7 +188,7 @@ class _Handler(BaseHTTPRequestHandler):
             answer = {"wrong": explain(error)[1]}
         self._reply(answer)
 
-    def _admitted(self) -> tuple[Session, list[str]]:
+    def _admitted(self) -> tuple[ServedStudy, list[str]]:
         """Whose page asks, and the address behind the token, in words."""
         hosts, origin = self.server.hosts, self.headers.get("Origin")
         token, _, rest = self.path.removeprefix("/").partition("/")
@@ -226,7 +226,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise _RefusedError(HTTPStatus.REQUEST_TIMEOUT)
         return body
 
-    def _wait(self, session: Session, version: int, page: str) -> None:
+    def _wait(self, session: ServedStudy, version: int, page: str) -> None:
         """Answer when the file has changed, or after a while."""
         self.server.waiting.append(page)
         try:

@@ -1,13 +1,10 @@
-"""A study that is changed by hand: what its page asks of the engine, and what it may write."""
+"""A mechanism that is changed by hand: what its page asks of the engine."""
 
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +17,7 @@ from mechdesign.door.live.asked import AskedError, changes_of, number_of, number
 from mechdesign.door.live.assembly import next_assembly
 from mechdesign.door.live.drag import TURNED, Drag, dragged, free_numbers, value_of
 from mechdesign.door.live.fields import number_field
+from mechdesign.door.live.served import Actions, OvertakenError, ServedStudy
 from mechdesign.door.live.turned import motion_of, turning
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.headlines import shown
@@ -27,7 +25,7 @@ from mechdesign.door.report.page.moving import moving, posed
 from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.door.report.page.tracks import ROWS, steps
 from mechdesign.drawing.before import Before
-from mechdesign.ground.errors import MechdesignError, StudyError, explain
+from mechdesign.ground.errors import MechdesignError, StudyError
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.progress import Progress
 from mechdesign.mechanism.graph import GROUND
@@ -40,79 +38,18 @@ _ORDER, _LONG = (
     ("sensitivities", "sweep", "optimize"),
 )
 _MOST_ROWS = 20_000  # poses that a page draws
-_MOST_PAGES = 16  # whose answers are kept: those that asked last
 _ALIKE = 1e-9  # lengths and angles that differ by less are the same
 _PIXEL = 0.1  # of a drawing, by which a dragged number is rounded
 _REACH = 0.6  # of a slider to both sides, as a part of the number
 _WAY = 0.3  # of a slider of a number that is zero, as a part of the mechanism's size
 
 
-class OvertakenError(Exception):
-    """A newer change of the same page made an answer worthless."""
-
-
-@dataclass(eq=False)
-class _OpenPage:
-    """What is kept of a page: the number of its newest request, how far its computation is, and the answers to it."""
-
-    turn: int = -1
-    progress: str = ""
-    answers: dict[str, ChangedAnswer] = field(default_factory=dict)
-    parts: dict[str, dict[str, Any]] = field(default_factory=dict)  # mechanisms that move, by their questions
-
-
-class _Watched(Progress):
-    """Progress that ends a computation which was overtaken, and tells a page how far it is."""
-
-    def __init__(self, page: _OpenPage, overtaken: Callable[[], bool]) -> None:
-        self._page, self._overtaken, self._stage, self._done, self._total = page, overtaken, "", 0, 0
-
-    def start(self, total: int, stage: str) -> None:
-        """Begin a stage."""
-        self._stage, self._done, self._total = stage, 0, total
-        self.update(0)
-
-    def update(self, n: int) -> None:
-        """Go on, unless it was overtaken."""
-        self._done += n
-        share = f" {100 * self._done // self._total} %" if self._total > 1 else ""
-        self._page.progress = f"{self._stage}{share}"
-        self.look()
-
-    def look(self) -> None:
-        """End the computation if it was overtaken."""
-        if self._overtaken():
-            raise OvertakenError
-
-
-class Session:
-    """What the pages of one study ask.
-
-    Every request says by what its page differs from the study (`changes`, by the names of parameters and dimensions, in
-    the study's units): the study in memory is that of the file, and of a page nothing is kept but its last answers.
-
-    Attributes
-    ----------
-    version : int
-        Counts changes of the file; a page of an older version is made anew.
-    mistake : str
-        What is wrong with the file since it was last right; empty where it is.
-    ended : bool
-        Whether computations are to end, for nobody waits for them.
-    taken : bool
-        Whether its study is a linkage of a task, whose page stands two folders above.
-    linkages : dict of str to Session
-        Linkages that pages of a task have taken over, by the names in their addresses.
-    """
+class Session(ServedStudy):
+    """What the pages of one mechanism ask."""
 
     def __init__(self, study: Study, load: Callable[[], Study] | None = None) -> None:
-        self._load = load
-        self.version, self.mistake, self.ended = 1, "", False
-        self.changed = threading.Condition()
-        self._computing, self._pages, self._noting = threading.Lock(), dict[str, _OpenPage](), threading.Lock()
+        super().__init__(study, load)
         self._seconds = dict[str, float]()  # that each question took last
-        self.taken, self.linkages = False, dict[str, Session]()
-        self._take(study)
 
     @np.errstate(all="ignore")
     def _take(self, study: Study) -> None:
@@ -130,24 +67,8 @@ class Session:
             raise StudyError("the study has no motion that can be shown")
         self.study, self.shown, self.held, self._first = study, shown, held, first
 
-    def reload(self) -> None:
-        """Read the file again; where it has mistakes the last study without any stays."""
-        assert self._load is not None
-        with self.changed:
-            try:
-                study = self._load()
-                alike = study.text == self.study.text and [*study.inputs()] == [*self.study.inputs()]
-                if alike and not self.mistake:
-                    return
-                self._take(study)
-                self.mistake = ""
-            except Exception as error:
-                self.mistake = explain(error)[1]
-            self.version += 1
-            self.changed.notify_all()
-
     @property
-    def actions(self) -> dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]]:
+    def actions(self) -> Actions:
         """What a page may ask, by the words of its requests."""
         return {"move": self.move, "answer": self.answer, "pictures": self.pictures, "save": self.save,
                 "assembly": self.assembly}  # fmt: skip
@@ -271,10 +192,6 @@ class Session:
             return self.study.units.label("length")
         return self.shown.unit_of(self.held.get(name, name)) or ""
 
-    def _own(self, changes: Mapping[str, float]) -> dict[str, float]:
-        """Changes of the study itself, without the drives that stand still."""
-        return {name: value for name, value in changes.items() if name not in self.held}
-
     @np.errstate(all="ignore")
     def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to a question with changed numbers, and the order in which questions are asked next.
@@ -313,22 +230,6 @@ class Session:
         assert motion is not None
         return ChangedAnswer(question, study, result, moves, motion)
 
-    def _turn(self, asked: Mapping[str, Any]) -> tuple[_OpenPage, _Watched]:
-        """The page that asks, and what ends its computation when it has asked something newer."""
-        page, turn = self._page(asked)
-        return page, _Watched(page, lambda: self.ended or page.turn != turn)
-
-    @contextmanager
-    def _watched(self, asked: Mapping[str, Any]) -> Iterator[tuple[_OpenPage, _Watched]]:
-        """The same, alone among all computations but those of pictures."""
-        page, progress = self._turn(asked)
-        with self._computing:
-            try:
-                progress.look()
-                yield page, progress
-            finally:
-                page.progress = ""
-
     @np.errstate(all="ignore")
     def pictures(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """The first pictures of the last answer to a question, as they stand in a report.
@@ -346,33 +247,6 @@ class Session:
         drawn = answer.pictures(progress.look)
         html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
         return {"html": html, "dark": dark(drawn.values())}
-
-    @np.errstate(all="ignore")
-    def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """Write the study with changed numbers into its file, or into another in its folder; see `saving.save`."""
-        changed = altered(self.study, self._own(changes_of(asked)))
-        name, replacing, own = str(asked.get("name") or ""), bool(asked.get("replace")), self._load is not None
-        answer = saving.save(self.study, changed, name, own=own, replacing=replacing)
-        if own and answer.get("saved") == saving.file_names(self.study)["file"]:
-            self.reload()
-        return answer
-
-    def progress(self, name: str) -> str:
-        """How far the computation for a page is, in words."""
-        page = self._pages.get(name)
-        return page.progress if page else ""
-
-    def _page(self, asked: Mapping[str, Any]) -> tuple[_OpenPage, int]:
-        """The page that asks, and the number of its request; by a newer one older computations are overtaken."""
-        name, turn = str(asked.get("page"))[:40], int(number_of(asked.get("turn")))
-        with self._noting:
-            page = self._pages.pop(name, None) or _OpenPage()
-            self._pages[name] = page
-            for oldest in [*self._pages][:-_MOST_PAGES]:
-                del self._pages[oldest]
-            if turn > page.turn:
-                page.turn, page.answers, page.parts = turn, {}, {}
-        return page, turn
 
 
 def _missing(rows: Floats, gaps: Sequence[tuple[int, int, str]]) -> str:

@@ -17,6 +17,7 @@ from mechdesign.door.live.answers import DRAWING, PACKAGE
 from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
 from mechdesign.door.live.saving import file_names, overrides
+from mechdesign.door.live.served import Actions, ServedStudy
 from mechdesign.door.live.session import Session
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.linkage import Canvas
@@ -41,12 +42,12 @@ _CONDITIONS = {"transmission": "angle", "lengths": "length", "keep_out": "length
 _REACH, _TURN = 0.5, 90.0  # of sliders to both sides: as a part of the task's size, and in degrees
 
 
-def session_of(study: Study, load: Callable[[], Study] | None = None) -> Session:
+def session_of(study: Study, load: Callable[[], Study] | None = None) -> ServedStudy:
     """What the pages of a study ask: those of its task where it has one, else those of its mechanism."""
     return Session(study, load) if study.synthesis is None else TaskSession(study, load)
 
 
-class TaskSession(Session):
+class TaskSession(ServedStudy):
     """What the pages of one task ask.
 
     Changes are entries of the task, as `--set` names them. A search is dropped as soon as a newer change comes, and a
@@ -66,12 +67,9 @@ class TaskSession(Session):
             self.linkages[_OWN].taken = True
 
     @property
-    def actions(self) -> dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]]:
+    def actions(self) -> Actions:
         """What a page may ask, by the words of its requests."""
         return {"answer": self.answer, "take": self.take, "save": self.save}
-
-    def _own(self, changes: Mapping[str, float]) -> dict[str, float]:
-        return dict(changes)
 
     def page(self) -> bytes:
         """The page of the task as it is in the file; its linkages come when they are found."""
