@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmark_rows import PRECISE
 from floors import five_bar_deviations
 from helpers.memory import peak_of
 
@@ -150,26 +151,6 @@ def test_memory_of_ten_million_samples(tmp_path: Path) -> None:
     assert peak_of([*command, "--no-plots", *changes, "--out", str(tmp_path)]) < 500e6
 
 
-# Ten poses of a five-bar, whose lengths, base and drives vary.
-FIVE_BAR = """
-mechanism:
-  parameters: {l1: 40, l2: 60, tol: 0.02}
-  links:
-    ground: {A: [0, 0], E: [50, 0]}
-    left: [A, B, l1]
-    right: [E, D, l1]
-    up_left: [B, C, l2]
-    up_right: [D, C, l2]
-  drives: {theta1: {angle: left}, theta2: {angle: right}}
-  sketch: {B: [-10, 38], D: [60, 38], C: [25, 87]}
-reliability:
-  sweep: {theta1: {from: 90, to: 126, number: 10}, theta2: 80}
-  outputs: [C]
-  dimensions: {"*.length": tol, ground.E.x: 0.02, theta1: 0.03, theta2: 0.03}
-  limits: {limits}
-  methods: [analytic]
-optimize: {method: search, variables: {l1: {from: 35, to: 45}, tol: {from: 0.01, to: 0.03}}, minimize: [{result}]}
-"""
 DESIGNS = 100
 
 
@@ -179,8 +160,9 @@ DESIGNS = 100
 ])  # fmt: skip
 def test_first_order_of_designs(benchmark: Any, result: str, limits: str) -> None:
     """Milliseconds of one processor a design, in populations of 100, beside NumPy by hand."""
-    text = FIVE_BAR.replace("{limits}", limits).replace("{result}", f"reliability.{result}")
-    study = mechdesign.load(text=text)
+    variables = "{l1: {from: 35, to: 45}, tol: {from: 0.01, to: 0.03}}"
+    search = f"{{method: search, variables: {variables}, minimize: [reliability.{result}]}}"
+    study = mechdesign.load(text=f"{PRECISE}  limits: {limits}\noptimize: {search}\n")
     evaluator = Evaluator(designs_question(study, [goal(f"reliability.{result}", smallest=result == "moments.sigma")]))
     rng = np.random.default_rng(1)
     batch = {"l1": rng.uniform(35, 45, DESIGNS), "tol": rng.uniform(0.01, 0.03, DESIGNS)}

@@ -17,7 +17,7 @@ from helpers.studies import COMMENTED_FOUR_BAR
 from mechdesign import load
 from mechdesign.door.live import server as serving
 from mechdesign.door.live.answers import DRAWING
-from mechdesign.door.live.asked import AskedError
+from mechdesign.door.live.requests import RequestError
 from mechdesign.door.live.served import OvertakenError
 from mechdesign.door.live.server import LiveServer
 from mechdesign.door.live.session import Session
@@ -180,7 +180,7 @@ def test_what_no_page_would_send_ends_in_a_refusal_or_a_sentence(session, count)
         asked |= {"drag": drag} if generator.random() < 0.7 else {}
         action = generator.choice(["move"] * 6 + ["answer", "pictures", "save"])
         # A mistake of ours would be another kind of exception.
-        with suppress(AskedError, OvertakenError, MechdesignError):
+        with suppress(RequestError, OvertakenError, MechdesignError):
             json.dumps(getattr(session, action)(asked), allow_nan=False)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mechdesign.door.live import saving
 from mechdesign.door.live.altered import altered
 from mechdesign.door.live.answers import ChangedAnswer
-from mechdesign.door.live.asked import changes_of, number_of
+from mechdesign.door.live.requests import changes_of, number_of
 from mechdesign.ground.errors import explain
 from mechdesign.ground.progress import Progress
 from mechdesign.study import Study
@@ -127,15 +127,15 @@ class ServedStudy(ABC):
         """Changes of the study itself, without the drives that stand still."""
         return {name: value for name, value in changes.items() if name not in self.held}
 
-    def _turn(self, asked: Mapping[str, Any]) -> tuple[OpenPage, _Watched]:
+    def _turn(self, request: Mapping[str, Any]) -> tuple[OpenPage, _Watched]:
         """The page that asks, and what ends its computation when it has asked something newer."""
-        page, turn = self._page(asked)
+        page, turn = self._page(request)
         return page, _Watched(page, lambda: self.ended or page.turn != turn)
 
     @contextmanager
-    def _watched(self, asked: Mapping[str, Any]) -> Iterator[tuple[OpenPage, _Watched]]:
+    def _watched(self, request: Mapping[str, Any]) -> Iterator[tuple[OpenPage, _Watched]]:
         """The same, alone among all computations but those of pictures."""
-        page, progress = self._turn(asked)
+        page, progress = self._turn(request)
         with self._computing:
             try:
                 progress.look()
@@ -144,10 +144,10 @@ class ServedStudy(ABC):
                 page.progress = ""
 
     @np.errstate(all="ignore")
-    def save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def save(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Write the study with changed numbers into its file, or into another in its folder; see `saving.save`."""
-        changed = altered(self.study, self._own(changes_of(asked)))
-        name, replacing, own = str(asked.get("name") or ""), bool(asked.get("replace")), self._load is not None
+        changed = altered(self.study, self._own(changes_of(request)))
+        name, replacing, own = str(request.get("name") or ""), bool(request.get("replace")), self._load is not None
         answer = saving.save(self.study, changed, name, own=own, replacing=replacing)
         if own and answer.get("saved") == saving.file_names(self.study)["file"]:
             self.reload()
@@ -158,9 +158,9 @@ class ServedStudy(ABC):
         page = self._pages.get(name)
         return page.progress if page else ""
 
-    def _page(self, asked: Mapping[str, Any]) -> tuple[OpenPage, int]:
+    def _page(self, request: Mapping[str, Any]) -> tuple[OpenPage, int]:
         """The page that asks, and the number of its request; by a newer one older computations are overtaken."""
-        name, turn = str(asked.get("page"))[:40], int(number_of(asked.get("turn")))
+        name, turn = str(request.get("page"))[:40], int(number_of(request.get("turn")))
         with self._noting:
             page = self._pages.pop(name, None) or OpenPage()
             self._pages[name] = page

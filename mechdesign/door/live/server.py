@@ -21,7 +21,7 @@ from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from mechdesign.door.live.asked import AskedError, asked_in
+from mechdesign.door.live.requests import RequestError, request_in
 from mechdesign.door.live.served import OvertakenError, ServedStudy
 from mechdesign.ground.errors import explain
 
@@ -177,12 +177,12 @@ class _Handler(BaseHTTPRequestHandler):
         if len(words) != 1 or words[0] not in actions:
             raise _RefusedError(HTTPStatus.NOT_FOUND)
         try:
-            asked = asked_in(body)
+            request = request_in(body)
             # A page of an older version of the file asks for names that there may not be.
-            answer = actions[words[0]](asked) if asked.get("version") == session.version else {"outdated": True}
+            answer = actions[words[0]](request) if request.get("version") == session.version else {"outdated": True}
         except OvertakenError:
             answer = {"overtaken": True}
-        except AskedError:
+        except RequestError:
             raise _RefusedError(HTTPStatus.BAD_REQUEST) from None
         except Exception as error:
             answer = {"wrong": explain(error)[1]}

@@ -13,10 +13,10 @@ from mechdesign.commands import QUESTIONS
 from mechdesign.door.live import saving
 from mechdesign.door.live.altered import SKETCH, altered, is_entry
 from mechdesign.door.live.answers import AS_IT_WAS, PACKAGE, ChangedAnswer, staged, titled
-from mechdesign.door.live.asked import AskedError, changes_of, number_of, numbers_of, sheet_of, texts_of
 from mechdesign.door.live.assembly import next_assembly
 from mechdesign.door.live.drag import TURNED, Drag, dragged, free_numbers, value_of
 from mechdesign.door.live.fields import number_field
+from mechdesign.door.live.requests import RequestError, changes_of, number_of, numbers_of, sheet_of, texts_of
 from mechdesign.door.live.served import Actions, OvertakenError, ServedStudy
 from mechdesign.door.live.turned import motion_of, turning
 from mechdesign.door.report.page.dark import dark
@@ -98,8 +98,8 @@ class Session(ServedStudy):
         return {name: value_of(self.study, name) for name in names}
 
     def _questions(self) -> list[str]:
-        asked, names = self.study.sections, (*_ORDER, *_LONG)
-        return [name for name in names if name == "kinematics" or asked.get(QUESTIONS[name].key) is not None]
+        sections, names = self.study.sections, (*_ORDER, *_LONG)
+        return [name for name in names if name == "kinematics" or sections.get(QUESTIONS[name].key) is not None]
 
     def _quickest(self) -> list[str]:
         """The questions by the time that each took last; then those that were not asked yet."""
@@ -131,15 +131,15 @@ class Session(ServedStudy):
         return sorted(groups.items(), key=lambda group: (group[0] != "parameters", group[0] != GROUND))
 
     @np.errstate(all="ignore")
-    def move(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def move(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Positions with changed numbers, or with those that a drag changes; with ``wrong`` where there are none."""
-        study, changes, sheet = self.shown, changes_of(asked), sheet_of(asked, self.shown.mechanism.size)
-        self._page(asked)
+        study, changes, sheet = self.shown, changes_of(request), sheet_of(request, self.shown.mechanism.size)
+        self._page(request)
         names: tuple[str, ...] = ()
         why, row, hint = "", None, ""
-        if (drag := asked.get("drag")) is not None:
+        if (drag := request.get("drag")) is not None:
             if not isinstance(drag, Mapping):
-                raise AskedError
+                raise RequestError
             hand = Drag(
                 str(drag.get("point")), complex(*numbers_of(drag.get("to"), 2)), number_of(drag.get("row")),
                 texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
@@ -147,19 +147,19 @@ class Session(ServedStudy):
             )  # fmt: skip
             numbers = {TURNED, *study.parameters.names(), *self._entries()}
             if hand.point not in study.mechanism.points or not numbers.issuperset(hand.held):
-                raise AskedError
+                raise RequestError
             done = dragged(study, changes, hand)
             changes, names, why, row = dict(done.changes), done.names, done.why, done.row
             if done.across:
                 hint = (
                     f"along its way it is driven; pull further across it for {done.across.removeprefix('mechanism.')}"
                 )
-        count = int(number_of(asked.get("poses")))
+        count = int(number_of(request.get("poses")))
         if not 0 < count <= _MOST_ROWS:
-            raise AskedError
+            raise RequestError
         now = altered(study, changes)
         own = now if study is self.study else altered(self.study, self._own(changes))
-        rows = steps(str(asked.get("rows")), count) / ROWS
+        rows = steps(str(request.get("rows")), count) / ROWS
         drawing, tracks = posed(now, rows, sheet, study)
         return {
             "changes": changes, "names": names, "why": why, "row": row, "hint": hint, "drawing": drawing,
@@ -178,9 +178,9 @@ class Session(ServedStudy):
                 yield self._in_words(now, name)
 
     @np.errstate(all="ignore")
-    def assembly(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def assembly(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Changes by which the sketch shows the next assembly, and its name."""
-        changes, words = next_assembly(self.shown, changes_of(asked))
+        changes, words = next_assembly(self.shown, changes_of(request))
         return {"changes": changes, "words": words}
 
     def _in_words(self, study: Study, name: str) -> str:
@@ -193,7 +193,7 @@ class Session(ServedStudy):
         return self.shown.unit_of(self.held.get(name, name)) or ""
 
     @np.errstate(all="ignore")
-    def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to a question with changed numbers, and the order in which questions are asked next.
 
         Raises
@@ -201,11 +201,11 @@ class Session(ServedStudy):
         OvertakenError
             If the page has asked something newer.
         """
-        changes, question = changes_of(asked), asked.get("question")
+        changes, question = changes_of(request), request.get("question")
         if question not in self._questions():
-            raise AskedError
-        sheet = sheet_of(asked, self.shown.mechanism.size) if asked.get("sheet") else None
-        with self._watched(asked) as (page, progress):
+            raise RequestError
+        sheet = sheet_of(request, self.shown.mechanism.size) if request.get("sheet") else None
+        with self._watched(request) as (page, progress):
             begin = time.perf_counter()
             answer = page.answers[question] = self._ask(question, changes, progress)
             progress.look()
@@ -231,7 +231,7 @@ class Session(ServedStudy):
         return ChangedAnswer(question, study, result, moves, motion)
 
     @np.errstate(all="ignore")
-    def pictures(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def pictures(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """The first pictures of the last answer to a question, as they stand in a report.
 
         Raises
@@ -239,9 +239,9 @@ class Session(ServedStudy):
         OvertakenError
             If the page has asked something newer.
         """
-        page, progress = self._turn(asked)
+        page, progress = self._turn(request)
         progress.look()
-        answer = page.answers.get(str(asked.get("question")))
+        answer = page.answers.get(str(request.get("question")))
         if answer is None:
             raise OvertakenError
         drawn = answer.pictures(progress.look)

@@ -14,8 +14,8 @@ import numpy as np
 from mechdesign.commands import COMMANDS
 from mechdesign.door.live.altered import POINTS, TASK, altered, path_points
 from mechdesign.door.live.answers import DRAWING, PACKAGE
-from mechdesign.door.live.asked import AskedError, changes_of, number_of
 from mechdesign.door.live.fields import number_field
+from mechdesign.door.live.requests import RequestError, changes_of, number_of
 from mechdesign.door.live.saving import file_names, overrides
 from mechdesign.door.live.served import Actions, ServedStudy
 from mechdesign.door.live.session import Session
@@ -92,7 +92,7 @@ class TaskSession(ServedStudy):
         )  # fmt: skip
 
     @np.errstate(all="ignore")
-    def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """The linkages of the changed task, moving side by side; of a task without any the one that comes nearest.
 
         Raises
@@ -100,9 +100,9 @@ class TaskSession(ServedStudy):
         OvertakenError
             If the page has asked something newer.
         """
-        changes = changes_of(asked)
+        changes = changes_of(request)
         key = repr(sorted(changes.items()))
-        with self._watched(asked) as (_, progress):
+        with self._watched(request) as (_, progress):
             study, result = altered(self.study, changes), self._searches.get(key)
             if result is None:
                 try:
@@ -129,15 +129,15 @@ class TaskSession(ServedStudy):
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
 
-    def take(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def take(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Take over a linkage of a search: the address of its page, in which it is dragged and saved."""
-        key, row = str(asked.get("search")), number_of(asked.get("row"))
+        key, row = str(request.get("search")), number_of(request.get("row"))
         result = self._searches.get(key)
         if result is None:
             raise StudyError("that search is over; change a point, or load the page again, and it is made anew")
         drawn = DrawnSolutions.of(result)
         if row not in range(len(drawn.data)):
-            raise AskedError
+            raise RequestError
         file, text = _files(result)[int(row)]
         name = _name(text)
         if name not in self.linkages:

@@ -50,26 +50,22 @@ def _outside(task: Task) -> Iterator[Caution]:
             continue
         pose, scale, unit = int(np.argmax(beyond)), task.scale[band.output], task.labels[2][band.output]
         several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
-        name = task.question.channels[band.output].name
+        name, where = task.question.channels[band.output].name, f"at {task.where(pose)}{several}"
         if band.round:
             radius, distance = (
-                scale * np.broadcast_to(end, beyond.shape)[pose] for end in (band.high, away + band.high)
+                numeral(scale * np.broadcast_to(end, beyond.shape)[pose]) for end in (band.high, away + band.high)
             )
-            words = f"the nominal place at {task.where(pose)}{several} is {numeral(distance)} from its target, of"
-            words = f"{name.replace('.x', '')}: {words} {numeral(radius)} {unit} allowed"
-            yield Caution("suspect", words, pose=task.where(pose))
-            continue
-        value = scale * task.nominal[band.output, pose]
-        low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
-        between = f"{numeral(low)} to {numeral(high)}"
-        if not np.isfinite(low) or not np.isfinite(high):
-            between = f"at least {numeral(low)}" if np.isfinite(low) else f"at most {numeral(high)}"
-        yield Caution(
-            "suspect",
-            f"{name}: the nominal value {numeral(value)} at {task.where(pose)}"
-            f"{several} lies outside its limits, {between}{f' {unit}' if unit else ''}",
-            pose=task.where(pose),
-        )  # fmt: skip
+            point = name.replace(".x", "")
+            words = f"{point}: the nominal place {where} is {distance} from its target, of {radius} {unit} allowed"
+        else:
+            value = scale * task.nominal[band.output, pose]
+            low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
+            between = f"{numeral(low)} to {numeral(high)}"
+            if not np.isfinite(low) or not np.isfinite(high):
+                between = f"at least {numeral(low)}" if np.isfinite(low) else f"at most {numeral(high)}"
+            between = f"{between} {unit}".rstrip()
+            words = f"{name}: the nominal value {numeral(value)} {where} lies outside its limits, {between}"
+        yield Caution("suspect", words, pose=task.where(pose))
 
 
 def _cornered(task: Task) -> Iterator[Caution]:

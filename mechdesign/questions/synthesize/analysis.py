@@ -16,7 +16,7 @@ from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.synthesize.columns import CENTRE_POINTS, SOLUTIONS
 from mechdesign.questions.synthesize.curves import centre_points
 from mechdesign.questions.synthesize.files import judged, study_data, study_files
-from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, distinct, ranked, rounded
+from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, clear, distinct, ranked, rounded
 from mechdesign.questions.synthesize.tasks import BodyTask, Task, task_of
 from mechdesign.questions.synthesize.words import faults, linkage
 from mechdesign.study import Study
@@ -92,7 +92,7 @@ def _answer(
     """The answer that some solutions are, best first; or the one that comes nearest, with what it has `missed`."""
     table = solutions_table(study, task, solutions, scores[: len(solutions)])
     unit = task.error_factor
-    errors = np.array([rounded(solution.error / unit, task.size / unit) for solution in solutions])
+    errors = np.array([clear(solution.error, task.size) / unit for solution in solutions])
     words = [", ".join(linkage(table, row, float(error))) for row, error in enumerate(errors)]
     data, files = [], dict[str, str]()
     for number, solution in enumerate(solutions, 1):

@@ -269,8 +269,13 @@ def distinct(solutions: Sequence[Solution], size: float) -> list[Solution]:
 
 
 def rounded(error: float, size: float) -> float:
-    """An error, 0 where it is rounding; to four digits, so that rounding orders nothing."""
-    return 0.0 if error < EXACT * size else float(f"{error:.4g}")
+    """An error to four digits, so that rounding orders nothing."""
+    return float(f"{clear(error, size):.4g}")
+
+
+def clear(error: float, size: float) -> float:
+    """An error, 0 where it is rounding beside the task's size."""
+    return 0.0 if error < EXACT * size else error
 
 
 def ranked(

@@ -77,9 +77,8 @@ def _course(study: Study, point: str) -> tuple[Still, Complexes]:
 
 def costs(result: Result) -> tuple[str, Floats]:
     """What a larger transmission angle costs, a column of the solutions, and its values: error, of exact ones size."""
-    errors, table = DrawnSolutions.of(result).errors, result.tables["solutions"]
-    # An exact linkage has no error, but the rows of the others are drawn to all digits.
-    return ("error", np.where(errors > 0, table["error"], 0.0)) if errors.any() else ("size", np.asarray(table["size"]))
+    errors = DrawnSolutions.of(result).errors
+    return ("error", errors) if errors.any() else ("size", np.asarray(result.tables["solutions"]["size"]))
 
 
 def trade(view: View) -> Picture | None:
