@@ -64,9 +64,7 @@ def test_the_end_of_a_quick_pull_at_a_cranks_pin_sets_angle_and_length(slow):
 
 def test_within_four_pixels_of_its_circle_a_cranks_pin_turns_alone_and_says_how_its_length_is_changed(live):
     bar = live()
-    x, y = bar.middle("A")
-    bar.page.mouse.move(x, y)
-    bar.page.mouse.down()
+    x, y = bar.hold("A")
     bar.page.mouse.move(x + 3, y)
     expect(bar.page.locator(".live-hand")).to_contain_text("pull further across it for crank.length")
     assert bar.value("crank.length") == 30
@@ -114,9 +112,7 @@ def test_where_a_pose_cannot_be_assembled_a_pivot_is_dragged_back(live):
     expect(bar.page.locator(".moving-words")).to_contain_text("cannot be assembled")
     for point in "OADBP":
         assert bar.page.locator(f".live-handle[data-at={point}]").is_visible()
-    x, y = bar.middle("B")
-    bar.page.mouse.move(x, y)
-    bar.page.mouse.down()
+    x, y = bar.hold("B")
     bar.page.mouse.move(x - 10, y, steps=3)
     expect(bar.page.locator(".live-hand")).to_contain_text("rocker.length = ")
     bar.page.mouse.up()
@@ -165,11 +161,7 @@ def test_what_was_saved_is_said_until_the_next_change_and_a_refused_save_leaves_
 def test_beside_a_finger_the_numbers_stand_above_left_and_cover_no_ring(live):
     bar = live(viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True)
     x, y = bar.middle("D")
-    session = bar.page.context.new_cdp_session(bar.page)
-    touch = lambda kind, *points: session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [*points]})  # noqa: E731
-    touch("touchStart", {"x": x, "y": y})
-    for k in range(1, 6):
-        touch("touchMove", {"x": x + 2 * k, "y": y})
+    let_go = bar.touch("D", 10)
     expect(bar.page.locator(".live-hand")).to_contain_text("ground.D.x")
     box = bar.page.locator(".live-hand").bounding_box()
     right, bottom = box["x"] + box["width"], box["y"] + box["height"]
@@ -178,7 +170,7 @@ def test_beside_a_finger_the_numbers_stand_above_left_and_cover_no_ring(live):
     for point in "OABP":
         a, b = bar.middle(point)
         assert not (box["x"] < a < right and box["y"] < b < bottom)
-    touch("touchEnd")
+    let_go()
 
 
 @pytest.mark.nightly

@@ -49,9 +49,7 @@ def test_a_dragged_pivot_changes_the_study_that_is_saved_and_the_command_line_gi
 def test_the_numbers_that_a_drag_changes_are_named_beside_the_hand_and_a_locked_one_stays(live):
     bar = live()
     bar.page.get_by_label("lock rod.length").check()
-    x, y = bar.middle("B")
-    bar.page.mouse.move(x, y)
-    bar.page.mouse.down()
+    x, y = bar.hold("B")
     bar.page.mouse.move(x - 20, y - 5, steps=4)
     expect(bar.page.locator(".live-hand")).to_contain_text("rocker.length = ")
     assert "rod.length" not in bar.page.locator(".live-hand").inner_text()
@@ -135,13 +133,7 @@ def test_a_saved_file_makes_the_page_anew_and_a_mistake_is_told_while_the_last_a
 @pytest.mark.nightly
 def test_a_finger_drags_on_a_narrow_dark_screen_and_nothing_leaves_the_page(live):
     bar = live(viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True, color_scheme="dark")
-    x, y = bar.middle("D")
-    session = bar.page.context.new_cdp_session(bar.page)
-    touch = lambda kind, *points: session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [*points]})  # noqa: E731
-    touch("touchStart", {"x": x, "y": y})
-    for k in range(1, 6):
-        touch("touchMove", {"x": x + 2 * k, "y": y})
-    touch("touchEnd")
+    bar.touch("D", 10)()
     bar.page.wait_for_selector(".live-number.changed")
     bar.answered(bar.page)
     assert bar.value("ground.D.x") > 101
@@ -305,9 +297,7 @@ def test_undo_goes_on_after_the_file_was_changed_in_an_editor_and_says_what_it_l
 def test_a_cranks_pin_turns_the_crank_and_a_button_shows_the_other_assembly(live):
     bar = live()
     pixels = bar.scale
-    x, y = bar.middle("A")
-    bar.page.mouse.move(x, y)
-    bar.page.mouse.down()
+    x, y = bar.hold("A")
     for angle in range(10, 61, 10):
         turned = math.radians(angle)
         bar.page.mouse.move(x + 30 * pixels * (math.cos(turned) - 1), y - 30 * pixels * math.sin(turned))
@@ -329,9 +319,7 @@ def test_a_cranks_pin_turns_the_crank_and_a_button_shows_the_other_assembly(live
 def test_what_is_drawn_without_numbers_says_that_arrows_wait_for_the_hand_to_rest(live):
     bar = live()
     bar.page.get_by_label("Velocities").check()
-    x, y = bar.middle("B")
-    bar.page.mouse.move(x, y)
-    bar.page.mouse.down()
+    x, y = bar.hold("B")
     bar.page.mouse.move(x - 10, y, steps=3)
     expect(bar.page.get_by_label("Velocities")).to_be_disabled()
     bar.page.mouse.up()

@@ -46,11 +46,29 @@ class Live:
         box = self.page.locator(f".live-handle[data-at={point}]").bounding_box()
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
-    def drag(self, point, across, down):
-        """Take a point by the mouse, move it by pixels and let it go."""
+    def hold(self, point):
+        """Take a point by the mouse; returns where it is on the screen."""
         x, y = self.middle(point)
         self.page.mouse.move(x, y)
         self.page.mouse.down()
+        return x, y
+
+    def touch(self, point, across):
+        """Take a point by a finger and move it by pixels to the right; returns what lets it go."""
+        x, y = self.middle(point)
+        session = self.page.context.new_cdp_session(self.page)
+
+        def send(kind, *points):
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [*points]})
+
+        send("touchStart", {"x": x, "y": y})
+        for k in range(1, 6):
+            send("touchMove", {"x": x + across * k / 5, "y": y})
+        return lambda: send("touchEnd")
+
+    def drag(self, point, across, down):
+        """Take a point by the mouse, move it by pixels and let it go."""
+        x, y = self.hold(point)
         self.page.mouse.move(x + across / 2, y + down / 2, steps=4)
         self.page.mouse.move(x + across, y + down, steps=4)
         self.page.mouse.up()
