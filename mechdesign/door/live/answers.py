@@ -31,7 +31,7 @@ DRAWING = threading.Lock()  # held where Matplotlib's settings, which are those 
 _MOVE = ("kinematics", "dynamics")
 _STAGED = ("motion", "paths")  # pictures in whose place the mechanism moves
 _MOST_PICTURES = 2  # of a question
-_MOST_CLASSES = 2  # four-bars and slider-cranks whose class is among the key numbers
+_MOST_CLASSES = 2  # four-bars and slider-cranks whose class is told
 # Links that turn fully against the frame, by Grashof's class.
 _TURNING = {"double-crank": ("input", "output"), "crank-rocker": ("input",), "double-rocker": ("coupler",),
             "rocker-crank": ("output",), "triple-rocker": (), "crank-slider": ("input",)}  # fmt: skip
@@ -53,8 +53,11 @@ class ChangedAnswer:
     @cached_property
     def numbers(self) -> list[Headline]:
         """The key numbers: those of the turn that is shown where the study does not ask how it moves."""
-        seen = (self.result or self.motion).seen
-        return [*_classes(seen), *headlines(seen)]
+        return headlines(self._seen)
+
+    @property
+    def _seen(self) -> Result:
+        return (self.result or self.motion).seen
 
     def part(self, first: Before | None, sheet: Canvas | None) -> dict[str, Any] | None:
         """The mechanism moving over its first motion, as plain data; None where nothing moves."""
@@ -69,12 +72,13 @@ class ChangedAnswer:
         return {**whole, "data": titled(whole["data"])}
 
     def html(self, stage: Mapping[str, Any] | None) -> str:
-        """Key numbers, requirements, dead centres and warnings, with links into the mechanism on the stage."""
+        """Classes, key numbers, requirements, dead centres and warnings, with links into the mechanism on the stage."""
         result, moves = self.result, {} if stage is None else {"kinematics": stage}
         section = AnsweredQuestion(self.question, "", 0, verdicts=requirements(self.study, result) if result else ())
         return fragment(
             "answer.html.j2", PACKAGE, command=self.question, question=QUESTIONS[self.question].question,
-            numbers=self.numbers, mover=partial(mover, moves), pose_of=pose_of, dead=dead_centres(self.motion),
+            classes=[*_classes(self._seen)], numbers=self.numbers, mover=partial(mover, moves), pose_of=pose_of,
+            dead=dead_centres(self.motion),
             required=[entry for entry in required_of(self.study, [section]) if entry["verdict"] is not None],
             failed=result.failed if result else "", warnings=[*map(str, result.warnings if result else ())],
         )  # fmt: skip
