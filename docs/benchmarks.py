@@ -142,6 +142,10 @@ def main() -> None:
     given = parser.parse_args()
     if unknown := set(given.rows) - set(ROWS):
         parser.error(f"no row {', '.join(sorted(unknown))}")
+    if not given.rows and (floors.compiler() is None or not has_pylinkage()):
+        parser.error(
+            "a run that is stored has all peers: a C compiler, and pip install -e '.[benchmark]', or name rows"
+        )
     data = {"machine": machine(), "rounds": given.rounds}
     data["rows"] = {name: compare(ROWS[name], given.rounds) for name in given.rows or ROWS}
     print(rows_table(data["rows"]))

@@ -45,6 +45,12 @@ def test_the_command_prints_a_row_and_leaves_the_stored_run(
     with pytest.raises(SystemExit):
         benchmarks.main()
     assert "no row no_such_row" in capsys.readouterr().err
+    monkeypatch.setattr("sys.argv", ["benchmarks.py"])
+    monkeypatch.setattr(benchmarks, "has_pylinkage", lambda: False)
+    with pytest.raises(SystemExit):
+        benchmarks.main()
+    assert "a run that is stored has all peers" in capsys.readouterr().err
+    assert benchmarks.MEASURED.read_bytes() == before
 
 
 def test_the_tables_are_those_of_the_stored_run() -> None:
