@@ -44,7 +44,9 @@ def isotropic_points(panels: Panels, cells: Parts, strips: Strips, some: Flags) 
     same = np.diff(segments["strip"]) == 0
     before = np.append(np.inf, np.where(same, uneven[:-1], np.inf))
     after = np.append(np.where(same, uneven[1:], np.inf), np.inf)
-    chosen = (uneven <= np.minimum(before, after)) | (np.arange(len(segments)) % EVERY == 0)
+    # By their place on the ray, not in the batch: a design's points are the same alone and beside others.
+    node = segments["ray"] // len(cells)
+    chosen = (uneven <= np.minimum(before, after)) | (node % EVERY == 0)
     seed = np.flatnonzero(chosen & (uneven < SEED) & some[segments["cell"]])
     tips = np.zeros(len(seed), dtype=TIP)
     if not len(seed):
