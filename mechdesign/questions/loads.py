@@ -20,6 +20,9 @@ from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 from mechdesign.study.text.reading import MAX_NUMBER
 from mechdesign.study.text.units import Amount
 
+# Directions in which a mechanism may move, and instants, in which loads show how large they are.
+BOTH_WAYS, INSTANTS = np.array([[-1.0], [1.0]]), 33
+
 
 def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
     """Coordinates in the expressions of loads, also those whose velocities stand there."""
@@ -80,3 +83,31 @@ def variable(study: Study, name: str, poses: PoseNumbers, configuration: Configu
     assert moving.velocity is not None
     rate = first(configuration, coordinate, moving.velocity)
     return np.asarray(in_study_units(study.units, coordinate, rate), dtype=np.float64)
+
+
+def size_in_sketch(study: Study, quantity: Quantity, tempo: float, span: float) -> float:
+    """About how large a number of a load is: where it follows the motion, its largest size in the sketch.
+
+    Parameters
+    ----------
+    tempo : float
+        How fast the mechanism moves there, either way: radians, or sizes of it, in a unit of time.
+    span : float
+        The times from 0 on that count.
+    """
+    if not isinstance(quantity, Expression):
+        return abs(quantity)
+    mechanism, values = study.mechanism, dict[str, Number]()
+    for name in quantity.names:
+        if name == TIME:
+            values[name] = np.linspace(0.0, span, INSTANTS)
+        elif name in study.parameters.nominal:
+            values[name] = study.parameters.nominal[name]
+        else:
+            coordinate = mechanism.coordinate(name.removesuffix(VELOCITY))
+            speed = tempo * (mechanism.size if coordinate.quantity == "length" else 1.0)
+            at_rest = coordinate.name == name
+            value = mechanism.sketch_configuration.value(coordinate) if at_rest else BOTH_WAYS * speed
+            values[name] = np.asarray(in_study_units(study.units, coordinate, value), dtype=np.float64)
+    sizes = np.abs(np.asarray(quantity.evaluate(values)))
+    return float(sizes.max(initial=0.0, where=sizes <= MAX_NUMBER))

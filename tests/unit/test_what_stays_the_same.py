@@ -55,6 +55,30 @@ def test_a_constant_velocity_has_extremes_without_places() -> None:
     assert np.isnan([table["min_at"][row], table["max_at"][row]]).all()
 
 
+DAMPED = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 30], rod: [A, B, 90], piston: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, piston], point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [80, 0]}
+dynamics:
+  sweep: {theta: {from: 20, to: 100, step: 40}}
+  rates: {theta: 300 rpm}
+  loads: [{at: B, force: ["FORCE", 0]}]
+"""
+
+
+@pytest.mark.parametrize("force", ["-0.2*B.x_velocity", "-0.2*B.x", "-20*max(-1, min(1, B.x_velocity))"])
+def test_what_a_load_by_the_motion_leaves_at_rounding_is_zero(force: str) -> None:
+    """Nothing but the load acts, along the line through the crank's pivot: it turns the frame nowhere."""
+    result = mechdesign.dynamics(mechdesign.load(text=DAMPED.replace("FORCE", force)))
+    table = result.tables["extremes"]
+    (row,) = np.flatnonzero(table["output"] == "shaking_moment")
+    assert [table[name][row] for name in ("min", "max", "peak", "mean", "rms")] == [0] * 5
+    (row,) = np.flatnonzero(table["output"] == "shaking")
+    assert table["peak"][row] >= np.abs(result.main["shaking.x"]).max() > 10
+
+
 def test_a_requirement_on_what_is_constant_names_no_pose() -> None:
     places = [verdict.place for verdict in answered(CONSTANT)[1].verdicts]
     assert places == ["joint O, on crank, by ground"] * 3

@@ -12,7 +12,6 @@ from typing import Self
 import numpy as np
 
 from mechdesign.ground.errors import StudyError
-from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Strands
 from mechdesign.mechanism import Configuration
@@ -33,7 +32,7 @@ from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import JointFriction, Slipping
 from mechdesign.questions.kinematics.moved import AT_REST, MovedQuestion, Static, watched
 from mechdesign.questions.kinematics.schema import KinematicsSection
-from mechdesign.questions.loads import Loading
+from mechdesign.questions.loads import Loading, size_in_sketch
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
@@ -112,9 +111,9 @@ class ForceQuestion:
 
     @cached_property
     def size(self) -> float:
-        """About how large the forces are: weights, inertia, springs and constant loads, all in the same direction.
+        """About how large the forces are: weights, inertia, springs and loads, all in the same direction.
 
-        What is balanced is the rounding of these.
+        What is balanced is the rounding of these. Loads that follow the motion count as in the sketch.
         """
         mechanism, length = self.study.mechanism, self.study.mechanism.size
 
@@ -127,10 +126,12 @@ class ForceQuestion:
             way, arm = (np.pi, length) if spring.turning else (length, 1.0)
             constant, stiffness, _, damping = spring.pull(size)
             forces.append((abs(constant) + (stiffness + damping * self.tempo) * way) / arm)
+        forward = self.section.forward
+        span = forward.duration if forward is not None else 2 * np.pi / max(self.tempo, np.finfo(float).tiny)
         for load in self.section.loads:
             for _, quantity, kind in load.numbers:
-                if not isinstance(quantity, Expression):
-                    forces.append(abs(quantity) / (length if kind == "moment" else 1.0))
+                largest = size_in_sketch(self.study, quantity, self.tempo, span)
+                forces.append(largest / (length if kind == "moment" else 1.0))
         return sum(forces)
 
     def lean(self, names: Collection[str]) -> ForceQuestion:
