@@ -137,7 +137,14 @@ class Functions(Means):
             lanes, first = firsts(lane[tie])
             chosen = tie[first]
             own, sign = rows[lanes // lines], sign[lanes // lines]
-            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], equal[lanes])
+            line, least = line[chosen], equal[lanes]
+            values, places = self._settled(own, sign, line, place[chosen], value[chosen], least)
+            # Where a steep function comes to a level that it keeps, it has few digits: its nodes behind have them all.
+            for k in np.flatnonzero(np.isfinite(best[lanes]) & (sign * values < best[lanes] - least)).tolist():
+                some = np.flatnonzero(self.pieces.line == line[k])
+                nodes = np.nan_to_num(sign[k] * self._quotients(own[[k]], some), nan=-np.inf)
+                values[k] = sign[k] * max(sign[k] * values[k], min(nodes.max(), best[lanes[k]]))
+            table[:, lanes] = values, places
         value, place = table.reshape(2, 2, len(names), lines)
         return Extremes(value, place, still)
 

@@ -19,6 +19,8 @@ from mechdesign.motion.pieces import BESIDE, MOST_HALVINGS, RESOLVED, CurvePiece
 # A series is exact if its truncation error is less than this part of the function's size; near a singularity, where
 # functions have fewer digits, less than this part over the conditioning.
 EXACT = 2e-15
+# A place is known to so many neighbouring numbers: a function that is steep there has no more digits.
+PLACE = 2.0
 # A truncation error below this part of the size, and not four times smaller in either half of the piece, is rounding,
 # as of a load that begins on a short way; no halving would make it smaller. Of a corner one half has none.
 ROUNDING = 1e-11
@@ -181,7 +183,10 @@ class Series:
                 largest(top, pending.line, end)
             scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
             rest = chebyshev.remainder(chebyshev.series(values))
-            rough = ~(rest <= exact * scale) & finite.any(axis=2) & ~own
+            change = np.nan_to_num(values.max(axis=2) - values.min(axis=2))
+            near = np.spacing(pending.end)
+            blurred = change * PLACE * near / np.maximum(pending.end - pending.begin, near)
+            rough = ~(rest <= exact * scale + blurred) & finite.any(axis=2) & ~own
             if before is not None:
                 rounding = np.minimum(*np.split(rest, 2, axis=1)) > before / 4
                 part = np.where(pending.depth >= DEEP, ROUNDING_DEEP, ROUNDING)

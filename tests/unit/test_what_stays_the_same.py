@@ -79,6 +79,20 @@ def test_what_a_load_by_the_motion_leaves_at_rounding_is_zero(force: str) -> Non
     assert table["peak"][row] >= np.abs(result.main["shaking.x"]).max() > 10
 
 
+@pytest.mark.slow
+def test_the_extreme_of_a_force_that_keeps_its_size_is_that_of_the_rows() -> None:
+    """Dry friction changes sides within a thousandth of a degree: there the piston is 4/3 as fast as the crank pin."""
+    force = "-20*max(-1, min(1, B.x_velocity/0.02))"
+    turn = "theta: {from: 0, to: 360, step: 5}"
+    text = DAMPED.replace("FORCE", force).replace("theta: {from: 20, to: 100, step: 40}", turn)
+    result = mechdesign.dynamics(mechdesign.load(text=text))
+    table = result.tables["extremes"]
+    (row,) = np.flatnonzero(table["output"] == "shaking.x")
+    assert [table[name][row] for name in ("min", "max", "peak")] == [-20, 20, 20]
+    assert result.main["shaking.x"].max() == 20
+    assert table["max_at"][row] == pytest.approx(np.degrees(0.02 / (10 * np.pi * 30 * 4 / 3)), rel=1e-6)
+
+
 def test_a_requirement_on_what_is_constant_names_no_pose() -> None:
     places = [verdict.place for verdict in answered(CONSTANT)[1].verdicts]
     assert places == ["joint O, on crank, by ground"] * 3
