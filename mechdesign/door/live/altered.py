@@ -54,3 +54,22 @@ def path_points(study: Study) -> list[list[float]]:
     if isinstance(path.points, str):
         rows = read_table(study.folder, path.points).tolist()
     return [[*map(float, row)] for row in rows]
+
+
+def free_numbers(study: Study) -> list[str]:
+    """Parameters and dimensions that are numbers of their own: they follow from nothing else in the study."""
+    parameters, places = study.parameters, study.mechanism.description.places
+    return [
+        name for name in parameters.names()
+        if name not in parameters.formulas and name not in parameters.dependent
+        and (name in parameters.nominal or places[name].path)
+    ]  # fmt: skip
+
+
+def value_of(study: Study, name: str) -> float:
+    """A parameter, a dimension or a number of the sketch of a study, in its units."""
+    if is_entry(name):
+        point, _, axis = name.removeprefix(f"{SKETCH}.").rpartition(".")
+        place = study.mechanism.description.sketch[point]
+        return place.imag if axis == "1" else place.real
+    return study.sizes[name] / study.parameters.factors.get(name, 1.0)

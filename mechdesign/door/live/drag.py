@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
-from mechdesign.door.live.altered import SKETCH, altered, is_entry
+from mechdesign.door.live.altered import SKETCH, altered, free_numbers, is_entry, value_of
 from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.expressions import Number
-from mechdesign.ground.numerics.arrays import Complexes, Floats
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.elements.joints import Prismatic, Slot
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.motion.solving import solve_rows
 from mechdesign.study import Study
 
@@ -63,6 +63,12 @@ class Dragged:
     names: tuple[str, ...] = ()
     why: str = ""
     across: str = ""
+
+    @property
+    def hint(self) -> str:
+        """What else the hand may do, in words."""
+        name = self.across.removeprefix("mechanism.")
+        return f"along its way it is driven; pull further across it for {name}" if name else ""
 
 
 @dataclass(frozen=True)
@@ -133,25 +139,6 @@ def _place(study: Study, row: float) -> float:
     return row % end if _goes_round(study) else min(max(row, 0.0), end)
 
 
-def free_numbers(study: Study) -> list[str]:
-    """Parameters and dimensions that are numbers of their own: they follow from nothing else in the study."""
-    parameters, places = study.parameters, study.mechanism.description.places
-    return [
-        name for name in parameters.names()
-        if name not in parameters.formulas and name not in parameters.dependent
-        and (name in parameters.nominal or places[name].path)
-    ]  # fmt: skip
-
-
-def value_of(study: Study, name: str) -> float:
-    """A parameter, a dimension or a number of the sketch of a study, in its units."""
-    if is_entry(name):
-        point, _, axis = name.removeprefix(f"{SKETCH}.").rpartition(".")
-        place = study.mechanism.description.sketch[point]
-        return place.imag if axis == "1" else place.real
-    return study.sizes[name] / study.parameters.factors.get(name, 1.0)
-
-
 @np.errstate(all="ignore")
 def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragged:
     """Change as few free numbers as bring a point to the hand, or as near as they can.
@@ -168,14 +155,14 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
     pose = _Pose.of(altered(original, changes), drag.row, changes)
     if not pose.valid:
         return _pivoted(original, pose, drag)
-    ways = {name: way for name, way in _ways(original, pose, drag) if abs(way).max() > _BLIND}
+    ways = _preferred(original, pose, drag)
     names: tuple[str, ...] = ()
     if _driven(pose.study, drag.point) and not _spans(ways):
-        far = max((abs(way[0]) for way in ways.values()), default=0.0)
-        names = tuple(name for name, way in ways.items() if abs(way[0]) >= _FULL * far)[:1]
-        ways |= _turning(original, pose, drag.point, drag.row)
+        far = max((abs(way) for way in ways.values()), default=0.0)
+        names = tuple(name for name, way in ways.items() if abs(way) >= _FULL * far)[:1]
+        ways |= _turning(original, pose, drag.point)
         if TURNED in ways and not set(drag.held).difference([TURNED]):
-            turned = _newton(original, changes, pose, {TURNED: drag.row}, drag)[0]
+            turned, _, _ = _newton(original, pose, (TURNED,), drag)
             if abs(turned.at(drag.point) - drag.target) <= drag.near:
                 return Dragged(changes, turned.row, (TURNED,), across="".join(names))
         names += (TURNED,) if TURNED in ways else ()
@@ -185,9 +172,7 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
         if f"{drag.point}.x" in original.motions["kinematics"].values:
             return Dragged(changes, drag.row, why=f"the motion of the study says where {drag.point} is")
         return Dragged(changes, drag.row, why=f"no number{locked} of its links moves {drag.point} at this pose")
-    begin = {name: drag.row if name == TURNED else value_of(pose.study, name) for name in names}
-    pose, values, why = _newton(original, changes, pose, begin, drag)
-    values.pop(TURNED, None)
+    pose, values, why = _newton(original, pose, names, drag)
     rounded = {name: _rounded(original, name, value, drag.resolution) for name, value in values.items()}
     try:
         if not pose.with_values(original, {**changes, **rounded}).valid:
@@ -199,22 +184,20 @@ def dragged(original: Study, changes: Mapping[str, float], drag: Drag) -> Dragge
 
 def _pivoted(original: Study, pose: _Pose, drag: Drag) -> Dragged:
     """The pivot that a hand holds where it is wanted: it has a place, also where the pose cannot be assembled."""
-    now, ways = pose.study.mechanism.nominal, dict[str, Complexes]()
+    now, ways = pose.study.mechanism.nominal, dict[str, complex]()
     at = [f"{GROUND}.{drag.point}.{axis}" for axis in "xy"]
     for name in [*_drawn(original, drag.point), *free_numbers(original)] if now.keys() >= {*at} else ():
         slopes = _slopes(original, pose, name)
         if name not in drag.locked and not slopes.keys().isdisjoint(at):
-            ways[name] = np.array([complex(*(float(slopes.get(place, 0.0)) for place in at))])
-    missing = drag.target - complex(*(now[place] for place in at)) if ways else 0j
+            ways[name] = complex(*(float(slopes.get(place, 0.0)) for place in at))
     names = tuple(ways)[:2]
     if not names:
         return Dragged(pose.changes, drag.row, why=f"the pose {pose.why}")
-    matrix = np.column_stack([_parts(ways[name]) for name in names])
-    step = np.linalg.lstsq(matrix, _parts(np.array([missing])), rcond=1e-6)[0]
+    step, _ = _nearest(ways, names, drag.target - complex(*(now[place] for place in at)))
     values = {
         name: _rounded(original, name, value_of(pose.study, name) + change, drag.resolution)
-        for name, change in zip(names, step.tolist(), strict=True)
-        if abs(ways[name][0] * change) > drag.resolution
+        for name, change in step.items()
+        if abs(ways[name] * change) > drag.resolution
     }
     changes = {**pose.changes, **values}
     there = _Pose.of(altered(original, changes), drag.row, changes)
@@ -222,29 +205,31 @@ def _pivoted(original: Study, pose: _Pose, drag: Drag) -> Dragged:
 
 
 def _newton(
-    original: Study, changes: Mapping[str, float], pose: _Pose, values: dict[str, float], drag: Drag
-) -> tuple[_Pose, dict[str, float], str]:
-    """Newton's method from a pose; steps into what cannot be assembled, or away from the hand, are halved."""
+    original: Study, pose: _Pose, names: Sequence[str], drag: Drag
+) -> tuple[_Pose, dict[str, float], str]:  # fmt: skip
+    """Newton's method from a pose by numbers, and with `TURNED` along the motion: the pose, the numbers, what stops it.
+
+    Steps into what cannot be assembled, or away from the hand, are halved.
+    """
     size, why, share = original.mechanism.size, "", 1.0
     tolerance = max(0.1 * drag.resolution, 1e-12 * size)
+    values = {name: value_of(pose.study, name) for name in names if name != TURNED}
     for _ in range(_MOST_STEPS):
         missing = drag.target - pose.at(drag.point)
         if abs(missing) <= tolerance:
             return pose, values, ""
-        ways = dict(_ways(original, pose, drag, [name for name in values if name != TURNED]))
-        ways |= _turning(original, pose, drag.point, values[TURNED]) if TURNED in values else {}
-        if ways.keys() != values.keys():
+        ways = {name: way for name, way, _ in _ways(original, pose, drag.point, values)}
+        ways |= _turning(original, pose, drag.point) if TURNED in names else {}
+        if ways.keys() != {*names}:
             break
-        matrix = np.column_stack([_parts(ways[name]) for name in values])
-        step = np.linalg.lstsq(matrix, _parts(np.array([missing])), rcond=1e-6)[0]
-        gone = float(np.abs(matrix @ step).max())
+        step, gone = _nearest(ways, names, missing)
         if gone <= tolerance:
             break
-        step *= share * min(1.0, _LONGEST * size / gone)
-        tried = {name: value + change for (name, value), change in zip(values.items(), step.tolist(), strict=True)}
-        row = _place(original, tried[TURNED]) if TURNED in tried else None
+        part = share * min(1.0, _LONGEST * size / gone)
+        tried = {name: value + part * step[name] for name, value in values.items()}
+        row = _place(original, pose.row + part * step[TURNED]) if TURNED in names else None
         try:
-            there = pose.with_values(original, {**changes, **{name: tried[name] for name in tried if name}}, row)
+            there = pose.with_values(original, {**pose.changes, **tried}, row)
             why = "" if there.valid else there.why
         except MechdesignError as error:
             there, why = pose, str(error).splitlines()[0].rpartition(": ")[2]
@@ -254,70 +239,74 @@ def _newton(
                 break
             continue
         pose, values, share = there, tried, min(1.0, 2 * share)
-        if row is not None:
-            values[TURNED] = row
     return pose, values, why
 
 
-def _ways(
-    original: Study, pose: _Pose, drag: Drag, only: Collection[str] | None = None
-) -> Iterator[tuple[str, Complexes]]:  # fmt: skip
-    """Where a point goes by each number of its links and guides, per unit of the number; the preferred ones first."""
-    study, mechanism = pose.study, pose.study.mechanism
-    owners, guides = {*mechanism.graph.links_at(drag.point)}, dict[str, str | None]()
-    for name, joint in mechanism.description.joints.items():
-        if isinstance(joint, Prismatic | Slot) and owners & {joint.line.link, getattr(joint, "slider", "")}:
-            guides[name] = f"{joint.line.link}.{joint.line.through}"
-
-    def rank(name: str) -> int:
-        """0 of a coordinate of the point itself, 1 of lengths, what has no place and a guide's point, else 2."""
-        point, _, axis = name.rpartition(".")
-        if axis in ("x", "y") and point not in guides.values():
-            return 0 if point.rpartition(".")[2] == drag.point else 2
-        return 2 if point in guides else 1
-
-    places = [
-        name for name, place in mechanism.description.places.items()
-        if place.quantity in ("length", "angle") and (
-            (place.path[:1] == ("links",) and place.path[1] in owners)
-            or (place.path[:1] == ("joints",) and place.path[1] in guides)
-            or name.rpartition(".")[0] in guides.values()
-        )
-    ]  # fmt: skip
-    if not places:
-        return
-    node = mechanism.graph.node(drag.point)
-    nodes = mechanism.linearize(pose.configuration).sensitivity(places).nodes[node]
-    by_place = dict(zip(places, np.broadcast_to(nodes, (len(places), 1)), strict=True))
-    exact = _by_drives(original)
-    kept = [name for name in drag.held if name] if len(drag.held) == 2 else ()
-    ways: list[tuple[int, str, Complexes]] = []
+def _preferred(original: Study, pose: _Pose, drag: Drag) -> dict[str, complex]:
+    """Where a point goes by each number that a drag may change, the preferred ones first."""
     drawn = _drawn(original, drag.point)
-    for name in only if only is not None else kept or [*drawn, *free_numbers(original)]:
-        if name in drag.locked or name in original.fixed or (name in study.parameters.measured and drawn):
-            continue
+    kept = [name for name in drag.held if name] if len(drag.held) == 2 else []
+    barred = {*drag.locked, *original.fixed, *(pose.study.parameters.measured if drawn else ())}
+    names = [name for name in kept or [*drawn, *free_numbers(original)] if name not in barred]
+
+    def rank(name: str, of_places: int) -> int:
+        return -1 if name in drag.held else 0 if name in drawn else of_places
+
+    ways = sorted(_ways(original, pose, drag.point, names), key=lambda way: rank(way[0], way[2]))
+    return {name: way for name, way, _ in ways if abs(way) > _BLIND}
+
+
+def _ways(
+    original: Study, pose: _Pose, point: str, names: Collection[str]
+) -> Iterator[tuple[str, complex, int]]:  # fmt: skip
+    """Where a point goes by each number that its links and guides follow, per unit of it; with the rank of these."""
+    mechanism = pose.study.mechanism
+    ranks = _ranks(mechanism, point)
+    if not ranks or not names:
+        return
+    nodes = mechanism.linearize(pose.configuration).sensitivity([*ranks]).nodes[mechanism.graph.node(point)]
+    moves = dict(zip(ranks, np.broadcast_to(nodes, (len(ranks), 1))[:, 0], strict=True))
+    exact = _by_drives(original)
+    for name in names:
         slopes = _slopes(original, pose, name)
-        moved = [place for place in slopes if place in by_place]
-        if moved or only is not None:
-            if exact:
-                way = sum((by_place[place] * slopes[place] for place in moved), start=np.zeros(1, dtype=complex))
-            else:
-                way = _way(original, pose, drag.point, name)
-            ways.append(
-                (-1 if name in drag.held else 0 if name in drawn else min(map(rank, moved), default=2), name, way)
-            )
-    yield from ((name, way) for _, name, way in (ways if only is not None else sorted(ways, key=lambda way: way[0])))
+        if moved := [place for place in slopes if place in ranks]:
+            way = sum(moves[place] * slopes[place] for place in moved) if exact else _way(original, pose, point, name)
+            yield name, complex(way), min(ranks[place] for place in moved)
 
 
-def _way(original: Study, pose: _Pose, point: str, name: str) -> Complexes:
+def _ranks(mechanism: Mechanism, point: str) -> dict[str, int]:
+    """Dimensions of a point's links, and of the guides along which these slide, by how soon a drag changes them.
+
+    0 of a coordinate of the point itself, 1 of lengths and of the point of a guide, 2 of what else a guide has and of
+    places of other points.
+    """
+    links, through = {*mechanism.graph.links_at(point)}, dict[str, str]()
+    for name, joint in mechanism.description.joints.items():
+        if isinstance(joint, Prismatic | Slot) and links & {joint.line.link, getattr(joint, "slider", "")}:
+            through[name] = f"{joint.line.link}.{joint.line.through}"
+    owners = {*(("links", link) for link in links), *(("joints", guide) for guide in through)}
+    ranks = dict[str, int]()
+    for name, place in mechanism.description.places.items():
+        owner, _, axis = name.rpartition(".")
+        guides = owner in through.values()
+        if place.quantity not in ("length", "angle") or not (place.path[:2] in owners or guides):
+            continue
+        if axis in ("x", "y") and not guides:
+            ranks[name] = 0 if owner.rpartition(".")[2] == point else 2
+        else:
+            ranks[name] = 2 if owner in through else 1
+    return ranks
+
+
+def _way(original: Study, pose: _Pose, point: str, name: str) -> complex:
     """Where a point goes by a number at a pose whose motion does not give the drives; by a difference."""
     value = value_of(pose.study, name)
     step = _STEP * (abs(value) or pose.study.mechanism.size)
     try:
         there = pose.with_values(original, {**pose.changes, name: value + step})
     except MechdesignError:
-        return np.full(1, np.nan + 0j)
-    return np.array([(there.at(point) - pose.at(point)) / step])
+        return complex(np.nan)
+    return (there.at(point) - pose.at(point)) / step
 
 
 def _drawn(study: Study, point: str) -> list[str]:
@@ -347,31 +336,30 @@ def _driven(study: Study, point: str) -> bool:
     return not links.isdisjoint(mechanism.graph.links_at(point))
 
 
-def _turning(original: Study, pose: _Pose, point: str, row: float) -> dict[str, Complexes]:
+def _turning(original: Study, pose: _Pose, point: str) -> dict[str, complex]:
     """Where a point goes along the motion, per row of it; nothing where that ends or stands still."""
-    ends = [_place(original, row + way * _BESIDE) for way in (-1, 1)]
+    ends = [_place(original, pose.row + way * _BESIDE) for way in (-1, 1)]
     low, high = (pose.of(pose.study, end) for end in ends)
     # Round the end of a closed motion a row is as long as elsewhere.
     span = 2 * _BESIDE if _goes_round(original) else ends[1] - ends[0]
     way = (high.at(point) - low.at(point)) / span
-    return {TURNED: np.array([way])} if np.isfinite(way) and abs(way) > _BLIND else {}
+    return {TURNED: way} if np.isfinite(way) and abs(way) > _BLIND else {}
 
 
-def _spans(ways: Mapping[str, Complexes]) -> bool:
+def _spans(ways: Mapping[str, complex]) -> bool:
     """Whether two of the ways lead anywhere in the plane."""
-    directions = [complex(way[0]) / abs(way[0]) for way in ways.values()]
+    directions = [way / abs(way) for way in ways.values()]
     return any(abs((one.conjugate() * other).imag) > _FULL for one, other in combinations(directions, 2))
 
 
-def _fewest(ways: Mapping[str, Complexes], missing: complex) -> tuple[str, ...]:
+def _fewest(ways: Mapping[str, complex], missing: complex) -> tuple[str, ...]:
     """The first number, else the first pair, that brings a point all the way; else what brings it nearest."""
     best: tuple[str, ...] = ()
-    want, least = _parts(np.array([missing])), math.inf
+    least = math.inf
     for count in (1, 2):
         for names in combinations(ways, count):
-            matrix = np.column_stack([_parts(ways[name]) for name in names])
-            left = want - matrix @ np.linalg.lstsq(matrix, want, rcond=1e-6)[0]
-            far = float(np.hypot(*left)) / (abs(missing) or 1.0)
+            step, _ = _nearest(ways, names, missing)
+            far = abs(missing - sum(ways[name] * step[name] for name in names)) / (abs(missing) or 1.0)
             if far <= _ALIKE:
                 return names
             if far < least - _ALIKE:
@@ -379,9 +367,11 @@ def _fewest(ways: Mapping[str, Complexes], missing: complex) -> tuple[str, ...]:
     return best
 
 
-def _parts(way: Any) -> Floats:
-    """Parts of a place along x and y."""
-    return np.array([way[0].real, way[0].imag])
+def _nearest(ways: Mapping[str, complex], names: Sequence[str], missing: complex) -> tuple[dict[str, float], float]:
+    """Changes of numbers that bring a point as near as they can to where it is missing, and how far it goes by them."""
+    matrix = np.array([[ways[name].real for name in names], [ways[name].imag for name in names]])
+    step: Floats = np.linalg.lstsq(matrix, [missing.real, missing.imag], rcond=1e-6)[0]
+    return dict(zip(names, step.tolist(), strict=True)), float(np.abs(matrix @ step).max())
 
 
 def _rounded(study: Study, name: str, value: float, resolution: float) -> float:

@@ -11,16 +11,17 @@ import numpy as np
 
 from mechdesign.commands import QUESTIONS
 from mechdesign.door.live import saving
-from mechdesign.door.live.altered import SKETCH, altered, is_entry
+from mechdesign.door.live.altered import SKETCH, altered, free_numbers, is_entry, value_of
 from mechdesign.door.live.answers import AS_IT_WAS, PACKAGE, ChangedAnswer, staged, titled
 from mechdesign.door.live.assembly import next_assembly
-from mechdesign.door.live.drag import TURNED, Drag, dragged, free_numbers, value_of
+from mechdesign.door.live.drag import TURNED, Drag, Dragged, dragged
 from mechdesign.door.live.fields import number_field
 from mechdesign.door.live.requests import RequestError, changes_of, number_of, numbers_of, sheet_of, texts_of
 from mechdesign.door.live.served import Actions, OvertakenError, ServedStudy
 from mechdesign.door.live.turned import motion_of, turning
 from mechdesign.door.report.page.dark import dark
 from mechdesign.door.report.page.headlines import shown
+from mechdesign.door.report.page.linkage import Canvas
 from mechdesign.door.report.page.moving import moving, posed
 from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.door.report.page.tracks import ROWS, steps
@@ -133,47 +134,42 @@ class Session(ServedStudy):
     @np.errstate(all="ignore")
     def move(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Positions with changed numbers, or with those that a drag changes; with ``wrong`` where there are none."""
-        study, changes, sheet = self.shown, changes_of(request), sheet_of(request, self.shown.mechanism.size)
+        changes, sheet = changes_of(request), sheet_of(request, self.shown.mechanism.size)
         self._page(request)
-        names: tuple[str, ...] = ()
-        why, row, hint = "", None, ""
-        if (drag := request.get("drag")) is not None:
-            if not isinstance(drag, Mapping):
-                raise RequestError
-            hand = Drag(
-                str(drag.get("point")), complex(*numbers_of(drag.get("to"), 2)), number_of(drag.get("row")),
-                texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
-                number_of(drag.get("near", 0)) / sheet.scale,
-            )  # fmt: skip
-            numbers = {TURNED, *study.parameters.names(), *self._entries()}
-            if hand.point not in study.mechanism.points or not numbers.issuperset(hand.held):
-                raise RequestError
-            done = dragged(study, changes, hand)
-            changes, names, why, row = dict(done.changes), done.names, done.why, done.row
-            if done.across:
-                hint = (
-                    f"along its way it is driven; pull further across it for {done.across.removeprefix('mechanism.')}"
-                )
-        count = int(number_of(request.get("poses")))
-        if not 0 < count <= _MOST_ROWS:
-            raise RequestError
-        now = altered(study, changes)
-        own = now if study is self.study else altered(self.study, self._own(changes))
-        rows = steps(str(request.get("rows")), count) / ROWS
-        drawing, tracks = posed(now, rows, sheet, study)
+        drag, rows = self._drag(request.get("drag"), sheet), _rows(request)
+        done = Dragged(changes, 0.0) if drag is None else dragged(self.shown, changes, drag)
+        now = altered(self.shown, done.changes)
+        own = now if self.shown is self.study else altered(self.study, self._own(done.changes))
+        drawing, tracks = posed(now, rows, sheet, self.shown)
         return {
-            "changes": changes, "names": names, "why": why, "row": row, "hint": hint, "drawing": drawing,
-            "data": titled(tracks), "missing": _missing(rows, tracks["gaps"]),
-            "set": saving.overrides(self.study, own), "words": [*self._words(names, changes, now)],
+            "changes": dict(done.changes), "names": done.names, "why": done.why, "row": done.row, "hint": done.hint,
+            "drawing": drawing, "data": titled(tracks), "missing": _missing(rows, tracks["gaps"]),
+            "set": saving.overrides(self.study, own), "words": [*self._words(done, now)],
         }  # fmt: skip
 
-    def _words(self, names: Sequence[str], changes: Mapping[str, float], now: Study) -> Iterator[str]:
+    def _drag(self, drag: Any, sheet: Canvas) -> Drag | None:
+        """What a hand holds in a drawing; None where it holds nothing."""
+        if drag is None:
+            return None
+        if not isinstance(drag, Mapping):
+            raise RequestError
+        hand = Drag(
+            str(drag.get("point")), complex(*numbers_of(drag.get("to"), 2)), number_of(drag.get("row")),
+            texts_of(drag.get("locked")), texts_of(drag.get("held")), _PIXEL / sheet.scale,
+            number_of(drag.get("near", 0)) / sheet.scale,
+        )  # fmt: skip
+        numbers = {TURNED, *self.shown.parameters.names(), *self._entries()}
+        if hand.point not in self.shown.mechanism.points or not numbers.issuperset(hand.held):
+            raise RequestError
+        return hand
+
+    def _words(self, done: Dragged, now: Study) -> Iterator[str]:
         """What a drag has changed, in words: its numbers, and what is measured in a sketch that it has moved."""
-        drawn = {*filter(is_entry, names)}
+        drawn = {*filter(is_entry, done.names)}
         if drawn:
-            before = altered(self.shown, {name: value for name, value in changes.items() if name not in drawn})
-        for name in (*names, *(free_numbers(self.shown) if drawn else ())):
-            moved = name in names or not math.isclose(now.sizes[name], before.sizes[name], abs_tol=_ALIKE)
+            before = altered(self.shown, {name: value for name, value in done.changes.items() if name not in drawn})
+        for name in (*done.names, *(free_numbers(self.shown) if drawn else ())):
+            moved = name in done.names or not math.isclose(now.sizes[name], before.sizes[name], abs_tol=_ALIKE)
             if name != TURNED and moved:
                 yield self._in_words(now, name)
 
@@ -247,6 +243,14 @@ class Session(ServedStudy):
         drawn = answer.pictures(progress.look)
         html = fragment("pictures.html.j2", PACKAGE, pictures=drawn)
         return {"html": html, "dark": dark(drawn.values())}
+
+
+def _rows(request: Mapping[str, Any]) -> Floats:
+    """The poses of the motion that a page draws."""
+    count = int(number_of(request.get("poses")))
+    if not 0 < count <= _MOST_ROWS:
+        raise RequestError
+    return steps(str(request.get("rows")), count) / ROWS
 
 
 def _missing(rows: Floats, gaps: Sequence[tuple[int, int, str]]) -> str:
