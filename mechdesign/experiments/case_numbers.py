@@ -11,7 +11,7 @@ from mechdesign.experiments.schema.matrix import Named
 from mechdesign.family.goals import Goal, goal
 from mechdesign.family.judge import Judgement, judge
 from mechdesign.ground.numerics.arrays import Flags, Floats
-from mechdesign.ground.rows import Chosen, UnknownColumnError
+from mechdesign.ground.rows import ChosenRows, UnknownColumnError
 from mechdesign.ground.terms import Sum, path_of, terms_of
 from mechdesign.motion.group import DesignGroup
 from mechdesign.study.schema.conditions import Requirement
@@ -75,7 +75,7 @@ def judged(group: DesignGroup, required: Sequence[Requirement]) -> tuple[Judgeme
     return judged, judged.met & ~partly, terms.unit
 
 
-def incomplete(group: DesignGroup, terms: Chosen | Sum) -> Flags:
+def incomplete(group: DesignGroup, terms: ChosenRows | Sum) -> Flags:
     """Designs of which poses, samples or a part of the motion are missing in what is judged."""
     if len(group.ends) == 1:
         return np.array([any(part.gaps for part in terms.parts)])
@@ -88,7 +88,7 @@ def _subject(requirement: Requirement) -> dict[str, Any]:
     return requirement.model_copy(update=limits).__dict__
 
 
-def _terms(group: DesignGroup, path: str, where: dict[str, Any]) -> Chosen | Sum:
+def _terms(group: DesignGroup, path: str, where: dict[str, Any]) -> ChosenRows | Sum:
     """The rows that a path names, of which each design has the same number, and at least one that counts."""
     terms, designs = terms_of(group.result, path, where), len(group.ends)
     if designs == 1 and terms.missing:

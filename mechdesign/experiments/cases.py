@@ -53,10 +53,10 @@ def answers(
     together = set(commands_of(study, results)) <= stacked.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
     batches = (cases[k : k + at_once] for k in range(begin, len(cases), at_once))
-    yield from map_chunks(Answer(study, tuple(results), cases[0]), shard.share(batches), jobs, travels=True)
+    yield from map_chunks(CaseRunner(study, tuple(results), cases[0]), shard.share(batches), jobs, travels=True)
 
 
-class Answer:
+class CaseRunner:
     """Answers cases of a study; numbers of entries that it leaves out are those of the `first` of them."""
 
     def __init__(self, study: Study, results: tuple[Goal, ...], first: Changes) -> None:

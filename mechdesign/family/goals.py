@@ -12,7 +12,7 @@ from mechdesign.family.judge import judge
 from mechdesign.ground.expressions import Expression
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.ground.results import Result
-from mechdesign.ground.rows import Chosen
+from mechdesign.ground.rows import ChosenRows
 from mechdesign.ground.statistics import STATISTICS, Request
 from mechdesign.ground.terms import Sum, command_of, path_of, terms_of
 from mechdesign.questions.optimize.schema import Containment, Outline
@@ -125,7 +125,7 @@ class Goal:
             rows = np.column_stack([rows, *between])
         return Scored(judged.values, rows)
 
-    def requests(self, chosen: Chosen) -> list[Request]:
+    def requests(self, chosen: ChosenRows) -> list[Request]:
         """How a column is followed between the poses; not at all where single poses are picked."""
         if chosen.picked:
             return []

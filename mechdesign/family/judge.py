@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.ground.numerics.rounding import cleared
-from mechdesign.ground.rows import Chosen
+from mechdesign.ground.rows import ChosenRows
 from mechdesign.ground.terms import Sum
 
 Bound = Floats | float | None
@@ -70,14 +70,14 @@ class Judgement:
 
 
 def judge(
-    terms: Chosen | Sum, bounds: Bounds, designs: int = 1, *, absolute: bool = False, assembled: bool = False,
+    terms: ChosenRows | Sum, bounds: Bounds, designs: int = 1, *, absolute: bool = False, assembled: bool = False,
     number: bool = False,
 ) -> Judgement:  # fmt: skip
     """Judge a result of designs by the worst of its rows and of the motion between them.
 
     Parameters
     ----------
-    terms : Chosen or Sum
+    terms : ChosenRows or Sum
         Of all designs, each with as many rows.
     absolute : bool
         Whether absolute values are judged.
@@ -94,7 +94,7 @@ def judge(
 
 
 def by_rows(
-    chosen: Chosen, bounds: Bounds, designs: int = 1, *, absolute: bool = False, assembled: bool = False
+    chosen: ChosenRows, bounds: Bounds, designs: int = 1, *, absolute: bool = False, assembled: bool = False
 ) -> Judgement:
     """Judge by the rows alone."""
     values, counts = chosen.shaped(designs, assembled=assembled)
@@ -112,7 +112,7 @@ def by_rows(
     return judged
 
 
-def along(judged: Judgement, chosen: Chosen, bounds: Bounds, *, absolute: bool = False) -> Judgement:
+def along(judged: Judgement, chosen: ChosenRows, bounds: Bounds, *, absolute: bool = False) -> Judgement:
     """Judge by the motion between the rows as well, where it is followed."""
     if not chosen.courses:
         return judged

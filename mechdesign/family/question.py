@@ -14,7 +14,7 @@ from mechdesign.family.goals import Goal, unit_of
 from mechdesign.ground.columns import Column
 from mechdesign.ground.errors import AssemblyError, Problem, StudyError
 from mechdesign.ground.results import Result
-from mechdesign.ground.rows import Chosen, UnknownColumnError
+from mechdesign.ground.rows import ChosenRows, UnknownColumnError
 from mechdesign.ground.statistics import Request
 from mechdesign.ground.terms import Sum, terms_of
 from mechdesign.questions.look import look
@@ -202,7 +202,7 @@ class DesignsQuestion:
         """Read the goals that are judged in tables of all designs at once; returns them."""
         study, poses = self.study, study_poses(self.study, command)
         result = stacked.tables(study, command, stacked.TABLES[command], poses).result
-        named: dict[Goal, Chosen | Sum] = {}
+        named: dict[Goal, ChosenRows | Sum] = {}
         for goal in goals:
             with suppress(UnknownColumnError):
                 named[goal] = _named(goal, result)
@@ -228,7 +228,7 @@ class DesignsQuestion:
             self._margins[command] = stacked.assembly_margins(study, poses, stack.solved).shape[1]
         return named
 
-    def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
+    def _count(self, goal: Goal, terms: ChosenRows | Sum, result: Result) -> Goal:
         """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
         self._bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
         self.units[bounded] = terms.unit
@@ -247,7 +247,7 @@ def regions_of(study: Study, goals: Sequence[Goal]) -> list[Question]:
     return questions(study, GRID_TOLERANCE, tuple(dict.fromkeys(("area", *whole)))) if regional else []
 
 
-def _named(goal: Goal, result: Result) -> Chosen | Sum:
+def _named(goal: Goal, result: Result) -> ChosenRows | Sum:
     """The rows, or the sum, that a goal names."""
     terms = terms_of(result, goal.column, dict(goal.where))
     if terms.missing:

@@ -22,7 +22,7 @@ from mechdesign.ground.statistics import (
     Request,
     RowSpread,
     Several,
-    Span,
+    ValueRange,
     no_value,
     no_value_along,
 )  # fmt: skip
@@ -40,7 +40,7 @@ class UnknownColumnError(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class ChosenRows:
     """A column and the rows of its table that count."""
 
     table: Table
@@ -61,7 +61,7 @@ class Chosen:
         return "" if pure else unit_of(self.table, self.column, self.counts)
 
     @property
-    def parts(self) -> tuple[Chosen, ...]:
+    def parts(self) -> tuple[ChosenRows, ...]:
         """The columns that it is made from: itself. A `Sum` has one for each term."""
         return (self,)
 
@@ -180,7 +180,7 @@ class Chosen:
         return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
 
 
-def choose(result: Result, path: str, where: Mapping[str, Any]) -> Chosen:
+def choose(result: Result, path: str, where: Mapping[str, Any]) -> ChosenRows:
     """Find a column and the rows in which others have the values of `where`, or lie in its spans.
 
     Parameters
@@ -210,10 +210,10 @@ def choose(result: Result, path: str, where: Mapping[str, Any]) -> Chosen:
     worded, picked = rows, False
     for name, value in where.items():
         if name not in table:
-            several = isinstance(value, Span) and table.name == "extremes"
+            several = isinstance(value, ValueRange) and table.name == "extremes"
             hint = "; name what is told of a column itself, as in kinematics.C.x.range" * several
             raise UnknownColumnError(_unknown("where", name, table.names) + hint)
-        if isinstance(value, Span):
+        if isinstance(value, ValueRange):
             part.append((name, _interval(value, table, name, counts)))
             counts = counts & part[-1][1].holds(table[name].astype(float))
             continue
@@ -230,7 +230,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any]) -> Chosen:
     if table.lacking is not None:
         numbers = np.where(table.lacking == "", numbers, np.nan)
     missing = "" if counts.any() or part else _missing(table, rows, where)
-    return Chosen(
+    return ChosenRows(
         table, column, numbers, counts, missing, statistic, tuple(part),
         f"{result.command}.{path}", picked, _strands(table, worded),
     )  # fmt: skip
@@ -290,7 +290,7 @@ def amount_in(value: Any, label: str, unit: str) -> float:
         raise UnknownColumnError(f"{label}: {error}") from None
 
 
-def _interval(span: Span, table: Table, name: str, rows: Flags) -> Interval:
+def _interval(span: ValueRange, table: Table, name: str, rows: Flags) -> Interval:
     """A span in the unit that a column has in some rows, the same in all of them."""
     if not table.column(name).numeric:
         raise UnknownColumnError(f"where: column {name!r} of {table.name} holds words, which have no range")

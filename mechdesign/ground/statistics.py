@@ -165,7 +165,7 @@ class Interval(NamedTuple):
 
 
 @runtime_checkable
-class Span(Protocol):
+class ValueRange(Protocol):
     """Values from one to another, such as `mechdesign.study.schema.conditions.Span`."""
 
     def interval(self, unit: str) -> Interval:

@@ -15,7 +15,7 @@ from mechdesign.ground.expressions import Expression
 from mechdesign.ground.notation import ExpressionError
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.results import Result
-from mechdesign.ground.rows import Chosen, UnknownColumnError, amount_in, choose, named
+from mechdesign.ground.rows import ChosenRows, UnknownColumnError, amount_in, choose, named
 
 # The path of one column.
 _PATH = re.compile(r"[\w.]+")
@@ -28,7 +28,7 @@ class Sum:
     """A sum of multiples of numbers of a result, all of one unit."""
 
     expression: Expression
-    terms: Mapping[str, Chosen]  # by the names in the expression
+    terms: Mapping[str, ChosenRows]  # by the names in the expression
 
     @property
     def unit(self) -> str:
@@ -36,11 +36,11 @@ class Sum:
         return next(iter(self.terms.values())).unit
 
     def bound(self, value: float) -> float:
-        """A bound in the unit of the terms; see `Chosen.bound`."""
+        """A bound in the unit of the terms; see `ChosenRows.bound`."""
         return amount_in(value, self.expression.text, self.unit)
 
     @property
-    def parts(self) -> tuple[Chosen, ...]:
+    def parts(self) -> tuple[ChosenRows, ...]:
         """The columns that it is made from, one for each term."""
         return (*self.terms.values(),)
 
@@ -50,7 +50,7 @@ class Sum:
         return next(filter(None, (term.missing for term in self.parts)), "")
 
     def numbers(self, designs: int = 1, *, assembled: bool = False) -> Floats:
-        """The sum of each design, shape (designs,); see `Chosen.numbers`."""
+        """The sum of each design, shape (designs,); see `ChosenRows.numbers`."""
         numbers = {name: term.numbers(designs, assembled=assembled) for name, term in self.terms.items()}
         return np.asarray(self.expression.evaluate(numbers), dtype=float)
 
@@ -84,7 +84,7 @@ def sum_of(text: str) -> Expression | None:
     return expression
 
 
-def terms_of(result: Result, path: str, where: Mapping[str, Any]) -> Chosen | Sum:
+def terms_of(result: Result, path: str, where: Mapping[str, Any]) -> ChosenRows | Sum:
     """The column that a path names, or the sum of numbers of several columns.
 
     Raises

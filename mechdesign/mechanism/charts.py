@@ -30,7 +30,7 @@ from mechdesign.mechanism.structure import Structure
 Sides = tuple[tuple[tuple[Step, ...], float], ...]
 
 
-class Positions:
+class ChartPositions:
     """Angles of the classes, each that of its first body, and slides of a mechanism.
 
     Angles of `coordinates` are reported in the turns that they have on the way from a pose `at`.
@@ -108,7 +108,7 @@ class Chart:
         If they do not determine it.
     """
 
-    def __init__(self, positions: Positions, rows: Sequence[int], couplings: Sequence[Coupled]) -> None:
+    def __init__(self, positions: ChartPositions, rows: Sequence[int], couplings: Sequence[Coupled]) -> None:
         self.positions, self.rows = positions, np.array(rows, dtype=int)
         mechanism = positions.mechanism
         given = [positions.coordinates[row] for row in rows]
@@ -172,7 +172,7 @@ def regularity(linear: Linearization) -> Floats:
 class Charts:
     """Charts of a mechanism, compiled where they are wanted."""
 
-    def __init__(self, positions: Positions) -> None:
+    def __init__(self, positions: ChartPositions) -> None:
         self.positions = positions
         self._charts: dict[tuple[tuple[int, ...], Sides], Chart | None] = {}
         laws = corners_of(coupling.function for coupling in positions.mechanism.couplings)

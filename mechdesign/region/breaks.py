@@ -21,7 +21,7 @@ from mechdesign.ground.numerics.roots import bracketed_roots
 from mechdesign.mechanism.algebra import picked
 from mechdesign.region.field import Places
 from mechdesign.region.intervals import Intervals
-from mechdesign.region.rays import Designs, trace
+from mechdesign.region.rays import Scanned, trace
 
 # Panel ends nearer to each other than this angle (radians) are one: rounding hides what lies between them.
 TOGETHER = 1e-7
@@ -80,7 +80,7 @@ def signatures(intervals: Intervals, margins: int) -> Ints:
 
 
 def all_breaks(
-    designs: Designs, reach: Floats, intervals: Intervals, design: Ints, angle: Floats
+    designs: Scanned, reach: Floats, intervals: Intervals, design: Ints, angle: Floats
 ) -> tuple[Ints, Floats]:
     """All breaks between neighbouring rays of a design that differ, also where several lie between two rays.
 
@@ -243,7 +243,7 @@ def _closing(longer: tuple[list[int], Floats], shorter: tuple[list[int], Floats]
 
 
 def _solve(
-    designs: Designs, meetings: Meetings, design: Ints, begin: Floats, end: Floats, reach: Floats
+    designs: Scanned, meetings: Meetings, design: Ints, begin: Floats, end: Floats, reach: Floats
 ) -> tuple[Ints, Floats]:
     """Pairs and angles of the meetings that take place between their two rays.
 
@@ -284,7 +284,7 @@ def _solve(
 
 
 def _residual(
-    designs: Designs, meetings: Meetings, theta: Floats, radius: Floats, reach: Floats, places: Places, assembly: bool
+    designs: Scanned, meetings: Meetings, theta: Floats, radius: Floats, reach: Floats, places: Places, assembly: bool
 ) -> Floats:
     """Residuals at angles `theta` that are zero where the two ends meet, shape (meetings,).
 

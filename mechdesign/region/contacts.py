@@ -13,7 +13,7 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.ground.numerics.roots import AROUND, lowest_near, parabola
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import BATCH, Designs, is_turn, trace
+from mechdesign.region.rays import BATCH, Scanned, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape
 
 # Places of an outline in its final check.
@@ -64,7 +64,7 @@ class Contacts:
         every = panels.designs
         centre: Complexes = np.asarray(shape.centre, dtype=complex)
         self._shape, self._centre = shape, centre
-        self._designs: Designs = replace(
+        self._designs: Scanned = replace(
             every, places=every.of(design), count=len(design), centres=centre, effort=BATCH
         )  # fmt: skip
         self._reach = np.abs(centre - every.about) + panels.reach[design]
@@ -211,7 +211,7 @@ def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
     return turn[row + np.arange(3)[:, None, None], lanes], np.where(missing, np.inf, beside)
 
 
-def within_scan(designs: Designs, z: Complexes, theta: Floats) -> tuple[Floats, Floats]:
+def within_scan(designs: Scanned, z: Complexes, theta: Floats) -> tuple[Floats, Floats]:
     """Distances at which rays enter and leave a scan of less than a turn for the first time; infinite where never."""
     first, last = (np.exp(-1j * angle) for angle in designs.scan)
     way, step = np.broadcast_arrays(z - designs.about, np.exp(1j * theta))

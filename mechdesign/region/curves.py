@@ -10,7 +10,7 @@ from mechdesign.motion.rows import Poses
 from mechdesign.motion.rules import GivenRows, Sector, Sectors
 from mechdesign.region.patches import GRID, patches
 from mechdesign.region.pieces import counted
-from mechdesign.region.rays import SINGLE, Designs
+from mechdesign.region.rays import SINGLE, Scanned
 from mechdesign.region.regions import RAYS, regions
 from mechdesign.study import Study
 
@@ -44,7 +44,7 @@ def workspace_nodes(study: Study) -> Poses:
     held: dict[str, list[Floats]] = {name: [] for name in all_regions[0].held}
     for region in all_regions:
         # Poses of other questions keep the sketch's elbows, in any assembly as well.
-        panels, _ = counted(Designs(region.field.members[0], {}, 1, region.about, region.scan, SINGLE))
+        panels, _ = counted(Scanned(region.field.members[0], {}, 1, region.about, region.scan, SINGLE))
         if not panels.closes[0]:
             continue
         rays = region.rays or RAYS

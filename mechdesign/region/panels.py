@@ -17,7 +17,7 @@ from mechdesign.region.crossings import resolved
 from mechdesign.region.field import ROUNDING
 from mechdesign.region.intervals import SAME_ROOT, Intervals, joined
 from mechdesign.region.raster import Raster
-from mechdesign.region.rays import Designs, ray_through, trace
+from mechdesign.region.rays import Scanned, ray_through, trace
 from mechdesign.region.rules import cubic, spread
 
 # Largest number of times that the reach is doubled.
@@ -55,7 +55,7 @@ class Panels:
         Area between rays of which it stays undecided whether their intervals go on between them.
     """
 
-    designs: Designs
+    designs: Scanned
     design: Ints
     low: Floats
     high: Floats
@@ -90,7 +90,7 @@ class Panels:
         return theta, traced, on_scan[traced.ray] & (traced.inner <= distance) & (distance <= traced.outer)
 
 
-def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
+def find_panels(designs: Scanned, cuts: tuple[float, ...] = ()) -> Panels:
     """Divide the scan of every design into panels; `cuts` are further angles where panels end.
 
     Raises
@@ -151,7 +151,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
                   undecided)  # fmt: skip
 
 
-def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:
+def _rays(designs: Scanned, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:
     """Rays that miss no piece and no hole that the raster shows: design and angle of each, reach, and intervals.
 
     The reach is of shape (designs,).
@@ -179,7 +179,7 @@ def _with_rays(design: Ints, angle: Floats, owner: Ints, place: Floats) -> tuple
 
 
 def _along_ends(
-    designs: Designs, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
+    designs: Scanned, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
 ) -> tuple[Ints, Floats, Flags, Floats]:
     """Further rays of panels whose rays are `alike`, where the ends of their intervals may not go on between them.
 
@@ -264,7 +264,7 @@ def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats, together:
     return owner[:-1][keep], place[:-1][keep], place[1:][keep]
 
 
-def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> tuple[Floats, Intervals]:
+def _extent(designs: Scanned, design: Ints, theta: Floats, reach: Floats) -> tuple[Floats, Intervals]:
     """The reach that each design needs, doubled until no ray ends inside, and the intervals of all rays."""
     for _ in range(DOUBLINGS):
         intervals = trace(designs, design, theta, reach[design])

@@ -18,7 +18,7 @@ from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import MIDDLE, Panels, find_panels
-from mechdesign.region.rays import Designs, is_turn
+from mechdesign.region.rays import Scanned, is_turn
 from mechdesign.region.rules import cubic, spread
 
 # Distances of rays from the end of a panel (radians), tried one after the other until a ray meets as many intervals as
@@ -257,7 +257,7 @@ class _OnePiece(Panels):
         return traced.kept((piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0)))
 
 
-def counted(designs: Designs, cuts: tuple[float, ...] = ()) -> tuple[Panels, Pieces | None]:
+def counted(designs: Scanned, cuts: tuple[float, ...] = ()) -> tuple[Panels, Pieces | None]:
     """The panels that count, of the first piece of each design or of all pieces in any assembly, and the pieces.
 
     Several designs whose pieces all count are not divided: None. `cuts` and errors as in `find_panels`.

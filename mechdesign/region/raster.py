@@ -16,7 +16,7 @@ from mechdesign.ground.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.ground.numerics.roots import AROUND, lowest_near
 from mechdesign.region.crossings import passed
 from mechdesign.region.intervals import Intervals
-from mechdesign.region.rays import Designs, ray_through
+from mechdesign.region.rays import Scanned, ray_through
 
 # Fraction by which a box is widened, so that rounding leaves no part of the region outside.
 ROOM = 1e-6
@@ -58,7 +58,7 @@ class Raster:
         Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
     """
 
-    designs: Designs
+    designs: Scanned
     low: Complexes
     cell: Complexes
     inside: Flags
@@ -67,7 +67,7 @@ class Raster:
     cut: Flags
 
     @staticmethod
-    def of(designs: Designs) -> Raster:
+    def of(designs: Scanned) -> Raster:
         """Compute the margins at the centres of all cells of each design, `effort.cells` in x and in y."""
         cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
@@ -105,7 +105,7 @@ class Raster:
         )  # fmt: skip
 
     def _thin(
-        self, mode: Designs, designs: Ints, place: Complexes, margins: Floats, away: Floats, inside: Flags,
+        self, mode: Scanned, designs: Ints, place: Complexes, margins: Floats, away: Floats, inside: Flags,
         scanned: Flags,
     ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
@@ -136,7 +136,7 @@ class Raster:
         return np.concatenate([cell_design[hit], design[left]]), np.concatenate([witness[hit], place[left]])
 
     def _between_centres(
-        self, mode: Designs, designs: Ints, z: Complexes, margins: Floats, inside: Flags
+        self, mode: Scanned, designs: Ints, z: Complexes, margins: Floats, inside: Flags
     ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places of holes between centres: a margin is negative there, but at no centre around.
 
@@ -310,7 +310,7 @@ def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:
     return holds
 
 
-def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
+def _box(designs: Scanned) -> tuple[Complexes, Complexes, Flags]:
     """Lower left and upper right corners of a box for each design, shape (designs,), and whether it holds the region.
 
     The box follows from the lengths of links, the strokes and the limits of distances alone: two points of a link are

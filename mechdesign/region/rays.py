@@ -85,7 +85,7 @@ def ray_through(offset: Complexes, start: float) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Designs:
+class Scanned:
     """Several designs of one mechanism, scanned about one point.
 
     Parameters
@@ -111,13 +111,13 @@ class Designs:
     centres: Complexes | None = None
 
     @cached_property
-    def members(self) -> tuple[Designs, ...]:
+    def members(self) -> tuple[Scanned, ...]:
         """The same designs in each mode of the field."""
         several = self.field.members if len(self.field.members) > 1 else ()
         return tuple(replace(self, field=member) for member in several) or (self,)
 
     @cached_property
-    def in_any_assembly(self) -> Designs:
+    def in_any_assembly(self) -> Scanned:
         """The same designs without the margins of the assembly."""
         return replace(self, field=replace(self.field, same_assembly=False)) if self.field.same_assembly else self
 
@@ -237,7 +237,7 @@ class Designs:
         return shortened(intervals, sampled[less], remaining, NARROWEST * reach)
 
 
-def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float = 0.0) -> Intervals:
+def trace(designs: Scanned, design: Ints, theta: Floats, reach: Floats, slack: float = 0.0) -> Intervals:
     """Intersect rays with the region.
 
     Parameters

@@ -23,7 +23,7 @@ RAYS = 181
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class PlanarRegion:
     """A region of the plane: where a point can be while the other degrees of freedom are held.
 
     Parameters
@@ -64,7 +64,7 @@ class Region:
         return {**numbers.places, **varying}
 
 
-def regions(study: Study) -> list[Region]:
+def regions(study: Study) -> list[PlanarRegion]:
     """A region for each combination of the values of ``at``.
 
     Raises
@@ -107,7 +107,7 @@ def regions(study: Study) -> list[Region]:
     about = at_sketch if section.scan.about is None else complex(*section.scan.about)
     factors = [unit if c.quantity == "angle" else 1.0 for c in plan.structure.given[2:]]
     return [
-        Region(
+        PlanarRegion(
             whole(replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True)))),
             dict(zip(section.at, values, strict=True)), about, scan, section.scan.rays, factors,
         )

@@ -18,7 +18,7 @@ from mechdesign.ground.results import Result
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.local import Local
 from mechdesign.questions.workspace.question import questions
-from mechdesign.region.rays import BATCH, Designs
+from mechdesign.region.rays import BATCH, Scanned
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"
 DESIGNS = 4556
@@ -30,7 +30,7 @@ def test_all_designs(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     nodes, seconds = [], []
     on_rays = Local.on_rays
 
-    def counted(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:
+    def counted(designs: Scanned, design: Ints, theta: Floats, radius: Floats) -> Local:
         nodes.append(radius.size)
         return on_rays(designs, design, theta, radius)
 

@@ -12,7 +12,7 @@ from mechdesign.ground.numerics.statistics import rectangle_failure
 from mechdesign.questions.reliability.circles import disc_failure, disc_failures
 from mechdesign.questions.reliability.engine.problem import Estimate, binomial
 from mechdesign.questions.reliability.first_order import correlation
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.probability import estimated_failure, failure_probability
 
 
@@ -63,17 +63,18 @@ def test_disc_of_an_error_along_one_line() -> None:
 
 
 def test_one_sided_limit() -> None:
-    assert failure_probability(np.array([[0.04]]), [Limit((0,), -np.inf, 0.5)]) == pytest.approx(ndtr(-2.5), rel=1e-14)
+    failure = failure_probability(np.array([[0.04]]), [ErrorBound((0,), -np.inf, 0.5)])
+    assert failure == pytest.approx(ndtr(-2.5), rel=1e-14)
 
 
 def test_three_limits_by_the_lattice() -> None:
     covariance = np.array([[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 4.0]])
-    bands, third = [Limit((0,), -2.0, 2.0), Limit((1,), -2.0, 2.5)], Limit((2,), -6.0, 6.0)
+    bands, third = [ErrorBound((0,), -2.0, 2.0), ErrorBound((1,), -2.0, 2.5)], ErrorBound((2,), -6.0, 6.0)
     pair, single = failure_probability(covariance, bands), failure_probability(covariance, [third])
     together = failure_probability(covariance, [*bands, third])
     assert together == pytest.approx(pair + single - pair * single, rel=1e-4)
-    disc = failure_probability(covariance, [Limit((0, 1), -np.inf, 2.0)])
-    mixed = failure_probability(covariance, [third, Limit((0, 1), -np.inf, 2.0)])
+    disc = failure_probability(covariance, [ErrorBound((0, 1), -np.inf, 2.0)])
+    mixed = failure_probability(covariance, [third, ErrorBound((0, 1), -np.inf, 2.0)])
     assert mixed == pytest.approx(disc + single - disc * single, rel=1e-4)
 
 
@@ -84,13 +85,13 @@ def test_three_limits_of_errors_with_two_sources(limit: float) -> None:
     turn = 2 * np.pi * (np.arange(200_000) + 0.5) / 200_000
     reach = limit / np.abs(slopes @ np.stack([np.cos(turn), np.sin(turn)])).max(axis=0)
     exact = np.mean(np.exp(-0.5 * reach**2))
-    bands = [Limit((k,), -limit, limit) for k in range(3)]
+    bands = [ErrorBound((k,), -limit, limit) for k in range(3)]
     assert failure_probability(slopes @ slopes.T, bands) == pytest.approx(exact, rel=3e-3)
 
 
 def test_an_error_that_does_not_vary_keeps_its_limit() -> None:
     covariance = np.diag([1.0, 0.0])
-    bands = [Limit((0,), -2.0, 2.0), Limit((1,), -0.1, 0.1)]
+    bands = [ErrorBound((0,), -2.0, 2.0), ErrorBound((1,), -0.1, 0.1)]
     assert failure_probability(covariance, bands) == pytest.approx(2 * ndtr(-2.0), rel=1e-14)
     assert np.isnan(correlation(covariance))
 
@@ -142,13 +143,13 @@ def test_disc_about_another_place_than_the_mean(covariance: np.ndarray, mean: tu
 
 def test_limits_about_another_place_than_the_mean() -> None:
     covariance, mean = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([0.4, -0.7])
-    one, two = Limit((0,), -2.0, 3.0), Limit((1,), -4.0, 2.0)
-    moved = [Limit((0,), -2.4, 2.6), Limit((1,), -3.3, 2.7)]
+    one, two = ErrorBound((0,), -2.0, 3.0), ErrorBound((1,), -4.0, 2.0)
+    moved = [ErrorBound((0,), -2.4, 2.6), ErrorBound((1,), -3.3, 2.7)]
     assert failure_probability(covariance, (one, two), mean) == failure_probability(covariance, moved)
     # By the lattice, which takes bands and discs together.
-    disc = Limit((0, 1), -np.inf, 2.5)
+    disc = ErrorBound((0, 1), -np.inf, 2.5)
     alone = disc_failure(covariance, 2.5, mean)
-    wide = (Limit((0,), -50.0, 50.0),)
+    wide = (ErrorBound((0,), -50.0, 50.0),)
     assert failure_probability(covariance, (*wide, disc), mean) == pytest.approx(alone, rel=1e-4)
 
 
@@ -157,14 +158,14 @@ def test_a_circle_beside_an_idle_limit_is_the_circle_however_rare(radius: float,
     covariance = np.array([[1.0, rho, 0.1], [rho, 1.0, 0.0], [0.1, 0.0, 1.0]])
     mean = np.array([0.2, -0.1, 0.0])
     alone = disc_failure(covariance[:2, :2], radius, mean[:2])
-    beside = failure_probability(covariance, (Limit((2,), -50.0, 50.0), Limit((0, 1), -np.inf, radius)), mean)
+    beside = failure_probability(covariance, (ErrorBound((2,), -50.0, 50.0), ErrorBound((0, 1), -np.inf, radius)), mean)
     assert beside == pytest.approx(alone, rel=1e-9)
 
 
 def test_a_circle_beside_a_limit_that_counts_as_well() -> None:
     """Independent of each other: 1 - (1 - p)(1 - q)."""
     p, q = disc_failure(np.eye(2), 6.0), 2 * ndtr(-5.5)
-    found = failure_probability(np.eye(3), (Limit((2,), -5.5, 5.5), Limit((0, 1), -np.inf, 6.0)))
+    found = failure_probability(np.eye(3), (ErrorBound((2,), -5.5, 5.5), ErrorBound((0, 1), -np.inf, 6.0)))
     assert found == pytest.approx(p + q, rel=1e-7)
 
 
@@ -191,7 +192,7 @@ def test_a_circle_beside_another_output_is_the_sum_over_the_disc_however_it_is_t
         turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         found, doubt = estimated_failure(
             turned @ covariance @ turned.T,
-            [Limit((2,), -limit, limit), Limit((0, 1), least, radius)],
+            [ErrorBound((2,), -limit, limit), ErrorBound((0, 1), least, radius)],
             turned @ mean,
         )
         assert found == pytest.approx(1 - kept, rel=1e-8, abs=1e-12)
@@ -202,7 +203,7 @@ def test_a_circle_beside_another_output_is_the_sum_over_the_disc_however_it_is_t
 def test_a_circle_beside_one_of_its_own_coordinates_ends_at_a_straight_line(across: float) -> None:
     """Errors along x, and hardly across it: within the circle and the band is |x| below the smaller."""
     root = np.array([[1.0, 0.0], [0.0, across], [1.0, 0.0]])
-    found = failure_probability(root @ root.T, [Limit((2,), -1.2, 1.5), Limit((0, 1), -np.inf, 1.8)])
+    found = failure_probability(root @ root.T, [ErrorBound((2,), -1.2, 1.5), ErrorBound((0, 1), -np.inf, 1.8)])
     if across < 1:
         assert found == pytest.approx(ndtr(-1.2) + ndtr(-1.5), rel=3 * across**2 + 1e-10)
     else:
@@ -220,12 +221,12 @@ def test_the_interval_of_many_limits_holds_what_is_exact(limit: float) -> None:
     turn = 2 * np.pi * (np.arange(100_000) + 0.5) / 100_000
     reach = limit / np.abs(slopes @ np.stack([np.cos(turn), np.sin(turn)])).max(axis=0)
     exact = np.mean(np.exp(-0.5 * reach**2))
-    found, doubt = estimated_failure(slopes @ slopes.T, [Limit((k,), -limit, limit) for k in range(3)])
+    found, doubt = estimated_failure(slopes @ slopes.T, [ErrorBound((k,), -limit, limit) for k in range(3)])
     assert abs(found - exact) <= doubt <= 0.02 * exact
     circle, band = np.exp(-0.5 * limit**2), 2 * ndtr(-limit)
     exact = 1 - (1 - circle) ** 2 * (1 - band)
     found, doubt = estimated_failure(
-        np.eye(5), [Limit((4,), -limit, limit), *(Limit(pair, -np.inf, limit) for pair in ((0, 1), (2, 3)))]
+        np.eye(5), [ErrorBound((4,), -limit, limit), *(ErrorBound(pair, -np.inf, limit) for pair in ((0, 1), (2, 3)))]
     )
     assert abs(found - exact) <= doubt <= 0.05 * exact
 

@@ -13,7 +13,7 @@ import mechdesign
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.panels import find_panels
-from mechdesign.region.rays import BATCH, SINGLE, Designs, Effort, trace
+from mechdesign.region.rays import BATCH, SINGLE, Effort, Scanned, trace
 
 ARM = """
 units: {length: dimensionless}
@@ -232,7 +232,7 @@ def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effor
     about, one, other, hole, reach = 0.05 + 0.45j, -0.15, 0.15, 0.15, 0.65
     study = study_of(FIVE_BAR, f"workspace.assembly={assembly}", "workspace.scan.about=[0.05, 0.45]")
     question = questions(study)[0]
-    panels = find_panels(Designs(question.field, {}, 1, about, question.scan, effort))
+    panels = find_panels(Scanned(question.field, {}, 1, about, question.scan, effort))
     ends = np.concatenate([panels.low, panels.high])
     touching = [np.angle(one - about) - np.arcsin(hole / abs(one - about)),
                 np.angle(other - about) + np.arcsin(hole / abs(other - about))]  # fmt: skip
@@ -263,7 +263,7 @@ def test_few_samples_find_a_gap_between_them() -> None:
     question, about = questions(study)[0], 0.2267883835941191j
     zero, angle, reach = np.zeros(1, dtype=np.intp), np.array([4.377794174748168]), np.array([1.2])
     few, many = (
-        trace(Designs(question.field, {}, 1, about, question.scan, effort), zero, angle, reach)
+        trace(Scanned(question.field, {}, 1, about, question.scan, effort), zero, angle, reach)
         for effort in (BATCH, SINGLE)
     )
     assert len(many.inner) == 3

@@ -10,7 +10,7 @@ from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 
 import mechdesign
-from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
+from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, CasePlane, Gates
 from mechdesign.experiments.figures.sweep.quantities import CaseAxis, sample
 from tests.unit.test_cases import SLIDER_CRANK
 
@@ -59,7 +59,7 @@ def test_hatched_is_where_what_is_required_is_not_met():
     met[0] = False
     table = mechdesign.Table("sweep", (mechdesign.Column("s_met", r > 35.05), mechdesign.Column("q_met", met)))
     limited = [axis("s", 2 * r, low=70.1), axis("q", np.where(met, r + length, np.nan), high=160.03)]
-    plane = Plane.of(axis("r", r), axis("l", length), others=False)
+    plane = CasePlane.of(axis("r", r), axis("l", length), others=False)
     assert plane is not None
     gates = Gates.of(plane, limited, table)
     x, y = np.meshgrid(*plane.fine)
@@ -73,7 +73,7 @@ def test_hatched_is_where_what_is_required_is_not_met():
 
 def test_over_other_entries_a_map_has_what_is_best_of_the_cases_that_count():
     x, y, z = (values.ravel() for values in np.meshgrid([0.0, 1.0], [0.0, 2.0], [1.0, 2.0, 4.0]))
-    plane = Plane.of(axis("x", x), axis("y", y), others=True)
+    plane = CasePlane.of(axis("x", x), axis("y", y), others=True)
     assert plane is not None
     counted = z < 3
     shown = {word: plane.field(10 * x + z, counted, reduction) for reduction, word in REDUCTIONS.values()}
@@ -99,7 +99,7 @@ def test_titles_say_what_is_shown_of_other_entries():
 
 def test_cases_scattered_over_three_entries_are_gathered_in_classes():
     x, y = np.random.default_rng(5).random((2, 2000))
-    plane = Plane.of(axis("x", x), axis("y", y), others=True)
+    plane = CasePlane.of(axis("x", x), axis("y", y), others=True)
     assert plane is not None
     assert 3 <= plane.classes < 20
     field = plane.field(x, np.ones(len(x), dtype=bool), REDUCTIONS[0][0])
@@ -109,7 +109,7 @@ def test_cases_scattered_over_three_entries_are_gathered_in_classes():
 def test_triangles_between_scattered_cases_follow_a_plane_and_leave_out_what_failed():
     x, y = np.random.default_rng(6).random((2, 60)) * [[1.0], [1000.0]]
     values = 3 * x - 0.002 * y
-    plane = Plane.of(axis("x", x), axis("y", y), others=False)
+    plane = CasePlane.of(axis("x", x), axis("y", y), others=False)
     assert plane is not None
     every = np.ones(60, dtype=bool)
     field = plane.field(values, every, REDUCTIONS[0][0])
@@ -127,7 +127,7 @@ def test_there_is_no_map_of_one_number_that_varies(vary):
 
 
 def test_cases_on_a_line_span_no_map():
-    assert Plane.of(axis("x", [0, 1, 2]), axis("y", [5, 6, 7]), others=False) is None
+    assert CasePlane.of(axis("x", [0, 1, 2]), axis("y", [5, 6, 7]), others=False) is None
 
 
 @pytest.mark.nightly

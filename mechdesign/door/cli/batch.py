@@ -16,7 +16,7 @@ from pathlib import Path
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.door.cli import places, terminal
 from mechdesign.door.cli.annotations import annotate, of_warnings
-from mechdesign.door.cli.batch_record import BatchRecord, End, Said, Task, failure
+from mechdesign.door.cli.batch_record import BatchRecord, End, Said, StudyTask, failure
 from mechdesign.door.cli.docs import explained
 from mechdesign.door.cli.execution import (
     HERE,
@@ -131,9 +131,9 @@ def answer_all(paths: Sequence[Path] | None, options: Options, only: Sequence[st
 
 def _read(
     paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str], *, several: bool
-) -> list[Task]:
+) -> list[StudyTask]:
     """Read and check the studies; only their texts are kept."""
-    tasks: list[Task] = []
+    tasks: list[StudyTask] = []
     inputs: list[Path] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
@@ -150,7 +150,7 @@ def _read(
                 study = load_source(origin, own)
             folders = _places(only or questions(study), root, own)
             inputs += manifest.read_by(study)
-            tasks.append(Task(number, origin, label, root, folders, own))
+            tasks.append(StudyTask(number, origin, label, root, folders, own))
         except Exception as error:
             record.missing(number, failure(label, "check", Path(), error, study))
             if record.stopped:
@@ -159,7 +159,7 @@ def _read(
     return [task for task in tasks if not record.stopped and _free(task, inputs, record)]
 
 
-def _free(task: Task, inputs: Sequence[Path], record: BatchRecord) -> bool:
+def _free(task: StudyTask, inputs: Sequence[Path], record: BatchRecord) -> bool:
     """Whether a study's results replace no files of others, and none that one of the studies reads."""
     try:
         places.check_reports(task.root, task.options, inputs)
@@ -199,7 +199,7 @@ def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tupl
     return tuple(question for question in folders if shards.files_in(question[1])) or folders
 
 
-def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:
+def _answer(tasks: Sequence[StudyTask], options: Options, record: BatchRecord) -> None:
     """Answer the questions of the studies, in parallel if there are several.
 
     Raises
@@ -279,7 +279,7 @@ def _interrupt(processes: Sequence[TaskProcess]) -> None:
         process.interrupt()
 
 
-def _import(tasks: Sequence[Task], options: Options) -> None:
+def _import(tasks: Sequence[StudyTask], options: Options) -> None:
     """Import the modules of the questions once, before processes are forked."""
     for command in {command for task in tasks for command, _ in task.questions}:
         import_module(QUESTIONS[command].module)
@@ -287,7 +287,7 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
             import_module(QUESTIONS[command].figures)
 
 
-def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
+def _study(tasks: Sequence[StudyTask], several: bool, index: int, hear: Tell) -> End:
     """Answer the questions of a study, and write its report even if that fails or is interrupted."""
     task = tasks[index]
     options = task.options
@@ -338,7 +338,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     return replace(outcome, table=None)
 
 
-def _stale(study: Study, task: Task) -> int:
+def _stale(study: Study, task: StudyTask) -> int:
     """Tell of results of questions that the study no longer asks; the exit code, 1 where the study bars them."""
     code, asked = 0, questions(study)
     for path in sorted(task.root.glob(f"*/{manifest.NAME}")) if os.path.isdir(task.root) else ():
@@ -351,7 +351,7 @@ def _stale(study: Study, task: Task) -> int:
     return code
 
 
-def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> pages.IndexEntry | None:
+def _page(study: Study, task: StudyTask, outcomes: Sequence[Outcome], *, several: bool) -> pages.IndexEntry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
     pages.remove(task.root / pages.PRINTED)

@@ -31,7 +31,7 @@ _KILLED = "the process that computed it was killed, as where memory runs out; us
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyTask:
     """A study that was read without mistakes; a worker reads it again and answers its questions."""
 
     number: int  # index among the studies
@@ -76,7 +76,7 @@ class BatchRecord:
         self.check(())
         self._outcomes: list[list[Outcome]] = [[] for _ in studies]
         self._entries: dict[int, pages.IndexEntry] = {}
-        self._tasks: Sequence[Task] = ()
+        self._tasks: Sequence[StudyTask] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
         self._first = 0  # first task that has not ended
@@ -100,7 +100,7 @@ class BatchRecord:
                 outcome.study, outcome.study, failed=outcome.failed, outcome=outcome.word
             )
 
-    def begin(self, tasks: Sequence[Task]) -> None:
+    def begin(self, tasks: Sequence[StudyTask]) -> None:
         """Start with the tasks."""
         self._tasks = tasks
         self._words = [[] for _ in tasks]

@@ -54,7 +54,7 @@ def layers_csv(view: PosedStudy) -> Content:
 
 
 @dataclass(frozen=True)
-class Meeting(Pair):
+class MeetingItems(Pair):
     """Two items that meet in the plane, at a pose in words."""
 
     pose: str
@@ -96,7 +96,7 @@ class Layering:
     """The layer of each link, from 1 at the bottom, what meets in it, and whether all stacks were tried."""
 
     layers: Mapping[str, int]
-    meetings: Sequence[Meeting] = ()
+    meetings: Sequence[MeetingItems] = ()
     complete: bool = True
 
     @property
@@ -110,7 +110,7 @@ class Layering:
         return (Caution("infeasible", f"{head}; here {several(self.meetings)}"),)
 
 
-def meetings_of(view: PosedStudy) -> Iterator[Meeting]:
+def meetings_of(view: PosedStudy) -> Iterator[MeetingItems]:
     """What meets in the plane over the motion.
 
     Between two poses a distance changes by no more than the fastest corners move: what could meet there counts.
@@ -131,7 +131,7 @@ def meetings_of(view: PosedStudy) -> Iterator[Meeting]:
         else:
             pose = _first(view, clearances, one, other, common[0] if common else None)
         if pose:
-            yield Meeting(one, other, pose)
+            yield MeetingItems(one, other, pose)
 
 
 def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, link: str | None) -> str:
@@ -149,7 +149,7 @@ def _first(view: PosedStudy, clearances: Clearances, one: Item, other: Item, lin
 
 
 def stacked(
-    links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int]
+    links: Sequence[str], pins: Sequence[Item], meetings: Sequence[MeetingItems], given: Mapping[str, int]
 ) -> Layering:  # fmt: skip
     """The stack with the fewest layers in which nothing meets, and then the shortest pins; else the fewest meetings.
 
@@ -175,7 +175,7 @@ class _Search:
     """
 
     def __init__(
-        self, links: Sequence[str], pins: Sequence[Item], meetings: Sequence[Meeting], given: Mapping[str, int], *,
+        self, links: Sequence[str], pins: Sequence[Item], meetings: Sequence[MeetingItems], given: Mapping[str, int], *,
         strict: bool = True,
     ) -> None:  # fmt: skip
         self.pins, self.given, self.strict, self.tried = pins, given, strict, 0

@@ -37,7 +37,7 @@ def changes_in_words(changes: Iterable[tuple[str, Any]]) -> str:
 
 
 @dataclass(frozen=True)
-class Best:
+class BestCase:
     """The best case of a sweep.
 
     Parameters
@@ -104,7 +104,7 @@ def arranged(command: str, table: Table) -> list[Column]:
     return sorted(order, key=lambda column: not column.numeric and not any(column.values.tolist()))
 
 
-def best_of(table: Table) -> Best | None:
+def best_of(table: Table) -> BestCase | None:
     """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
     if FRONT not in table:
         return None
@@ -121,4 +121,4 @@ def best_of(table: Table) -> Best | None:
             label = str(part["label"][row]) if "label" in part else ""
             best = int(part["case"][row]), label, changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
-    return None if best is None else Best(*best, *numbers.tolist())
+    return None if best is None else BestCase(*best, *numbers.tolist())

@@ -16,7 +16,7 @@ from mechdesign.ground.cautions import ALL, Caution, fails
 from mechdesign.ground.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.ground.numerals import numeral
 from mechdesign.ground.results import POSES_ONLY, Drawn, Result
-from mechdesign.ground.rows import Chosen, UnknownColumnError, choose, located
+from mechdesign.ground.rows import ChosenRows, UnknownColumnError, choose, located
 from mechdesign.ground.statistics import AT_END, STATISTICS
 from mechdesign.ground.table_text import Rounding
 from mechdesign.ground.terms import Sum, is_plain, path_of, terms_of
@@ -297,18 +297,18 @@ def _judged(result: Result, requirement: Requirement, freedom: int, fewer: Colle
     return _verdict(requirement, judged, place, chosen)
 
 
-def _of_number(terms: Chosen | Sum, requirement: Requirement, freedom: int) -> Verdict:
+def _of_number(terms: ChosenRows | Sum, requirement: Requirement, freedom: int) -> Verdict:
     """The verdict on one number: a statistic of a column, or a sum."""
     bounds, assembled = _bounds(terms, requirement), bool(requirement.unassembled)
     judged = judge(terms, bounds, absolute=requirement.abs, assembled=assembled, number=True)
-    place = _place_of_end(terms, requirement, freedom) if isinstance(terms, Chosen) else ""
+    place = _place_of_end(terms, requirement, freedom) if isinstance(terms, ChosenRows) else ""
     if np.isnan(judged.values[0]):
         outside = any(chosen.part for chosen in terms.parts) and not any(chosen.lacking for chosen in terms.parts)
         place = _OUTSIDE if outside else ""
     return _verdict(requirement, judged, place, terms)
 
 
-def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str:
+def _place_of_end(chosen: ChosenRows, requirement: Requirement, freedom: int) -> str:
     """Where the largest or smallest value is that a statistic takes; empty of a mean and a range."""
     statistic = STATISTICS[chosen.statistic] if chosen.statistic else None
     counts = chosen.counted(assembled=bool(requirement.unassembled)) & ~np.isnan(chosen.values)
@@ -327,14 +327,14 @@ def _place_of_end(chosen: Chosen, requirement: Requirement, freedom: int) -> str
     return place
 
 
-def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Limits:
+def _bounds(chosen: ChosenRows | Sum, requirement: Requirement) -> Limits:
     low, high = (None if end is None else chosen.bound(end) for end in (requirement.at_least, requirement.at_most))
     return low, high
 
 
-def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: Chosen | Sum) -> Verdict:
+def _verdict(requirement: Requirement, judged: Judgement, place: str, terms: ChosenRows | Sum) -> Verdict:
     """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
-    if isinstance(terms, Chosen) and terms.values.dtype.kind == "f" and 0 < abs(judged.values[0]) < _SMALL:
+    if isinstance(terms, ChosenRows) and terms.values.dtype.kind == "f" and 0 < abs(judged.values[0]) < _SMALL:
         column = terms.table.column(terms.column)
         if abs(judged.values[0]) <= Rounding.of(terms.table.seen.columns).still(column, terms.unit):
             judged = Judgement.of(np.zeros(1), _bounds(terms, requirement))

@@ -21,7 +21,7 @@ from mechdesign.ground.notation import Step
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.ground.numerics.linear import solved
 from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.mechanism.charts import Chart, Charts, Positions, Sides, regularity
+from mechdesign.mechanism.charts import Chart, ChartPositions, Charts, Sides, regularity
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
@@ -114,7 +114,7 @@ class EquationsOfMotion:
         self.contacts: Sequence[Rubbing] = friction.contacts if friction is not None else []
         #: The joint that jammed when rates were computed last.
         self.jams = ""
-        self.positions = Positions(mechanism, at, followed)
+        self.positions = ChartPositions(mechanism, at, followed)
         self.atlas = Charts(self.positions)
         slopes = self.slopes(linear)
         chart, _ = self.atlas.best(slopes, ())

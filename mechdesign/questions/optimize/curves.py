@@ -11,7 +11,7 @@ from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.questions.optimize.variables import variables_of
 from mechdesign.questions.synthesize.bounds import RangeBounds
 from mechdesign.questions.synthesize.own import OwnKind
-from mechdesign.questions.synthesize.paths import MOST_EXACT, Points, fits, starts
+from mechdesign.questions.synthesize.paths import MOST_EXACT, PathPoints, fits, starts
 from mechdesign.study import Study
 
 # Linkages that are sampled, those whose curves are polished, and the best of these with which a search begins.
@@ -36,7 +36,7 @@ def near_curves(study: Study, goals: Sequence[Goal], conditions: Sequence[Goal],
         return none
     kind, (curve, *_) = OwnKind(study, curves[0].owner, ranges), curves
     assert curve.table is not None
-    path = Points(curve.table[:, 0] + 1j * curve.table[:, 1], bool(curve.closed and kind.turns))
+    path = PathPoints(curve.table[:, 0] + 1j * curve.table[:, 1], bool(curve.closed and kind.turns))
     if not path.size > 0 or not kind.course[1] > 0:
         return none
     # Conditioning is the sine of the transmission angle.

@@ -10,7 +10,7 @@ from scipy.special import erfcx, ndtr
 
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.ground.numerics.statistics import MAX_DEVIATION, outside
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
@@ -92,7 +92,7 @@ def _chance(covariance: Floats, radius: float, mean: Floats, *, within: bool) ->
     return float(beyond + weight @ (ndtr((-height - n) / b) + ndtr((n - height) / b)))
 
 
-def standard_ends(band: Limit, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
+def standard_ends(band: ErrorBound, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
     """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
     sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
     low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
@@ -125,7 +125,7 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
     return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
 
-def disc_and_band_failure(covariance: Floats, disc: Limit, band: Limit, mean: Floats) -> float:
+def disc_and_band_failure(covariance: Floats, disc: ErrorBound, band: ErrorBound, mean: Floats) -> float:
     """Probability that normal errors at one pose leave a circle, or a ring, or that one other leaves its band.
 
     Notes

@@ -18,7 +18,7 @@ from mechdesign.motion.rows import Poses
 from mechdesign.motion.solving import curve_with
 from mechdesign.questions.reliability import methods
 from mechdesign.questions.reliability.errors import linear_task
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.simulation import Sums
 from mechdesign.questions.reliability.tables import judged
 from mechdesign.questions.reliability.task import Strings, Task
@@ -54,7 +54,7 @@ class Samples:
     units: Strings
     errors: Floats
     kept: Flags
-    limits: tuple[Limit, ...]
+    limits: tuple[ErrorBound, ...]
     pair: tuple[int, int] | None
     mean: Floats
     covariance: Floats

@@ -21,7 +21,7 @@ from mechdesign.questions.reliability.deflection import Elastic, Elasticity, cau
 from mechdesign.questions.reliability.first_order import FirstOrder, derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel, force_model, pace
 from mechdesign.questions.reliability.lengths import model_of
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.question import ReliabilityQuestion, ask
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.schema.variation import LOADS
@@ -123,7 +123,7 @@ class Errors(PoseQuestion):
         return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
 
 
-def _freed(limit: Limit, components: Floats, offset: Floats, by_drive: Floats, nominal: Floats) -> None:
+def _freed(limit: ErrorBound, components: Floats, offset: Floats, by_drive: Floats, nominal: Floats) -> None:
     """Let the drive follow the errors, so that a point comes nearest to its target: its error is across its path.
 
     Parameters

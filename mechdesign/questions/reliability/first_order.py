@@ -20,7 +20,7 @@ from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.question import Channel, columns_among
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
@@ -87,7 +87,7 @@ class FirstOrder:
         """Poses at which `limits` are those of the same channels of `whole`."""
         return [slice(None)]
 
-    def limits(self, limits: Sequence[Limit], poses: Any) -> list[Limit]:
+    def limits(self, limits: Sequence[ErrorBound], poses: Any) -> list[ErrorBound]:
         """The limits of the channels, of errors, at some poses that are `alike`, as those of `whole`."""
         return [limit.at(poses) for limit in limits]
 

@@ -17,7 +17,7 @@ import scipy
 
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.first_order import FirstOrder
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 
 # Length of a mean vector, in deviations of its components, up to which its length has a law of its own. Beyond it the
@@ -74,16 +74,16 @@ class WithLengths(FirstOrder):
         patterns, rows = np.unique(self.short, axis=1, return_inverse=True)
         return [np.flatnonzero(rows.ravel() == k) for k in range(patterns.shape[1])]
 
-    def limits(self, limits: Sequence[Limit], poses: Any) -> list[Limit]:
+    def limits(self, limits: Sequence[ErrorBound], poses: Any) -> list[ErrorBound]:
         places = {output: k for k, output in enumerate(self.outputs) if self.short[k, poses].any()}
-        count, linear, rings = len(self.components), list[Limit](), list[Limit]()
+        count, linear, rings = len(self.components), list[ErrorBound](), list[ErrorBound]()
         for limit in super().limits(limits, poses):
             k = None if limit.round else places.get(limit.output)
             if k is None:
                 linear.append(limit)
                 continue
             ends = self.sizes[k, poses] + limit.low, self.sizes[k, poses] + limit.high
-            rings.append(Limit((count + 2 * k, count + 2 * k + 1), *ends))
+            rings.append(ErrorBound((count + 2 * k, count + 2 * k + 1), *ends))
         return [*linear, *rings]
 
     def own(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:

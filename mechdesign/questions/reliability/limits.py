@@ -17,7 +17,7 @@ from mechdesign.study import Study
 
 
 @dataclass(frozen=True)
-class Limit:
+class ErrorBound:
     """Limits low <= error <= high of a channel, or of two: of the distance of their errors from the middle of a circle
     or ring.
 
@@ -65,7 +65,7 @@ class Limit:
         """The first of its channels."""
         return self.channels[0]
 
-    def at(self, poses: Any) -> Limit:
+    def at(self, poses: Any) -> ErrorBound:
         """The limit at one pose or some, by an index of the arrays of poses."""
         x, y = (at_rows(part, poses) for part in self.middle)
         return replace(self, low=at_rows(self.low, poses), high=at_rows(self.high, poses), middle=(x, y))

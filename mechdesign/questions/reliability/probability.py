@@ -23,7 +23,7 @@ from mechdesign.questions.reliability.circles import (
 )
 from mechdesign.questions.reliability.engine.problem import CONFIDENCE
 from mechdesign.questions.reliability.first_order import FirstOrder, correlation
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 
 # Points of a lattice.
 _LATTICE_POINTS = 8191
@@ -43,7 +43,7 @@ _POLYGON_SIDES = 64
 
 
 def made_failure(
-    linear: FirstOrder, closing: FirstOrder, limits: Sequence[Limit], mean: Floats | None = None,
+    linear: FirstOrder, closing: FirstOrder, limits: Sequence[ErrorBound], mean: Floats | None = None,
     covariance: Floats | None = None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Probability that a made mechanism breaks a limit or cannot be assembled, by normal errors, shape (poses,).
@@ -73,17 +73,19 @@ def made_failure(
         spread, middle = both.covariance()[0], both.shift()[:, 0]
         spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
         here = [limit.at(0) for limit in linear.limits(limits, [pose])]
-        here += [Limit((count + k,), 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
+        here += [ErrorBound((count + k,), 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
         failure[pose], doubt[pose] = estimated_failure(spread, here, middle)
     return failure, doubt
 
 
-def failure_probability(covariance: Floats, limits: Sequence[Limit], mean: Floats | None = None) -> Floats:
+def failure_probability(covariance: Floats, limits: Sequence[ErrorBound], mean: Floats | None = None) -> Floats:
     """Probability that normal errors break any limit, as `estimated_failure`."""
     return estimated_failure(covariance, limits, mean)[0]
 
 
-def estimated_failure(covariance: Floats, limits: Sequence[Limit], mean: Floats | None = None) -> tuple[Floats, Floats]:
+def estimated_failure(
+    covariance: Floats, limits: Sequence[ErrorBound], mean: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Probability that normal errors break any limit, shape (...); nan where a limited one's moments are not finite.
 
     With it half the width of its 99.7 % interval, 0 where it is integrated and not sampled.
@@ -130,7 +132,7 @@ def estimated_failure(covariance: Floats, limits: Sequence[Limit], mean: Floats 
     return failure, doubt
 
 
-def _about_circles(mean: Floats, limits: Sequence[Limit]) -> tuple[Floats, list[Limit]]:
+def _about_circles(mean: Floats, limits: Sequence[ErrorBound]) -> tuple[Floats, list[ErrorBound]]:
     """Means and limits of errors that count from the middle of the circle that holds them."""
     away = {k: part for limit in limits if limit.round for k, part in zip(limit.channels, limit.middle, strict=True)}
     if not any(np.any(part) for part in away.values()):
@@ -145,13 +147,13 @@ def _about_circles(mean: Floats, limits: Sequence[Limit]) -> tuple[Floats, list[
     ]  # fmt: skip
 
 
-def _kinds(limits: Sequence[Limit]) -> tuple[list[Limit], list[Limit]]:
+def _kinds(limits: Sequence[ErrorBound]) -> tuple[list[ErrorBound], list[ErrorBound]]:
     """Limits of single errors, and circles."""
     return [limit for limit in limits if not limit.round], [limit for limit in limits if limit.round]
 
 
 def _of_several(
-    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], mean: Floats
+    covariance: Floats, bands: Sequence[ErrorBound], discs: Sequence[ErrorBound], mean: Floats
 ) -> tuple[float, float]:  # fmt: skip
     """Probability that normal errors at one pose break any of several limits, and half its interval."""
     if len(bands) == len(discs) == 1:
@@ -164,7 +166,7 @@ def _of_several(
 
 
 def _rare(
-    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], mean: Floats
+    covariance: Floats, bands: Sequence[ErrorBound], discs: Sequence[ErrorBound], mean: Floats
 ) -> tuple[float, float] | None:  # fmt: skip
     """Probability outside any of several limits where it is small; None where a lattice is better."""
     total = sum(float(outside(*standard_ends(band, covariance, mean))) for band in bands)
@@ -254,7 +256,7 @@ def half_spaces(
 
 
 def _lattice(
-    covariance: Floats, bands: Sequence[Limit], discs: Sequence[Limit], centre: Floats
+    covariance: Floats, bands: Sequence[ErrorBound], discs: Sequence[ErrorBound], centre: Floats
 ) -> tuple[float, float]:  # fmt: skip
     """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it.
 

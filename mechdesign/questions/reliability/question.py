@@ -20,7 +20,7 @@ from mechdesign.motion.rows import Poses
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.reliability.corners import Bend, bends, vector_of
 from mechdesign.questions.reliability.forces import argument_name, kinds_of_forces, load_bends
-from mechdesign.questions.reliability.limits import Limit, targets_of
+from mechdesign.questions.reliability.limits import ErrorBound, targets_of
 from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
 from mechdesign.study import Study
@@ -97,7 +97,7 @@ class ReliabilityQuestion:
     """
 
     channels: tuple[Channel, ...]
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[ErrorBound, ...] = ()
     pair: tuple[int, int] | None = None
 
     @property
@@ -149,7 +149,7 @@ class ReliabilityQuestion:
         return replace(self, limits=tuple(limit.at(poses) for limit in self.limits))
 
     @property
-    def free(self) -> Limit | None:
+    def free(self) -> ErrorBound | None:
         """The limit of a point for whose target the drive is free."""
         return next((limit for limit in self.limits if limit.free), None)
 
@@ -167,7 +167,7 @@ class ReliabilityQuestion:
             self._about(limit, nominal) if limit.absolute else limit for limit in self.limits
         ))  # fmt: skip
 
-    def _about(self, limit: Limit, nominal: Sequence[Any] | Floats) -> Limit:
+    def _about(self, limit: ErrorBound, nominal: Sequence[Any] | Floats) -> ErrorBound:
         if limit.round:
             x, y = (part - nominal[k] for k, part in zip(limit.channels, limit.middle, strict=True))
             return replace(limit, middle=(x, y), absolute=False)
@@ -175,7 +175,7 @@ class ReliabilityQuestion:
         channel, middle = self.channels[limit.output], 0.5 * (limit.low + limit.high)
         if channel.order == 0 and channel.turns:
             value = value - TURN * np.where(np.isfinite(middle), np.round((value - middle) / TURN), 0.0)
-        return Limit(limit.channels, limit.low - value, limit.high - value)
+        return ErrorBound(limit.channels, limit.low - value, limit.high - value)
 
     @cached_property
     def limited_channels(self) -> list[int]:
@@ -205,7 +205,7 @@ class ReliabilityQuestion:
         return kept
 
     @property
-    def _ends(self) -> list[tuple[Limit, float, float]]:
+    def _ends(self) -> list[tuple[ErrorBound, float, float]]:
         """Finite ends of the limits, or an infinite one, and 1 for an upper or -1 for a lower one."""
         every = [(limit, end, sign) for limit in self.limits for end, sign in ((limit.high, 1.0), (limit.low, -1.0))]
         return [one for one in every if np.isfinite(one[1])] or every[:1]
@@ -262,7 +262,7 @@ def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQ
     for base, order, limit in limits:
         targets = None if limit.targets is None else targets_of(study, base, limit, poses)
         if limit.radius is not None:
-            circle = Limit((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius)
+            circle = ErrorBound((places[f"{base}.x", order], places[f"{base}.y", order]), -np.inf, limit.radius)
             if targets is not None:
                 radius, (x, y) = np.where(np.isnan(targets[0]), np.inf, limit.radius), np.nan_to_num(targets)
                 circle = replace(circle, high=radius, absolute=True, middle=(x, y), free=limit.timing == "free")
@@ -274,7 +274,7 @@ def ask(study: Study, section: ReliabilitySection, poses: Poses) -> ReliabilityQ
         for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True):
             end = bound if value is None else value * factor
             ends.append(end if targets is None else np.where(np.isnan(targets[0]), bound, factor * targets[0] + end))
-        asked.append(Limit((output,), ends[0], ends[1], limit.absolute or targets is not None))
+        asked.append(ErrorBound((output,), ends[0], ends[1], limit.absolute or targets is not None))
     asked.sort(key=lambda limit: limit.round)
     alone = len({limit.round for limit in asked}) < 2
     pair = [k for limit in asked for k in limit.channels] if alone else []

@@ -20,7 +20,7 @@ from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, LimitStates, counted, slopes
 from mechdesign.questions.reliability.first_order import derivatives, nominal_values
 from mechdesign.questions.reliability.forces import ForceModel
-from mechdesign.questions.reliability.limits import Limit
+from mechdesign.questions.reliability.limits import ErrorBound
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.sources import Made, Sources
 
@@ -122,7 +122,7 @@ def solve(setting: Setting, made: Made) -> Configuration:
     return solved.beside(nominal, [*setting.question.coordinates, *loads])
 
 
-def _late(setting: Setting, limit: Limit, solved: Configuration) -> Floats:
+def _late(setting: Setting, limit: ErrorBound, solved: Configuration) -> Floats:
     """By how much the drive stands behind the place at which a point comes nearest to its target."""
     mechanism, by_drive = setting.mechanism, setting.mechanism.linearize(solved).by_drives[0]
     along: Value = 0.0

@@ -16,8 +16,8 @@ from mechdesign.ground.work.threads import one_thread
 from mechdesign.questions.synthesize.columns import CENTRE_POINTS, SOLUTIONS
 from mechdesign.questions.synthesize.curves import centre_points
 from mechdesign.questions.synthesize.files import judged, study_data, study_files
-from mechdesign.questions.synthesize.solutions import Conditions, Pool, Solution, clear, distinct, ranked, rounded
-from mechdesign.questions.synthesize.tasks import BodyTask, Task, task_of
+from mechdesign.questions.synthesize.solutions import Conditions, Linkages, Solution, clear, distinct, ranked, rounded
+from mechdesign.questions.synthesize.tasks import BodyGuidance, Task, task_of
 from mechdesign.questions.synthesize.words import faults, linkage
 from mechdesign.study import Study
 from mechdesign.study.loading import load_data
@@ -77,7 +77,7 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     return replace(result, counts=counts)
 
 
-def _pools(task: Task, random: np.random.Generator, conditions: Conditions, progress: Progress) -> Iterator[Pool]:
+def _pools(task: Task, random: np.random.Generator, conditions: Conditions, progress: Progress) -> Iterator[Linkages]:
     """Linkages of every kind and assembly, one after the other; between two a search may be ended."""
     progress.start(1, "linkages looked for")
     for pool in task.pools(random, conditions):
@@ -113,7 +113,7 @@ def _answer(
     return Result("synthesize", tables, files=files, drawn=drawn, notes=notes)
 
 
-def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
+def _told(pools: Sequence[Linkages], solutions: Sequence[Solution], conditions: Conditions, seed: int) -> list[str]:
     """How many linkages there were, what became of them, and the seed."""
     count, whole = sum(len(pool.way) for pool in pools), sum(not solution.defects for solution in solutions)
     told = [f"{len(solutions)} of {counted(count, 'linkage')} within the conditions, {whole} without a defect"]
@@ -124,7 +124,7 @@ def _told(pools: Sequence[Pool], solutions: Sequence[Solution], conditions: Cond
 
 
 def _none(
-    study: Study, task: Task, pools: Sequence[Pool], conditions: Conditions, told: Sequence[str]
+    study: Study, task: Task, pools: Sequence[Linkages], conditions: Conditions, told: Sequence[str]
 ) -> AssemblyError:
     """Why there is no solution, with the linkage that comes nearest where there is one."""
     every = [(reasons, pool.solution(row)) for pool in pools for row, reasons in enumerate(conditions.missed(pool))]
@@ -171,7 +171,7 @@ def solutions_table(study: Study, task: Task, solutions: Sequence[Solution], sco
 
 def curve_tables(study: Study, task: Task) -> dict[str, Table]:
     """The links of four positions of a body along the curve of their pivots; empty for other tasks."""
-    if not isinstance(task, BodyTask) or len(task.positions.places) != 4 or task.positions.shifts:
+    if not isinstance(task, BodyGuidance) or len(task.positions.places) != 4 or task.positions.shifts:
         return {}
     parts = centre_points(task.positions, task.section.limits.reach * task.size)
     columns = CENTRE_POINTS.columns(

@@ -14,7 +14,7 @@ from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.open_loops import OpenLoops
 from mechdesign.questions.synthesize.bounds import Bounds
 from mechdesign.questions.synthesize.kinds import Kind
-from mechdesign.questions.synthesize.paths import Points, Starts
+from mechdesign.questions.synthesize.paths import PathPoints, Starts
 
 _ROUNDS = 60
 # Steps are shortened to this part of a dimension, but of small ones of this part of the task, and to a radian.
@@ -25,7 +25,7 @@ _CLOSED = 1e-13
 _LEAST = 1e-9
 
 
-def passing(kind: Kind, task: Points, starts: Sequence[Starts], bound: Bounds) -> Starts:
+def passing(kind: Kind, task: PathPoints, starts: Sequence[Starts], bound: Bounds) -> Starts:
     """The linkages to which starts in each of the assemblies lead."""
     values, numbers = (np.concatenate([getattr(part, name) for part in starts]) for name in ("values", "numbers"))
     poses = np.concatenate([_poses(kind, modes, part) for modes, part in zip(kind.begun, starts, strict=True)], axis=1)
@@ -66,7 +66,7 @@ def _poses(kind: Kind, modes: tuple[int, ...], start: Starts) -> Floats:
     return np.concatenate([start.angles[None], OpenLoops.closed(kind.mechanism.forward.structure, poses)])
 
 
-def _equations(kind: Kind, task: Points, values: Floats, poses: Floats) -> tuple[Floats, Floats, Floats]:
+def _equations(kind: Kind, task: PathPoints, values: Floats, poses: Floats) -> tuple[Floats, Floats, Floats]:
     """What point and loops miss at each point, shape (count, points, equations), and its derivatives.
 
     Those by drive, angles and slides, and those by values have a last axis more.

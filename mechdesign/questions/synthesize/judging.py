@@ -27,7 +27,7 @@ _DEAD = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class TaskMotion:
     """How linkages of a kind pass the positions of a task; each array has a first axis (count,)."""
 
     kind: Kind
@@ -113,7 +113,7 @@ def _along(kind: Kind, modes: tuple[int, ...], values: Floats, begin: Floats, en
 
 def passed(
     kind: Kind, modes: tuple[int, ...], values: Floats, angles: Floats, elsewhere: Flags, *, full_turn: bool
-) -> Way:
+) -> TaskMotion:
     """The way of linkages through a task in an assembly; `elsewhere` tells which positions need another one."""
     unwound, disorder = in_order(angles)
     if not kind.turns:
@@ -130,4 +130,4 @@ def passed(
     dead, worst = whole_dead.copy(), whole_worst.copy()
     if not full_turn and len(rest):
         dead[rest], worst[rest] = along(kind, modes, values[rest], begin[rest], end[rest])
-    return Way(kind, modes, values, unwound, elsewhere, dead, disorder, worst, ~whole_dead)
+    return TaskMotion(kind, modes, values, unwound, elsewhere, dead, disorder, worst, ~whole_dead)

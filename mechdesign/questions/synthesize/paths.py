@@ -41,7 +41,7 @@ _WINDOWS = [(begin / 24, length) for length in (0.15, 0.25, 0.35, 0.5, 0.7, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class PathPoints:
     """Points that a path passes, x + i y, and their crank angles if these are given (radians, the first is free)."""
 
     points: Complexes
@@ -98,7 +98,7 @@ class Fits(Starts):
 
 
 def starts(
-    kind: Kind, modes: tuple[int, ...], task: Points, samples: Floats, bound: Bounds, most: int = POLISHED
+    kind: Kind, modes: tuple[int, ...], task: PathPoints, samples: Floats, bound: Bounds, most: int = POLISHED
 ) -> Starts:
     """The linkages among samples, about so many, whose curves have most the form of the task; those first."""
     samples = samples[bound.accepts(modes, samples)]
@@ -112,7 +112,7 @@ def starts(
 
 
 def fits(
-    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: Bounds, *, whole: bool = False
+    kind: Kind, modes: tuple[int, ...], task: PathPoints, start: Starts, bound: Bounds, *, whole: bool = False
 ) -> Fits:
     """Linkages polished from starts; `bound` keeps their values, and with `whole` no start is left behind."""
     if whole:
@@ -157,7 +157,7 @@ def _centred(curves: Complexes) -> tuple[Complexes, Complexes, Floats]:
 
 
 def begun(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int, bound: Bounds
+    kind: Kind, modes: tuple[int, ...], task: PathPoints, values: Floats, most: int, bound: Bounds
 ) -> tuple[Floats, Floats]:
     """The linkages with a curve that comes nearest to the task, and the drive at its points.
 
@@ -192,7 +192,7 @@ def begun(
     return kind.moved(values[best], turn, middle - turn * middles[best]), angles + np.angle(turn)[:, None]
 
 
-def _near(kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, most: int) -> tuple[Floats, Floats]:
+def _near(kind: Kind, modes: tuple[int, ...], task: PathPoints, values: Floats, most: int) -> tuple[Floats, Floats]:
     """The linkages whose curves, as they are, pass nearest to the points in any order; and the drive there."""
     begin, span = kind.course
     angles = begin + span * np.arange(POSES + 1) / POSES
@@ -218,7 +218,7 @@ def _curves(kind: Kind, modes: tuple[int, ...], values: Floats, *, whole: bool) 
     return values, np.concatenate([curves, curves[:, 1:]], axis=1) if kind.turns else curves
 
 
-def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints, Floats]]:
+def _windows(kind: Kind, task: PathPoints, curves: Complexes) -> Iterator[tuple[Ints, Floats]]:
     """Parts of curves that may be the task's: which curves have no gap there, and their poses, with fractions."""
     if task.timing is not None:
         for start in 2 * np.pi * np.arange(POSES) / POSES:
@@ -238,7 +238,7 @@ def _windows(kind: Kind, task: Points, curves: Complexes) -> Iterator[tuple[Ints
 
 
 def polish(
-    kind: Kind, modes: tuple[int, ...], task: Points, start: Starts, bound: Bounds,
+    kind: Kind, modes: tuple[int, ...], task: PathPoints, start: Starts, bound: Bounds,
     kept: Mapping[int, int] = MappingProxyType({}),
 ) -> Fits:  # fmt: skip
     """All linkages at once by Levenberg and Marquardt's method; `kept` are how many go on after so many rounds."""
@@ -269,7 +269,7 @@ def polish(
 
 
 def _step(
-    kind: Kind, modes: tuple[int, ...], task: Points, values: Floats, angles: Floats, damping: Floats, bound: Bounds
+    kind: Kind, modes: tuple[int, ...], task: PathPoints, values: Floats, angles: Floats, damping: Floats, bound: Bounds
 ) -> tuple[Floats, Floats]:
     """Where a round leads: values and angles."""
     (begin, span), count = kind.course, len(kind.places)

@@ -18,7 +18,7 @@ from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.questions.synthesize.declared import BODY, FOUR_BAR
 from mechdesign.questions.synthesize.dyads import GUIDE, SLIDE, Dyads
-from mechdesign.questions.synthesize.judging import Way
+from mechdesign.questions.synthesize.judging import TaskMotion
 from mechdesign.questions.synthesize.kinds import Kind
 from mechdesign.questions.synthesize.schema import SynthesisSection
 from mechdesign.questions.synthesize.sites import Site
@@ -33,10 +33,10 @@ EXACT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pool:
+class Linkages:
     """Linkages of one kind and assembly that do a task, and how well; each array has a first axis (count,)."""
 
-    way: Way
+    way: TaskMotion
     errors: Floats  # at each position, shape (count, positions); infinite where it cannot be assembled
 
     @property
@@ -146,14 +146,14 @@ class Conditions:
         self.dropped["linkage", f"only {most} of a kind and assembly are followed"] += max(int(kept.sum()) - most, 0)
         return np.asarray(order[kept[order]][:most])
 
-    def kept(self, pool: Pool) -> Flags:
+    def kept(self, pool: Linkages) -> Flags:
         """Which linkages keep all conditions."""
         kept = np.isfinite(pool.errors).all(axis=1)
         for _, good in self._of_dimensions(pool.kind, pool.way.values):
             kept &= good
         return kept & self.counted(self._of_way(pool.way), len(pool.way))
 
-    def missed(self, pool: Pool) -> list[list[str]]:
+    def missed(self, pool: Linkages) -> list[list[str]]:
         """The conditions that each linkage of a pool does not keep."""
         conditions = [*self._of_dimensions(pool.kind, pool.way.values), *self._of_way(pool.way)]
         lost = [np.flatnonzero(np.isinf(errors)) + 1 for errors in pool.errors]
@@ -182,7 +182,7 @@ class Conditions:
             kept &= good
         return kept
 
-    def solutions(self, pool: Pool) -> Iterator[Solution]:
+    def solutions(self, pool: Linkages) -> Iterator[Solution]:
         """The best linkages of a pool that keep all conditions."""
         if not len(pool.way):
             return
@@ -235,7 +235,7 @@ class Conditions:
             good = ordered[0] + ordered[-1] <= ordered[1:-1].sum(axis=0)
             yield "no link can turn fully (grashof)", good
 
-    def _of_way(self, way: Way) -> Iterator[tuple[str, Flags]]:
+    def _of_way(self, way: TaskMotion) -> Iterator[tuple[str, Flags]]:
         section = self.section
         if section.needs_turn:
             yield "the drive cannot turn fully (full_turn)", way.full_turn

@@ -22,7 +22,7 @@ from mechdesign.questions.synthesize.kinds import Kind, kind_of
 from mechdesign.questions.synthesize.own import OwnKind, own_kind
 from mechdesign.questions.synthesize.schema import SynthesisSection
 from mechdesign.questions.synthesize.sites import Site
-from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Pool, Solution
+from mechdesign.questions.synthesize.solutions import EXACT, Conditions, Linkages, Solution
 from mechdesign.study import Study
 from mechdesign.study.text.csv_files import read_table
 
@@ -72,13 +72,13 @@ class _Task:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BodyTask(_Task):
+class BodyGuidance(_Task):
     """Positions of a body."""
 
     positions: Positions
     apart: ClassVar[tuple[str, ...]] = (f"{BODY}.{POINT}.x", f"{BODY}.{POINT}.y")
 
-    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Linkages]:
         """Linkages of every kind and assembly."""
         section, sites = self.section, conditions.sites
         conditions.told += filter(None, [self.positions.remark])
@@ -109,7 +109,7 @@ class BodyTask(_Task):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FunctionTask(_Task):
+class FunctionGeneration(_Task):
     """Pairs of an input angle and an output angle or place."""
 
     inputs: Floats  # radians
@@ -120,7 +120,7 @@ class FunctionTask(_Task):
         """Whether the output is a slide."""
         return self.section.output_kind != FOUR_BAR
 
-    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Linkages]:
         """Linkages of every assembly."""
         # The output link, or the slider, as it is seen from the input link.
         back = np.exp(-1j * self.inputs)
@@ -163,7 +163,7 @@ class FunctionTask(_Task):
         output = "B.x" if self.slides else "rocker.angle"
         return output, {output: ((self.outputs + self._zero(solution)) / self.error_factor).tolist()}
 
-    def _assembled(self, links: Dyads, conditions: Conditions) -> list[Pool]:
+    def _assembled(self, links: Dyads, conditions: Conditions) -> list[Linkages]:
         """The linkages with these couplers."""
         if not len(links):
             return []
@@ -171,7 +171,7 @@ class FunctionTask(_Task):
         pools = assembled(part, self.errors(part, links), conditions, self.size if self.slides else 1.0)
         return [*pools] if self.section.zeros == "fixed" else [*map(self._from_best_zero, pools)]
 
-    def _from_best_zero(self, pool: Pool) -> Pool:
+    def _from_best_zero(self, pool: Linkages) -> Linkages:
         """The linkages with the errors from the zero that is best for all pairs, where one assembly passes them."""
         way = pool.way
         away = self._away(way.kind.solve(way.values, way.angles, way.modes))
@@ -218,10 +218,10 @@ class FunctionTask(_Task):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PathTask(_Task):
+class PathGeneration(_Task):
     """Points that a point passes."""
 
-    path: paths.Points
+    path: paths.PathPoints
     given: int  # points that the task has, of which the path may have every second, third and so on
     kinds: Sequence[Kind]
 
@@ -229,11 +229,11 @@ class PathTask(_Task):
         """The output that is judged, and where it should be at each position."""
         return solution.kind.point, {solution.kind.point: self.points.tolist()}
 
-    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Pool]:
+    def pools(self, random: np.random.Generator, conditions: Conditions) -> Iterator[Linkages]:
         """Linkages of every kind and assembly."""
         if len(self.points) < self.given:
             conditions.told.append(f"{len(self.points)} of {self.given} points count, evenly chosen")
-        site, pools = conditions.sites[0], list[Pool]()
+        site, pools = conditions.sites[0], list[Linkages]()
         # Where no sample is within all conditions the nearest is one of the others.
         wide = self.section.model_copy(update={"lengths": {}, "pivots": None, "transmission": None})
         others = replace(self, section=wide), Site(site.centre, site.size, site.reach), list[str]()
@@ -246,7 +246,7 @@ class PathTask(_Task):
 
     def of_kind(
         self, kind: Kind, bound: Bounds, random: np.random.Generator, conditions: Conditions, told: list[str]
-    ) -> Iterator[Pool]:
+    ) -> Iterator[Linkages]:
         """Linkages of every assembly of a kind; what is found is `told` in words."""
         starts = [self._starts(kind, modes, bound, random) for modes in kind.begun]
         # They are counted in turn.
@@ -274,7 +274,7 @@ class PathTask(_Task):
             values, angles = fits.values[rows], fits.angles[rows]
             gaps = np.abs(kind.points(kind.solve(values, angles, modes)) - self.points)
             none = np.zeros(gaps.shape, dtype=bool)
-            yield Pool(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
+            yield Linkages(passed(kind, modes, values, angles, none, full_turn=self.section.needs_turn), gaps)
         if not count:
             told.append(f"{in_words(kind.name)}: no sample has a curve within all conditions")
         elif few:
@@ -302,7 +302,7 @@ class PathTask(_Task):
         return paths.starts(kind, modes, self.path, samples, bound, most)
 
 
-Task = BodyTask | FunctionTask | PathTask
+Task = BodyGuidance | FunctionGeneration | PathGeneration
 
 
 def _distinct(parts: Sequence[paths.Starts], size: float) -> paths.Starts:
@@ -317,7 +317,7 @@ def _distinct(parts: Sequence[paths.Starts], size: float) -> paths.Starts:
     return paths.Starts(values[kept], angles[kept], numbers[kept])
 
 
-def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Pool]:
+def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Linkages]:
     """Linkages by the assembly in which they are at the first position, with how they pass the others.
 
     Errors are infinite at positions at which they cannot be assembled.
@@ -341,7 +341,7 @@ def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, 
             other = stack[number, some] > nearest[some] + _OTHER * size
             way = passed(part.kind, modes, part.values[some], part.angles[some], other,
                          full_turn=conditions.section.needs_turn)  # fmt: skip
-            yield Pool(way, nearest[some])
+            yield Linkages(way, nearest[some])
 
 
 def task_of(study: Study, section: SynthesisSection) -> Task:
@@ -350,18 +350,17 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     if section.body is not None:
         places = np.array([complex(part.x, part.y) for part in section.body])
         positions = Positions(places, np.exp(1j * factor * np.array([part.angle for part in section.body])))
-        return BodyTask(section=section, factor=factor, centre=positions.centre, size=positions.size, points=places,
-                        directions=positions.rotations, positions=positions)  # fmt: skip
+        return BodyGuidance(section=section, factor=factor, centre=positions.centre, size=positions.size, points=places,
+                            directions=positions.rotations, positions=positions)  # fmt: skip
     if section.function is not None:
         inputs, outputs = factor * np.array(section.function.input), np.array(section.function.output, dtype=float)
-        if section.output_kind != FOUR_BAR:
-            size, centre = float(np.ptp(outputs)), complex(outputs.mean())
-            return FunctionTask(
-                section=section, factor=factor, centre=centre, size=size, inputs=inputs, outputs=outputs
-            )
-        size = float(section.frame or 1.0)
-        return FunctionTask(section=section, factor=factor, centre=complex(size / 2), size=size, error_factor=factor,
-                            inputs=inputs, outputs=factor * outputs)  # fmt: skip
+        size, unit = float(np.ptp(outputs)), 1.0
+        centre = complex(outputs.mean())
+        if section.output_kind == FOUR_BAR:
+            size, unit, outputs = float(section.frame or 1.0), factor, factor * outputs
+            centre = complex(size / 2)
+        return FunctionGeneration(section=section, factor=factor, centre=centre, size=size, error_factor=unit,
+                                  inputs=inputs, outputs=outputs)  # fmt: skip
     assert section.path is not None
     points = section.path.points
     try:
@@ -379,11 +378,11 @@ def task_of(study: Study, section: SynthesisSection) -> Task:
     # The form of a path needs no more points; the time of a search grows with them.
     given, every = len(table), -(-len(table) // _MOST_POINTS)
     table, timing = table[::every], None if timing is None else timing[::every]
-    path = paths.Points(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
+    path = paths.PathPoints(table[:, 0] + 1j * table[:, 1], section.path.closed, timing)
     if not path.size > 0:
         raise StudyError([study.problem("all points of the path are one", "synthesis", "path", "points")])
     kinds = (
         [own_kind(study, section)] if section.of else [kind_of("path", name) for name in section.kinds or (FOUR_BAR,)]
     )
-    return PathTask(section=section, factor=factor, centre=path.centre, size=path.size, points=path.points, path=path,
-                    given=given, kinds=kinds)  # fmt: skip
+    return PathGeneration(section=section, factor=factor, centre=path.centre, size=path.size, points=path.points,
+                          path=path, given=given, kinds=kinds)  # fmt: skip

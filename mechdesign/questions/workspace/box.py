@@ -10,7 +10,7 @@ from mechdesign.ground.numerics.arrays import Floats, Ints
 from mechdesign.ground.numerics.roots import dips
 from mechdesign.region.intervals import SAME_ROOT, Intervals
 from mechdesign.region.panels import Panels
-from mechdesign.region.rays import Designs
+from mechdesign.region.rays import Scanned
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
@@ -76,7 +76,7 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Intervals]) -> tu
     return area, most - area + SAME_ROOT * area
 
 
-def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
+def _farthest(designs: Scanned, theta: Floats, traced: Intervals) -> Floats:
     """How far rays reach in each direction of the rectangle, shape (directions, rays); -inf where they meet nothing."""
     places = designs.about + traced.by_ray(traced.inner, traced.outer) * np.exp(1j * theta)
     away = (places * SIDES[:, None, None, None]).real

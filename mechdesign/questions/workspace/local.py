@@ -11,7 +11,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.region.field import LENGTH, Field, Places
-from mechdesign.region.rays import Designs
+from mechdesign.region.rays import Scanned
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,6 @@ class Local(Jacobian):
         return Local(entries, homogeneous, jacobian.shape, configuration)
 
     @staticmethod
-    def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:
+    def on_rays(designs: Scanned, design: Ints, theta: Floats, radius: Floats) -> Local:
         """The same at places of rays, each of a design."""
         return Local.at(designs.field, designs.about + radius * np.exp(1j * theta), designs.of(design))

@@ -14,8 +14,8 @@ from mechdesign.questions.workspace.index import Prepared, prepare
 from mechdesign.questions.workspace.inscribed import INSCRIBED
 from mechdesign.questions.workspace.strips import Integrand
 from mechdesign.region.field import Places
-from mechdesign.region.rays import Designs, Effort
-from mechdesign.region.regions import Region, problem, regions
+from mechdesign.region.rays import Effort, Scanned
+from mechdesign.region.regions import PlanarRegion, problem, regions
 from mechdesign.study import Study
 from mechdesign.study.text.fields import parts_of
 from mechdesign.study.text.units import Amount
@@ -27,7 +27,7 @@ MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
 
 
 @dataclass(frozen=True, eq=False)
-class Question(Region):
+class Question(PlanarRegion):
     """What the workspace section asks of a region.
 
     Parameters
@@ -50,9 +50,9 @@ class Question(Region):
     columns: tuple[str, ...]
     shown: tuple[Prepared, ...]
 
-    def designs(self, places: Places, count: int, effort: Effort) -> Designs:
+    def designs(self, places: Places, count: int, effort: Effort) -> Scanned:
         """`count` designs, whose changed places are arrays of shape (count,), and how rays meet their regions."""
-        return Designs(self.field, places, count, self.about, self.scan, effort)
+        return Scanned(self.field, places, count, self.about, self.scan, effort)
 
     @cached_property
     def statistics(self) -> dict[str, tuple[str, str]]:

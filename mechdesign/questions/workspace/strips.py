@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.workspace.index import Prepared
 from mechdesign.questions.workspace.local import Local
-from mechdesign.region.rays import Designs
+from mechdesign.region.rays import Scanned
 from mechdesign.region.rules import Rule, cosine, spread
 
 RADII = Rule.of(11, 2, 2.0)
@@ -114,7 +114,7 @@ def divided(parts: Parts, at: Floats) -> Parts:
 
 
 def along(
-    designs: Designs, integrands: Sequence[Integrand], strips: Strips, allowed: Floats, rays: int, cells: int
+    designs: Scanned, integrands: Sequence[Integrand], strips: Strips, allowed: Floats, rays: int, cells: int
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Integrals along rays, shape (integrands, rays), and the errors that they leave in cells (integrands, cells).
 
@@ -156,7 +156,7 @@ def _worst(owner: Ints, error: Floats, noise: Floats, allowed: Floats) -> Flags:
     return split & (np.bincount(owner, share, allowed.shape[1]) > 1)[owner]
 
 
-def evaluate(designs: Designs, integrands: Sequence[Integrand], segments: Parts) -> Strips:
+def evaluate(designs: Scanned, integrands: Sequence[Integrand], segments: Parts) -> Strips:
     """Integrals over segments, and their errors strip by strip."""
     segments = segments[np.argsort(segments["strip"], kind="stable")]
     first = np.flatnonzero(np.diff(segments["strip"], prepend=-1))
@@ -257,7 +257,7 @@ def _sign_change(x: Floats, values: Floats) -> Floats:
     return np.where(finite & change.any(axis=0), root, np.nan)
 
 
-def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
+def _crossing(designs: Scanned, segments: Parts, v: Floats) -> Floats:
     """Where a forward singularity divides segments, by a step of Newton's method from `v`."""
     step = STEP * (segments["stop"] - segments["start"])
     around = v + step * np.array([-1.0, 0.0, 1.0])[:, None]

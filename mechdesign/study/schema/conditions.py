@@ -114,7 +114,7 @@ class Span(fields.Model):
             yield fields.Misfit(self.at_least >= self.at_most, "nothing is at least {} and at most {}", ends)
 
     def interval(self, unit: str) -> Interval:
-        """The values in a unit; see `mechdesign.ground.rows.Span`.
+        """The values in a unit; see `ValueRange` of `mechdesign.ground.statistics`.
 
         Raises
         ------

@@ -52,7 +52,7 @@ def unknown_key(name: str, names: Iterable[str]) -> str:
     return f"unknown key{hint or elsewhere}"
 
 
-class Remark(NamedTuple):
+class PathRemark(NamedTuple):
     """A message about a path of the data, which stands at the key there or else at its value."""
 
     path: tuple[str | int, ...]
@@ -65,8 +65,8 @@ class Reporter:
 
     def __init__(self, document: Document) -> None:
         self.document = document
-        self._mistakes: list[Remark] = []
-        self._doubts: list[Remark] = []
+        self._mistakes: list[PathRemark] = []
+        self._doubts: list[PathRemark] = []
         self.kinds: dict[KeyPath, str] = {}
 
     @property
@@ -95,7 +95,7 @@ class Reporter:
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Report a mistake at a path of the data, which may go through the long form of a short one."""
-        self._mistakes.append(Remark(tuple(path), message, at_key))
+        self._mistakes.append(PathRemark(tuple(path), message, at_key))
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Report quantities at or below a path of the data whose unit is of another kind."""
@@ -120,9 +120,9 @@ class Reporter:
 
     def doubt(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Warn of what is likely a mistake at a path of the data."""
-        self._doubts.append(Remark(tuple(path), message, at_key))
+        self._doubts.append(PathRemark(tuple(path), message, at_key))
 
-    def _placed(self, remark: Remark) -> Iterator[Problem]:
+    def _placed(self, remark: PathRemark) -> Iterator[Problem]:
         """A remark at its place in the text; nothing where it only follows from a mistake of the text itself."""
         written = self.document.written(remark.path)
         above = [written[:length] for length in range(len(written) + 1)]

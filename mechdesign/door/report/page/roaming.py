@@ -27,7 +27,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.index_maps import Scale, contours, index_columns
-from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
+from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, HeldRegion, fate, grids, regions, some
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.study import Study
@@ -93,7 +93,7 @@ def roaming(study: Study, result: Result, name: str) -> MovingPicture | None:
     return MovingPicture(drawing, "", data, words, ["value"], entries, meanings(table), replaces, maps)
 
 
-def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
+def _solved(study: Study, region: HeldRegion, cells: int) -> tuple[Ints, Configuration]:
     """Rows of the region's grid, at most one in each of even cells, and the poses there."""
     local, configuration = region.local, solved_inside(study, region)
     z = local["x"] + 1j * local["y"]
@@ -109,7 +109,7 @@ def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configurati
     return nearest, configuration.take(nearest)
 
 
-def _table(study: Study, region: Region, rows: Ints, configuration: Configuration) -> Table:
+def _table(study: Study, region: HeldRegion, rows: Ints, configuration: Configuration) -> Table:
     """Place, drives and local indices at some rows of the region's grid."""
     point = WorkspaceSection.of(study).point
     columns = [Column(f"{point}.{axis}", region.local[axis][rows], region.local.column(axis).unit)
@@ -124,7 +124,7 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
 
 
 def _maps(
-    layers: Element, sheet: Canvas, region: Region, number: int, scales: Mapping[str, Scale], name: str
+    layers: Element, sheet: Canvas, region: HeldRegion, number: int, scales: Mapping[str, Scale], name: str
 ) -> list[Map]:  # fmt: skip
     """A group for each index with its map over a region, the one of a number, or a group of the region alone."""
     places = sheet.all(region.places())
@@ -155,7 +155,7 @@ def _corners(places: Complexes) -> tuple[complex, complex]:
             complex(np.nanmax(places.real), np.nanmax(places.imag)) + room)  # fmt: skip
 
 
-def _region(layer: Element, sheet: Canvas, region: Region) -> None:
+def _region(layer: Element, sheet: Canvas, region: HeldRegion) -> None:
     """The region, and faintly what is left out."""
     if region.others is not None:
         _fill(layer, sheet, region.others[0], LEFT_OUT)
@@ -186,7 +186,7 @@ def _map(layer: Element, sheet: Canvas, patches: Sequence[Grid], norm: BoundaryN
     add(layer, "image", href=data, width=sheet.width, height=sheet.height, preserveAspectRatio="none")
 
 
-def _boundary(layer: Element, sheet: Canvas, region: Region) -> None:
+def _boundary(layer: Element, sheet: Canvas, region: HeldRegion) -> None:
     """The boundary, by what ends the region there."""
     table = region.boundary
     for rows in curves(table):
@@ -207,7 +207,7 @@ def _look(line: Element, kind: str) -> None:
     dashed(line, dashes, width)
 
 
-def _legend(root: Element, sheet: Canvas, shown: Sequence[Region], scales: Mapping[str, Scale]) -> None:
+def _legend(root: Element, sheet: Canvas, shown: Sequence[HeldRegion], scales: Mapping[str, Scale]) -> None:
     """Below the drawing what ends the regions, and what the colours of each map mean; the first is seen."""
     fates = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip

@@ -16,7 +16,7 @@ from mechdesign.drawing import style
 from mechdesign.drawing.contours import colour_steps, constant, round_levels
 from mechdesign.drawing.marks import Contours, Own, Panel, PanelMark, Picture, Trace
 from mechdesign.drawing.pictures import picture
-from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
+from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, CasePlane, Gates
 from mechdesign.experiments.figures.sweep.quantities import (
     MOST_OVER_MAP,
     CaseAxis,
@@ -52,7 +52,7 @@ def response(view: CasesView) -> Picture | None:
         return None
     entries, results, table, goals = view.entries, view.results, view.table, view.drawn.goals
     numbers = [entry for entry in entries if not entry.words]
-    pairs = (Plane.of(x, y, others=len(entries) > 2) for x, y in combinations(numbers[:MOST_ENTRIES], 2))
+    pairs = (CasePlane.of(x, y, others=len(entries) > 2) for x, y in combinations(numbers[:MOST_ENTRIES], 2))
     most = MOST_BELOW if style.narrow() else MOST_MAPS
     planes = [plane for plane in pairs if plane is not None][:most]
     ranked = sorted((result for result in results if result.ends), key=lambda axis: axis.name not in goals)
@@ -106,7 +106,7 @@ def _norm(fields: Sequence[Floats], met: Floats) -> BoundaryNorm:
     return colour_steps(round_levels(*ends, LEVELS), low, high)
 
 
-def _gate_marks(plane: Plane, gates: Gates) -> Iterator[PanelMark]:
+def _gate_marks(plane: CasePlane, gates: Gates) -> Iterator[PanelMark]:
     """A line a result along its limits, hatched where they are not all kept."""
     if gates.unmet:
         yield Own(partial(_hatch, plane, gates))
@@ -115,13 +115,13 @@ def _gate_marks(plane: Plane, gates: Gates) -> Iterator[PanelMark]:
             yield Own(partial(_limit, plane, margin, _dashes(k)))
 
 
-def _hatch(plane: Plane, gates: Gates, axes: Axes) -> None:
+def _hatch(plane: CasePlane, gates: Gates, axes: Axes) -> None:
     least = [np.nanmin(gates.joint) - 1, 0]
     unmet = axes.contourf(*plane.fine, gates.joint, levels=least, colors=_VEIL, hatches=["////"])
     unmet.set(edgecolor=_HATCH, linewidth=0)
 
 
-def _limit(plane: Plane, margin: Floats, dashes: Any, axes: Axes) -> None:
+def _limit(plane: CasePlane, margin: Floats, dashes: Any, axes: Axes) -> None:
     line = axes.contour(*plane.fine, margin, levels=[0.0], colors=style.INK, linewidths=1.4)
     line.set(linestyle=dashes, path_effects=[withStroke(linewidth=3.0, foreground="white")])
 

@@ -36,7 +36,7 @@ REDUCTIONS: Mapping[int, tuple[Reduction, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class CasePlane:
     """Two entries, and the cases at each place of their plane.
 
     Parameters
@@ -61,7 +61,7 @@ class Plane:
     classes: int = 0
 
     @classmethod
-    def of(cls, x: CaseAxis, y: CaseAxis, *, others: bool) -> Plane | None:
+    def of(cls, x: CaseAxis, y: CaseAxis, *, others: bool) -> CasePlane | None:
         """The plane of two entries, beside which others vary or not; None where the cases lie on a line."""
         steps = (x.distinct, y.distinct)
         across, up = (np.searchsorted(step, axis.values) for step, axis in zip(steps, (x, y), strict=True))
@@ -145,7 +145,7 @@ class Gates:
     nearest: Flags
 
     @classmethod
-    def of(cls, plane: Plane, limited: Sequence[CaseAxis], table: Table) -> Gates:
+    def of(cls, plane: CasePlane, limited: Sequence[CaseAxis], table: Table) -> Gates:
         """What results with limits make of a plane."""
         every = [_margin(axis, table[f"{axis.name}_met"] == 1) for axis in limited]
         single = [plane.over(plane.reduced(margin, np.fmax.reduceat)) for margin in every]

@@ -111,7 +111,7 @@ def goals_of(study: Study) -> dict[Target, Complexes]:
             if target.table is not None and len(target.coordinates) == 2}  # fmt: skip
 
 
-class Steps(NamedTuple):
+class SweepSteps(NamedTuple):
     """Poses at equal steps of what is swept, the step in words, and the values that are written beside some."""
 
     rows: Ints
@@ -119,7 +119,7 @@ class Steps(NamedTuple):
     written: Mapping[int, str]
 
 
-def steps_of(sweep: Sweep) -> Steps | None:
+def steps_of(sweep: Sweep) -> SweepSteps | None:
     """Steps of a sweep of one coordinate, with their time where it has a constant rate; None of other motions."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
@@ -146,10 +146,10 @@ def steps_of(sweep: Sweep) -> Steps | None:
         spacing = next((k for k in range(spacing, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), spacing)
     degree = "\N{DEGREE SIGN}" * (unit == "deg")
     written = {k: f"{values[k]:.4g}{degree}" for k in rows[::spacing].tolist()}
-    return Steps(rows, f"every {words}; numbers: {name}", written)
+    return SweepSteps(rows, f"every {words}; numbers: {name}", written)
 
 
-def _across(sweep: Sweep, steps: Steps) -> Iterator[tuple[str, Complexes, Complexes]]:
+def _across(sweep: Sweep, steps: SweepSteps) -> Iterator[tuple[str, Complexes, Complexes]]:
     """Points of the boldest paths, their places at the steps, and the unit vectors across the path there."""
     ranked, rows = ranks(sweep.study), steps.rows
     for point, path in sweep.places.items():
@@ -160,7 +160,7 @@ def _across(sweep: Sweep, steps: Steps) -> Iterator[tuple[str, Complexes, Comple
             yield point, path[rows], 1j * along / np.abs(along)
 
 
-def _draw_steps(sweep: Sweep, steps: Steps, axes: Axes) -> None:
+def _draw_steps(sweep: Sweep, steps: SweepSteps, axes: Axes) -> None:
     """Short lines across the boldest paths, of a length on paper."""
     shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
     half, lines = _TICK / 2 / (shown[1, 0] - shown[0, 0]), []
@@ -170,7 +170,7 @@ def _draw_steps(sweep: Sweep, steps: Steps, axes: Axes) -> None:
     axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
 
 
-def _step_names(sweep: Sweep, steps: Steps) -> list[Label]:
+def _step_names(sweep: Sweep, steps: SweepSteps) -> list[Label]:
     """The values that are written beside some steps."""
     looks = {look.point: look for look in path_looks(sweep)}
     return [

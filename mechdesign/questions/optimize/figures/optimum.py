@@ -43,7 +43,7 @@ _LOOKS: dict[tuple[str, bool], dict[str, Any]] = {
 }
 
 
-class Reached(NamedTuple):
+class TargetedOutput(NamedTuple):
     """An output with a target over the poses: what it is, and by how much it misses."""
 
     output: str
@@ -57,14 +57,14 @@ class Reached(NamedTuple):
         return float(np.nanmax(np.abs(self.error)))
 
 
-def reached(table: Table) -> list[Reached]:
+def reached(table: Table) -> list[TargetedOutput]:
     """Outputs with targets in a table of motion; the distance from a path only if there is no other error."""
     outputs = []
     for column in table.columns:
         output = column.name.removesuffix("_error")
         if output != column.name and np.isfinite(column.values).any():
             placed = output in table
-            outputs.append(Reached(output, column.unit, table[output] if placed else None, column.values))
+            outputs.append(TargetedOutput(output, column.unit, table[output] if placed else None, column.values))
     return [curve for curve in outputs if curve.values is not None] or outputs
 
 
@@ -93,7 +93,7 @@ def designs_picture(parts: Sequence[tuple[str, Shown, Result | None]]) -> Pictur
     return Picture("", panels, across=len(panels), share="xy")
 
 
-def _worst(shown: Sequence[Reached], valid: Ints) -> int:
+def _worst(shown: Sequence[TargetedOutput], valid: Ints) -> int:
     """The valid pose with the largest error relative to the worst of its output; the first pose without targets."""
     if not shown:
         return int(valid[0])
@@ -101,7 +101,7 @@ def _worst(shown: Sequence[Reached], valid: Ints) -> int:
     return int(valid[np.nanargmax(np.nan_to_num(far[valid], nan=-1.0))])
 
 
-def _targets(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
+def _targets(table: Table, shown: Sequence[TargetedOutput]) -> dict[str, Complexes]:
     """Places where points should be at the poses, by point: what they reach less the error."""
     errors = {curve.output: curve.error for curve in shown}
     targets: dict[str, Complexes] = {}
@@ -113,7 +113,7 @@ def _targets(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
     return targets
 
 
-def _target_marks(table: Table, shown: Sequence[Reached]) -> Iterator[Trace]:
+def _target_marks(table: Table, shown: Sequence[TargetedOutput]) -> Iterator[Trace]:
     """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
     for point, targets in _targets(table, shown).items():
         x, y = (table[f"{point}.{axis}"] for axis in "xy")
@@ -151,7 +151,7 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     return paths
 
 
-def _over_poses(over: Along, shown: Sequence[Reached]) -> Iterator[Panel]:
+def _over_poses(over: Along, shown: Sequence[TargetedOutput]) -> Iterator[Panel]:
     """Scalar outputs as wanted and reached, and the error of every output, over the poses."""
     dots: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
     blue = {"color": style.BLUE} | dots

@@ -89,7 +89,7 @@ def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
     return np.asarray(mean[:, None] + axes @ np.stack([np.cos(turn), np.sin(turn)]))
 
 
-class Region(NamedTuple):
+class DensityRegion(NamedTuple):
     """A smoothed density on a net of places, its levels that hold `SHARES`, and which samples lie outside all."""
 
     x: Floats
@@ -100,7 +100,7 @@ class Region(NamedTuple):
     width: float
 
 
-def smoothed(errors: Floats) -> Region | None:
+def smoothed(errors: Floats) -> DensityRegion | None:
     """Density of errors, shape (2, n), by a normal kernel of Scott's width n^(-1/6) deviations; None of too few.
 
     A level is the density that a share of the samples lies above, at their own places.
@@ -125,7 +125,7 @@ def smoothed(errors: Floats) -> Region | None:
     levels = [float(level) for level in np.quantile(at, [1 - share for share in shares])]
     net = np.stack(np.meshgrid(centres, centres, indexing="ij"))
     x, y = mean[:, None, None] + np.tensordot(axes, net, axes=1)
-    return Region(x, y, density, levels, at < levels[-1], width)
+    return DensityRegion(x, y, density, levels, at < levels[-1], width)
 
 
 def _limits(samples: Samples, reach: Floats) -> tuple[Floats, str, str]:

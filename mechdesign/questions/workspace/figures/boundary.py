@@ -23,7 +23,7 @@ from mechdesign.ground.results import Table
 from mechdesign.mechanism import Configuration
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import (
-    Region,
+    HeldRegion,
     fill,
     left_out,
     lines,
@@ -43,7 +43,7 @@ _NEAR_SHAPE = 3.0  # points from an inscribed shape to its size in words
 
 
 def workspace_picture(
-    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None,
+    study: Study, drawn: DrawnRegion, region: HeldRegion, title: str = "", before: Before | None = None,
     more: Sequence[PanelMark] = (),
 ) -> Picture:  # fmt: skip
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
@@ -73,7 +73,7 @@ def boundary_picture(view: WorkspaceView) -> Picture | None:
 
 
 def regions_picture(
-    parts: Sequence[tuple[str, Study, Region, Sequence[PanelMark]]], title: str, before: Before | None = None
+    parts: Sequence[tuple[str, Study, HeldRegion, Sequence[PanelMark]]], title: str, before: Before | None = None
 ) -> Picture:  # fmt: skip
     """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
     study, poses = parts[0][1], [_pose_inside(own, region) for _, own, region, _ in parts]
@@ -89,12 +89,12 @@ def regions_picture(
     return region_picture(study, everywhere, panels, title)
 
 
-def _pose_inside(study: Study, region: Region) -> Configuration:
+def _pose_inside(study: Study, region: HeldRegion) -> Configuration:
     """The pose at the node of a region where the Jacobian is conditioned best."""
     return solved_inside(study, region, [int(np.argmax(np.nan_to_num(region.local["inverse_condition"], nan=-1.0)))])
 
 
-def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = slice(None)) -> Configuration:
+def solved_inside(study: Study, region: HeldRegion, rows: Sequence[int] | slice = slice(None)) -> Configuration:
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
     field = next(own.field for own in regions(study) if own.held == region.held)
     return field.poses(places(region.local)[rows])
@@ -127,7 +127,7 @@ def _draw_shapes(shapes: Sequence[tuple[Patch, Label]], axes: Axes) -> None:
         axes.add_patch(shape)
 
 
-def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Label]]:
+def _inscribed(table: Table, region: HeldRegion, unit: str) -> list[tuple[Patch, Label]]:
     """The shapes of a region that were found, each with its size in words.
 
     Those that a singularity crosses are dotted.

@@ -30,7 +30,7 @@ _TOGETHER, _EACH = 0.09, 0.03  # of its height, alone and for each of many, betw
 _JOINED = 2e-5  # of the size of the region, between ends of curves that are one corner
 
 
-class Loop(NamedTuple):
+class BoundaryLoop(NamedTuple):
     """Smooth parts of a boundary, one after the other, counterclockwise: their rows; and whether it is a hole's."""
 
     parts: Sequence[Ints]
@@ -75,12 +75,12 @@ def drives_picture(view: WorkspaceView) -> Picture | None:
     return Picture("Drives along the boundary of the workspace, counterclockwise", panels, ("; ".join(notes),))
 
 
-def loops(boundary: Table) -> list[Loop]:
+def loops(boundary: Table) -> list[BoundaryLoop]:
     """The closed curves of a boundary, that of each piece of the region before those of the holes in it.
 
     Each begins where the scan meets it first. A boundary that a scan of a part of the plane leaves open is one, too.
     """
-    z, left, built = places(boundary), [*curves(boundary)], list[Loop]()
+    z, left, built = places(boundary), [*curves(boundary)], list[BoundaryLoop]()
     near = _JOINED * float(np.ptp(z.real) + np.ptp(z.imag))
     while left:
         parts = [left.pop(0)]
@@ -96,7 +96,7 @@ def loops(boundary: Table) -> list[Loop]:
         if float(np.sum((np.conj(way) * np.roll(way, -1)).imag)) < 0:
             parts = [rows[::-1] for rows in parts[::-1]]
         first = min(range(len(parts)), key=lambda k: float(boundary["theta"][parts[k]].min()))
-        built.append(Loop([*parts[first:], *parts[:first]], inner=False))
+        built.append(BoundaryLoop([*parts[first:], *parts[:first]], inner=False))
     ways = [z[np.concatenate(loop.parts)] for loop in built]
     # What lies in a hole is the outer boundary of another piece.
     around = [sum(_inside(way, other) for other in ways if other is not way) for way in ways]
@@ -110,7 +110,7 @@ def _inside(way: Complexes, other: Complexes) -> bool:
     return bool(Path(np.column_stack([other.real, other.imag])).contains_point((place.real, place.imag)))
 
 
-def _in_words(boundary: Table, loop: Loop, length: str) -> str:
+def _in_words(boundary: Table, loop: BoundaryLoop, length: str) -> str:
     """``inner boundary from (30, 40) mm``: where its length is 0, to a thousandth of its size."""
     rows = np.concatenate(loop.parts)
     step = 10.0 ** (np.floor(np.log10(np.ptp(boundary["x"][rows]) + np.ptp(boundary["y"][rows]))) - 3)

@@ -25,7 +25,7 @@ from mechdesign.ground.indices import INDEX_NAMES, index
 from mechdesign.ground.numerals import power
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.regions import (
-    Region,
+    HeldRegion,
     fill,
     grids,
     left_out,
@@ -60,7 +60,7 @@ def index_pictures(view: WorkspaceView) -> dict[str, Picture] | None:
     return {name: _index_map(view.study, shown, name, left_out(view.regions)) for name in names}
 
 
-def index_columns(region: Region) -> list[str]:
+def index_columns(region: HeldRegion) -> list[str]:
     """Names of the local indices that a region's table holds."""
     return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
 
@@ -94,7 +94,7 @@ class Scale:
     value: float | None = None
 
     @classmethod
-    def of(cls, regions: Sequence[Region], column: str) -> Scale:
+    def of(cls, regions: Sequence[HeldRegion], column: str) -> Scale:
         """That of a column of the table of local indices."""
         unit, name = regions[0].local.column(column).unit, column.replace("_", " ")
         shown, label = [[*grids(region.local, column)] for region in regions], style.axis_label(name, unit)
@@ -116,7 +116,7 @@ class Scale:
         return cls(shown, norm, labels, f"{name}, in parts", words)
 
 
-def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -> Picture:
+def _index_map(study: Study, regions: Sequence[HeldRegion], column: str, cut: str) -> Picture:
     meaning, scale = regions[0].local.column(column), Scale.of(regions, column)
     everywhere = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""

@@ -25,7 +25,14 @@ from mechdesign.ground.results import Table
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.motion import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
-from mechdesign.questions.workspace.figures.regions import PALE, Region, inner_loci, places, region_marks, stretch_of
+from mechdesign.questions.workspace.figures.regions import (
+    PALE,
+    HeldRegion,
+    inner_loci,
+    places,
+    region_marks,
+    stretch_of,
+)
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.study import Study
@@ -139,7 +146,7 @@ def _turn(study: Study, name: str) -> float:
 
 
 def _unrolled(
-    region: Region, drives: Sequence[Floats], turns: Floats, sketch: Floats, place: complex
+    region: HeldRegion, drives: Sequence[Floats], turns: Floats, sketch: Floats, place: complex
 ) -> tuple[list[Floats], Floats]:  # fmt: skip
     """Drives at the nodes of each patch, shape (rays, nodes, 2), continuous from patch to patch; and whole turns.
 
@@ -231,7 +238,7 @@ def _copies(cuts: Sequence[PlaneCut], nodes: Floats) -> list[Floats]:
 
 
 def _moved(
-    region: Region, table: Table, drives: Sequence[Floats], nodes: Floats, turns: Floats, shifts: Sequence[Floats],
+    region: HeldRegion, table: Table, drives: Sequence[Floats], nodes: Floats, turns: Floats, shifts: Sequence[Floats],
     cuts: Sequence[PlaneCut],
 ) -> Table:  # fmt: skip
     """Curves of a table with the drives in place of x and y, each in the turn of the node at its middle."""

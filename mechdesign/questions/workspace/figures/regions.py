@@ -62,7 +62,7 @@ def pieces(path: Table) -> list[Ints]:
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class HeldRegion:
     """The region for one value of each held coordinate: its row of the table of indices, and its part of the others.
 
     The title is ``platform.angle = 15 deg``, empty where nothing is held; `others` are grids and boundary of the pieces
@@ -91,7 +91,7 @@ def grids(local: Table, column: str) -> Iterator[Grid]:
         yield x, y, z
 
 
-def regions(study: Study, result: Result) -> list[Region]:
+def regions(study: Study, result: Result) -> list[HeldRegion]:
     """The regions that are not empty, in the order of the table of indices."""
     indices = result.tables["indices"]
     held = [name for name in (study.workspace.at if study.workspace else ()) if name in result.tables["local"]]
@@ -113,7 +113,7 @@ def regions(study: Study, result: Result) -> list[Region]:
             others = local.take(local["piece"] > 1), boundary.take(boundary["piece"] > 1)
             local, boundary = local.take(local["piece"] == 1), boundary.take(boundary["piece"] == 1)
         loci = lines.take(lines.where(**values)) if lines is not None and len(lines) else None
-        built.append(Region(title, values, row, local, boundary, loci, others))
+        built.append(HeldRegion(title, values, row, local, boundary, loci, others))
     return built
 
 
@@ -127,7 +127,7 @@ def fate(kind: str, at: str) -> str:
     return "singularity"
 
 
-def region_marks(region: Region) -> Iterator[PanelMark]:
+def region_marks(region: HeldRegion) -> Iterator[PanelMark]:
     """A region's boundary by what ends it, faintly the pieces left out, and the singularities inside."""
     boundary = region.boundary
     ends: dict[str, list[Ints]] = {}
@@ -165,7 +165,7 @@ def _joined(table: Table, pieces: Sequence[Ints], words: str, look: Mapping[str,
     return Trace(x, y, label=words, look=look)
 
 
-def inner_loci(region: Region) -> list[Ints]:
+def inner_loci(region: HeldRegion) -> list[Ints]:
     """Rows of each curve of singularities inside the region; `outline` draws those that end it."""
     table = region.singularities
     if table is None:
@@ -194,12 +194,12 @@ def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: f
     return drawn
 
 
-def some(regions: Sequence[Region]) -> list[Region]:
+def some(regions: Sequence[HeldRegion]) -> list[HeldRegion]:
     """At most `MAX_REGIONS` regions, evenly spread."""
     return [regions[k] for k in evenly(len(regions), MAX_REGIONS)]
 
 
-def left_out(regions: Sequence[Region]) -> str:
+def left_out(regions: Sequence[HeldRegion]) -> str:
     """How many regions `some` leaves out, in words for the end of a title."""
     return f" ({MAX_REGIONS} of {len(regions)} shown)" if len(regions) > MAX_REGIONS else ""
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 from mechdesign.drawing.pictures import View
 from mechdesign.questions.workspace.drawn import DrawnRegion
-from mechdesign.questions.workspace.figures.regions import Region, regions
+from mechdesign.questions.workspace.figures.regions import HeldRegion, regions
 
 
 class WorkspaceView(View):
@@ -17,7 +17,7 @@ class WorkspaceView(View):
     """
 
     @cached_property
-    def regions(self) -> list[Region]:
+    def regions(self) -> list[HeldRegion]:
         """The regions that have nodes."""
         return regions(self.study, self.result) if "local" in self.result.tables else []
 
