@@ -29,6 +29,9 @@ ROUNDS = 4
 MIDDLE = 0.4871
 # Rays that test a panel, by the variable of `cubic`: they are dense near its ends, where a boundary may have a notch.
 PROBES = np.array([0.02, 0.15, 0.3, 0.49, 0.7, 0.85, 0.98])
+# A margin that ends an interval jumps there if it is more than this part of its largest value. That near to the end, as
+# a part of the radius, but no farther than the middle of the interval, margins are those inside.
+JUMPS, INSIDE = 1e-4, 1e-11
 # Width (radians) below which a panel may hold nothing but the tip of a cusp.
 NARROW = 1e-3
 
@@ -208,6 +211,10 @@ def _along_ends(
     end = np.arange(len(owner)) - np.repeat(np.cumsum(2 * counts) - 2 * counts, 2 * counts)
     panels, angles = [owner[:0]], [theta[0, :0]]
 
+    def sampled(lane: Ints, radius: Floats, angle: Floats) -> tuple[Floats, Floats, Complexes]:
+        z = designs.about + radius * np.exp(1j * angle)
+        return field.sampled(z, designs.of(design[owner[lane]]))
+
     def at_ends(lane: Ints, angle: Floats, ray: Ints, traced: Intervals) -> tuple[Floats, Floats, Complexes]:
         """Margins but that of the end itself, and rotations, at ends of rays; nan where a ray is unlike its panel."""
         like = signatures(traced, labels)[ray] == codes[owner[lane]]
@@ -215,9 +222,15 @@ def _along_ends(
         last = end[lane] % 2 == 1
         radius = np.where(last, np.append(traced.outer, np.nan)[slot], np.append(traced.inner, np.nan)[slot])
         name = np.where(last, np.append(traced.leaves, -1)[slot], np.append(traced.enters, -1)[slot])
-        z = designs.about + radius * np.exp(1j * angle)
-        margins, away, rotations = field.sampled(z, designs.of(design[owner[lane]]))
+        margins, away, rotations = sampled(lane, radius, angle)
         own = np.flatnonzero(name >= 0)
+        # Where the margin that ends an interval is not zero it jumps, as others do with it; those inside count.
+        value, most = np.abs(margins[name[own], own]), np.nan_to_num(np.abs(margins)).max(axis=1, initial=0.0)
+        at = own[value > JUMPS * most[name[own]]]
+        step = np.minimum(INSIDE * radius[at], 0.5 * (traced.outer - traced.inner)[slot[at]])
+        inside = radius[at] + np.where(last[at], -step, step)
+        for table, there in zip((margins, away, rotations), sampled(lane[at], inside, angle[at]), strict=True):
+            table[:, at] = there
         margins[name[own], own] = 1.0
         # Of several assembly modes that of the end counts.
         margins[name // size != np.arange(labels)[:, None] // size] = 1.0
