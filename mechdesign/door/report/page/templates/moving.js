@@ -1,6 +1,4 @@
-"use strict";
 (() => {
-  const SVG = "http://www.w3.org/2000/svg";
   const PLACES = 20, TURNS = 100, TIMES = 10000, ROWS = 1000000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
@@ -63,19 +61,6 @@
 
   // Numbers of the poses with their decimals.
   const tracksOf = data => data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
-
-  function make(name, attributes, parent) {
-    const element = document.createElementNS(SVG, name);
-    for (const key in attributes) element.setAttribute(key, attributes[key]);
-    parent.append(element);
-    return element;
-  }
-
-  function html(name, properties, ...children) {
-    const element = Object.assign(document.createElement(name), properties);
-    element.append(...children);
-    return element;
-  }
 
   // A dot at a place of a drawing, or hidden.
   function put(dot, x, y, visible = isFinite(x + y)) {
@@ -804,8 +789,7 @@
     if (motions.length) maps.forEach(map => mark(motions[0], map));
   }
 
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", () => start());
-  else start();
+  ready(start);
   // A figure that a page gets later.
   document.addEventListener("moving-new", event => start(event.target.parentNode));
 })();
