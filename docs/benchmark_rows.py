@@ -250,7 +250,7 @@ def precision(share: float) -> dict[str, Side]:
     values = {"mechanism.parameters.l1": l1, "mechanism.parameters.tol": tolerance}
 
     def by_hand() -> Floats:
-        return np.asarray(floors.five_bar_deviations(l1, 60.0, tolerance).max(axis=(0, 2)))
+        return np.asarray(floors.five_bar_deviations(l1, tolerance).max(axis=(0, 2)))
 
     return {
         OURS: Side(lambda: mechdesign.evaluate(study, values, [worst]), lambda table: table[worst]),

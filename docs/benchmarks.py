@@ -23,6 +23,7 @@ import path_peers
 import path_problems
 import yaml
 from benchmark_rows import OURS, PEERS, ROWS, Row, accuracy, has_pylinkage
+from markup import table
 
 import mechdesign
 
@@ -88,11 +89,6 @@ def spread(ratios: list[float]) -> str:
     return "**{}** ({} to {})".format(*shown)
 
 
-def markdown(head: list[str], body: list[list[str]]) -> str:
-    """A table."""
-    return "".join(f"| {' | '.join(line)} |\n" for line in [head, ["---"] * len(head), *body])
-
-
 def rows_table(data: Mapping[str, Mapping[str, list[float]]]) -> str:
     """Our time over that of others, row by row."""
     lines = []
@@ -100,7 +96,7 @@ def rows_table(data: Mapping[str, Mapping[str, list[float]]]) -> str:
         missing = {"pylinkage": ROWS[name].without}
         cells = [spread(ratios[peer]) if peer in ratios else missing.get(peer, "") for peer in PEERS]
         lines.append([f"**{ROWS[name].title}.** {ROWS[name].text}", *cells])
-    return markdown(["our time over that of", *PEERS], lines)
+    return table(["our time over that of", *PEERS], *lines)
 
 
 def paths_table(data: Mapping[str, Mapping[str, float | str]]) -> str:
@@ -116,7 +112,7 @@ def paths_table(data: Mapping[str, Mapping[str, float | str]]) -> str:
             errors["pylinkage"] = "three to five points only"
         cells = [cell(errors.get(name, "")) for name in (OURS, "printed", "evolution", "pylinkage")]
         lines.append([problem.title, *cells])
-    return markdown(["error over size", OURS, "printed", "differential evolution", "pylinkage"], lines)
+    return table(["error over size", OURS, "printed", "differential evolution", "pylinkage"], *lines)
 
 
 def pages() -> dict[str, str]:
@@ -128,9 +124,9 @@ def pages() -> dict[str, str]:
     errors = [[name, f"{error:.2g}"] for name, error in data["accuracy"].items()]
     return {
         "_benchmarks_run.md": f"{where}, {data['rounds']} rounds; {versions}.\n",
-        "_benchmarks_rows.md": rows_table(data["rows"]),
-        "_benchmarks_accuracy.md": markdown(["isotropy and resistivity by", "largest relative error"], errors),
-        "_benchmarks_paths.md": paths_table(data["paths"]),
+        "_benchmarks_rows.md": rows_table(data["rows"]) + "\n",
+        "_benchmarks_accuracy.md": table(["isotropy and resistivity by", "largest relative error"], *errors) + "\n",
+        "_benchmarks_paths.md": paths_table(data["paths"]) + "\n",
     }
 
 

@@ -120,9 +120,9 @@ def five_bar_ranges(lower: Floats, upper: Floats, other: Floats) -> Floats:
     return np.asarray(np.degrees(np.ptp(angle, axis=1)) + 0 * second.sum(axis=1))
 
 
-def five_bar_deviations(l1: Floats, l2: float, tolerance: Floats) -> Floats:
+def five_bar_deviations(l1: Floats, tolerance: Floats) -> Floats:
     """Standard deviations of the tip of five-bars at ten poses, sqrt(sum (J_i sigma_i)^2): shape (2, designs, 10)."""
-    theta1, theta2 = np.radians(np.linspace(90, 126, 10)), np.radians(80.0)
+    theta1, theta2, l2 = np.radians(np.linspace(90, 126, 10)), np.radians(80.0), 60.0
     e1, e2 = np.exp(1j * theta1), np.exp(1j * theta2)
     b, d = l1[:, None] * e1, 50 + l1[:, None] * e2
     half = 0.5 * (d - b)

@@ -13,6 +13,7 @@ from itertools import groupby
 from pathlib import Path
 
 import yaml
+from markup import table
 
 from mechdesign.door.reference import Entry, entries, tables
 from mechdesign.ground.cautions import KINDS
@@ -157,16 +158,13 @@ def table_page(command: str, found: Iterable[TableKind]) -> str:
         f"What `mechdesign {command}` writes. `<names>` stand for those of a study. Lengths, angles, times and forces "
         "are in the study's units; an empty cell or `nan` has no value."
     ]
-    for table in found:
+    for kind in found:
         rows = [[code(column.name), markdown(column.meaning), markdown(column.unit.replace("_", " ")),
-                 code(column.formula.replace("|", r"\|")) if column.formula else ""]
-                for column in table.kinds]  # fmt: skip
-        lines = ["| column | meaning | unit | formula |", "| --- | --- | --- | --- |",
-                 *("| " + " | ".join(row) + " |" for row in rows)]  # fmt: skip
+                 code(column.formula) if column.formula else ""] for column in kind.kinds]  # fmt: skip
         parts += [
-            f"## {table.name}.csv",
-            f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.",
-            "\n".join(lines),
+            f"## {kind.name}.csv",
+            f"{markdown(kind.meaning[0].upper() + kind.meaning[1:])}.",
+            table(["column", "meaning", "unit", "formula"], *rows),
         ]
     return _page(f"Tables of {command}", parts)
 
@@ -207,7 +205,7 @@ def pages() -> dict[str, str]:
         "stands for a name of yours or a place in a list: `mechanism.joints.*.angle`.",
         f"```{{toctree}}\n:maxdepth: 1\n\n{names}\n```",
     ])  # fmt: skip
-    commands = {name: [table for _, table in found] for name, found in groupby(tables(), key=lambda pair: pair[0])}
+    commands = {name: [kind for _, kind in found] for name, found in groupby(tables(), key=lambda pair: pair[0])}
     text |= {f"reference/tables/{name}.md": table_page(name, found) for name, found in commands.items()}
     listing = "\n".join(commands)
     text["reference/tables/index.md"] = _page("Tables and columns", [

@@ -78,13 +78,14 @@ def errors_of(problem: Problem, seconds: float | None = None, *, pylinkage: bool
     Differential evolution has the processor time of our search, or so many seconds.
     """
     begin = time.process_time()
-    bars: dict[str, FourBar | None] = {"mechdesign": problem.solve(LIMITS["usual limits"]), "printed": problem.printed}
+    bars: dict[str, FourBar | None] = {"mechdesign": problem.solve(LIMITS["usual limits"])}
     spent = time.process_time() - begin if seconds is None else seconds
+    if problem.printed is not None:
+        bars["printed"] = problem.printed
     bars["evolution"] = evolved(problem, spent)
-    errors: dict[str, float | str] = {
-        name: float(f"{bar.error(problem.points) / problem.size:.3g}") for name, bar in bars.items() if bar is not None
-    }
     if pylinkage and len(problem.points) <= PRECISE:
-        bar = by_burmester(problem)
-        errors["pylinkage"] = "none found" if bar is None else float(f"{bar.error(problem.points) / problem.size:.3g}")
-    return errors
+        bars["pylinkage"] = by_burmester(problem)
+    return {
+        name: "none found" if bar is None else float(f"{bar.error(problem.points) / problem.size:.3g}")
+        for name, bar in bars.items()
+    }

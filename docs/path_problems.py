@@ -8,13 +8,14 @@ from __future__ import annotations
 import io
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 import yaml
+from markup import table
 
 import mechdesign
 from mechdesign.drawing import style
@@ -141,8 +142,7 @@ class Problem:
         pivot, other, point = (
             complex(number[f"{name}.x"], number[f"{name}.y"]) for name in ("ground.O", "ground.D", "coupler.P")
         )
-        links = (number[f"{name}.length"] for name in ("crank", "coupler", "rocker"))
-        crank, coupler, rocker = links
+        crank, coupler, rocker = (number[f"{name}.length"] for name in ("crank", "coupler", "rocker"))
         sides = [FourBar(pivot, other, crank, coupler, rocker, point, side) for side in (1, -1)]
         return min(sides, key=lambda bar: bar.error(self.points))
 
@@ -158,9 +158,11 @@ def found() -> dict[str, dict[str, FourBar]]:
     return {name: {limits: FourBar.of(bar) for limits, bar in bars.items()} for name, bars in data.items()}
 
 
-def linkages(problem: Problem, bars: Mapping[str, FourBar]) -> dict[str, FourBar]:
-    """The printed linkage of a problem, where there is one, and those found."""
-    return ({} if problem.printed is None else {"printed": problem.printed}) | dict(bars)
+def linkages() -> Iterator[tuple[Problem, dict[str, FourBar]]]:
+    """Every problem with the printed linkage, where there is one, and those found."""
+    solved = found()
+    for problem in problems():
+        yield problem, ({} if problem.printed is None else {"printed": problem.printed}) | solved[problem.name]
 
 
 def error_of(problem: Problem, bar: FourBar) -> str:
@@ -177,15 +179,12 @@ def angle_of(bar: FourBar) -> str:
 
 def overview() -> str:
     """The table of all problems."""
-    names = ("printed", *LIMITS)
-    lines = [["problem", "points", *names], ["---"] * (2 + len(names))]
-    solved = found()
-    for problem in problems():
-        bars = linkages(problem, solved[problem.name])
+    names, lines = ("printed", *LIMITS), list[list[str]]()
+    for problem, bars in linkages():
         shown = [f"{error_of(problem, bars[name])} ({angle_of(bars[name])})" if name in bars else "" for name in names]
         place = re.sub(r"[^a-z]+", "-", problem.title.lower())
         lines.append([f"[{problem.title}](#{place})", str(len(problem.points)), *shown])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return table(["problem", "points", *names], *lines)
 
 
 def drawing(problem: Problem, bars: Mapping[str, FourBar]) -> str:
@@ -213,38 +212,25 @@ def drawing(problem: Problem, bars: Mapping[str, FourBar]) -> str:
 
 def section(problem: Problem, bars: Mapping[str, FourBar]) -> str:
     """A problem: its source, its picture, its linkages, and the study."""
-    rows = [["", "first pivot", "second pivot", "crank", "coupler", "rocker", "P along, across the coupler"]]
-    rows.append(["---"] * len(rows[0]))
+    head = ["", "first pivot", "second pivot", "crank", "coupler", "rocker", "P along, across the coupler"]
+    rows = []
     for name, bar in bars.items():
-        pairs = (f"{place.real:.6g}, {place.imag:.6g}" for place in (bar.pivot, bar.other, bar.point))
-        pivot, other, point = pairs
+        pivot, other, point = (f"{place.real:.6g}, {place.imag:.6g}" for place in (bar.pivot, bar.other, bar.point))
         lengths = [f"{length:.6g}" for length in (bar.crank, bar.coupler, bar.rocker)]
         rows.append([f"{name}, {'left' if bar.side > 0 else 'right'}", pivot, other, *lengths, point])
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    picture = f"![{problem.title}](path_problems_{problem.name}.svg)"
     block = f"```{{code-block}} yaml\n:caption: {problem.name}.yaml\n\n{problem.study()}```"
-    parts = (
-        f"## {problem.title}",
-        problem.source,
-        f"![{problem.title}](path_problems_{problem.name}.svg)",
-        table,
-        block,
-    )
-    return "\n\n".join(parts)
+    return "\n\n".join((f"## {problem.title}", problem.source, picture, table(head, *rows), block))
 
 
 def sections() -> str:
     """The text of all problems."""
-    solved = found()
-    return "\n\n".join(section(problem, linkages(problem, solved[problem.name])) for problem in problems()) + "\n"
+    return "\n\n".join(section(problem, bars) for problem, bars in linkages()) + "\n"
 
 
 def pages() -> dict[str, str]:
     """What the page of the ten problems includes, and its pictures, by their paths in the folder of the site."""
-    solved = found()
-    drawings = {
-        f"theory/path_problems_{problem.name}.svg": drawing(problem, linkages(problem, solved[problem.name]))
-        for problem in problems()
-    }
+    drawings = {f"theory/path_problems_{problem.name}.svg": drawing(problem, bars) for problem, bars in linkages()}
     return {"theory/_path_problems_table.md": overview() + "\n", "theory/_path_problems.md": sections()} | drawings
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from cases import EVIDENCE, Case, Row, cases, half_unit, setting, shown
 from gallery import ROOT, picture, results
+from markup import table
 from steps import step
 
 import mechdesign
@@ -44,12 +45,6 @@ def cells(row: Row, letter: str = "") -> list[str]:
     ours = shown(row.ours) + (f"{{sup}}`{letter}`" if letter else "")
     difference = "" if row.bound else f"{row.difference:.1e}" if row.difference else "0"
     return [label, row.bound or row.printed or shown(row.expected), ours, difference, agreement(row)]
-
-
-def table(*lines: Sequence[str]) -> str:
-    """A table of Markdown; the first line is its head."""
-    every = (lines[0], ["---"] * len(lines[0]), *lines[1:])
-    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in every)
 
 
 def command(case: Case) -> str:

@@ -61,7 +61,7 @@ def replace(path: Path, blocks: Iterable[bytes]) -> str:
             left.unlink(missing_ok=True)
     with Transaction(path.parent) as files:
         digest = files.stage(path.name, blocks)
-        files.commit()
+        files.place()
     return digest
 
 
@@ -111,8 +111,14 @@ class Transaction:
                 digest.update(block)
         return digest.hexdigest()
 
-    def commit(self, own: Collection[str] = (), kept: Collection[str] = (), *, voucher: str | None = None) -> None:
-        """Give the files their names, and remove the folder's `own` files except those `kept`.
+    def place(self, last: str = "") -> None:
+        """Give the files their names."""
+        for name in sorted(self._staged, key=lambda name: name == last):
+            with giving_way(self.directory / name):
+                os.replace(self._staged[name], self.directory / name)
+
+    def commit(self, own: Collection[str], kept: Collection[str] = (), *, voucher: str) -> None:
+        """Give the files of results their names, and remove the folder's `own` files except those `kept`.
 
         The voucher is removed first and written last. If the process is killed meanwhile, `unsettled` lists the files.
 
@@ -123,15 +129,12 @@ class Transaction:
         OutputError
             If a file cannot be replaced or removed, as it is open elsewhere; then nothing has changed, either.
         """
-        if voucher is None:
-            self._place()
-            return
         check_own(self.directory, self._staged, own)
         replace(self.directory / _UNSETTLED, [json.dumps(sorted({*own, *self._staged})).encode()])
         try:
             for name in (voucher, *sorted({*own, *self._staged} - {voucher, *(set(kept) - self._staged.keys())})):
                 self._set_aside(name)
-            self._place(voucher)
+            self.place(voucher)
         except (OSError, OutputError):
             self._put_back()
             settle(self.directory)
@@ -148,11 +151,6 @@ class Transaction:
             with giving_way(path):
                 os.replace(path, aside)
             self._aside[name] = aside
-
-    def _place(self, voucher: str | None = None) -> None:
-        for name in sorted(self._staged, key=lambda name: name == voucher):
-            with giving_way(self.directory / name):
-                os.replace(self._staged[name], self.directory / name)
 
     def _put_back(self) -> None:
         for name, temporary in self._staged.items():

@@ -133,7 +133,9 @@ def test_the_command_serves_until_ctrl_c_and_says_how_many_pages_were_open(brows
         expect(pages[0].locator(".live-message")).to_contain_text("bar.yaml")
         path.rmdir()
         path.write_text(FOUR_BAR)
-        expect(pages[0].locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("60")
+        for page in pages:
+            expect(page.locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("60")
+            page.wait_for_selector("#kinematics .numbers")
         assert "ended; 2 pages open" in interrupted(process)
         assert process.returncode == 0
         for page in pages:

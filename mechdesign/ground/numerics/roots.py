@@ -94,7 +94,7 @@ def bracketed_roots(
 
 
 def dips(
-    function: Callable[[Ints, Floats], Floats], x: Floats, values: Floats, enough: Floats, steps: int = MAX_PARABOLAS
+    function: Callable[[Ints, Floats], Floats], x: Floats, values: Floats, enough: Floats
 ) -> tuple[Floats, Floats]:
     """Places and values, shape (n,), of minima of many functions, by successive parabolas.
 
@@ -109,7 +109,7 @@ def dips(
         `STEEP` times as far as convexity allows. Minus infinity asks for the minimum itself.
     """
     x, values, active = x.copy(), values.copy(), np.arange(x.shape[1])
-    for _ in range(steps):
+    for _ in range(MAX_PARABOLAS):
         (a, b, c), (fa, fb, fc) = x[:, active], values[:, active]
         fall, rise, vertex = parabola(x[:, active], values[:, active])
         # A convex function stays above both lines from an end of the bracket through the middle place.

@@ -37,9 +37,9 @@ class Bounds(ABC):
     def __init__(self, kind: Kind, *, turning: bool, least: float, in_place: bool) -> None:
         self.kind, self.turning, self.least, self.in_place = kind, turning, least, in_place
 
-    @abstractmethod
     def placed(self, values: Floats) -> Floats:
         """Samples where they must be, if `in_place`."""
+        return values
 
     @abstractmethod
     def __call__(self, values: Floats) -> Floats:
@@ -100,28 +100,35 @@ class KindBounds(Bounds):
         return len(self.kind.places) - held * pivots - (len(self.kind.rails) if not held else 0)
 
     def __call__(self, values: Floats) -> Floats:
-        values, limits, site = values.copy(), self.section.bounds, self.site
-        # The shortest gives way to the ratio; a negative length is one to the other side.
-        own = np.abs(values[:, self.links])
-        values[:, self.links] = own = np.maximum(own, own.max(axis=1, keepdims=True) / limits.ratio)
+        values = self._with_lengths(values)
+        for (x, y), place in zip(self.kind.pivots, self._pivots(values).T, strict=True):
+            values[:, x], values[:, y] = place.real, place.imag
+        return values
+
+    def _with_lengths(self, values: Floats) -> Floats:
+        """Linkages of the nearest lengths: the shortest gives way to the ratio; negative ones are to the other side."""
+        values, own = values.copy(), np.abs(values[:, self.links])
+        values[:, self.links] = np.maximum(own, own.max(axis=1, keepdims=True) / self.section.bounds.ratio)
         for column, (low, high) in self.ends.items():
             values[:, column] = np.clip(values[:, column], low, high)
+        return values
+
+    def _pivots(self, values: Floats) -> Complexes:
+        """The nearest places of the pivots within reach of the task, and in their site where that holds them."""
+        site, ratio = self.site, self.section.bounds.ratio
         away = self.kind.frame(values) - site.centre
         places = site.centre + away / np.maximum(np.abs(away) / (site.reach * site.size), 1.0)
         if not self.in_place and self.links:
             # The frame keeps the ratio by its second pivot.
             own, frame = values[:, self.links], places[:, 1] - places[:, 0]
             length = np.maximum(np.abs(frame), np.finfo(float).tiny)
-            least = np.maximum(own.max(axis=1) / limits.ratio, self.ground[0])
-            most = np.minimum(own.min(axis=1) * limits.ratio, self.ground[1])
+            least = np.maximum(own.max(axis=1) / ratio, self.ground[0])
+            most = np.minimum(own.min(axis=1) * ratio, self.ground[1])
             places[:, 1] = places[:, 0] + frame * np.clip(length, least, most) / length
         for pivot, column in self.kind.rails.items():
             # A rail is told by that of its points that is in place, and nearest to the middle.
             places[:, pivot] = site.crossed(places[:, pivot], 1j * np.exp(1j * values[:, column]))
-        places = np.where(self._held(places), site.nearest(places), places)
-        for (x, y), place in zip(self.kind.pivots, places.T, strict=True):
-            values[:, x], values[:, y] = place.real, place.imag
-        return values
+        return np.where(self._held(places), site.nearest(places), places)
 
     def _held(self, places: Complexes) -> Flags:
         """Which pivots the site holds, shape (count, pivots): all, or of fewer given points the nearest to each.
@@ -153,9 +160,6 @@ class RangeBounds(Bounds):
     def __init__(self, kind: OwnKind, *, turning: bool, least: float = 0.0) -> None:
         super().__init__(kind, turning=turning, least=least, in_place=True)
         self.low, self.high = kind.low, kind.high
-
-    def placed(self, values: Floats) -> Floats:
-        return values
 
     def __call__(self, values: Floats) -> Floats:
         return np.clip(values, self.low, self.high)

@@ -1,14 +1,14 @@
-"use strict";
 // What pages on which a hand changes a study have in common: the changes with undo, fields, saving, the file watched.
 // `react` is called when another change than a drag was made.
-function openHand(about, react) {
+function openHand(react) {
   const RETRY = 2000; // milliseconds until the page asks a server that is not there again
   const AWAY = 18; // pixels from the pointer to the words beside it
   const SERIES = 1000; // milliseconds within which presses of keys on a ring are one gesture
+  const WAYS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
   const KEEP = "mechdesign-live", MOST = 500; // what outlasts a new version of the file, and gestures that it holds
   const find = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
   const words = find(".live-hand"), said = find(".live-said"), message = find(".live-message"), grid = find(".live-grid");
-  const dialog = find("dialog"), page = crypto.randomUUID();
+  const about = JSON.parse(find("#live-data").textContent), dialog = find("dialog"), page = crypto.randomUUID();
   const rows = new Map(all(".live-number").map(row => [row.dataset.name, row]));
   const buttons = Object.fromEntries(all("[data-do]").map(button => [button.dataset.do, button]));
   const locks = new Map([...rows].map(([name, row]) => [name, row.querySelector("[type=checkbox]")]).filter(([, lock]) => lock));
@@ -23,8 +23,7 @@ function openHand(about, react) {
   const stored = () => JSON.parse(sessionStorage.getItem(KEEP) || "{}");
 
   const own = {
-    changes: {}, set: [], held: false, rows, page, keeping: () => ({}), kept: {}, settled: async () => {},
-    base,
+    about, changes: {}, set: [], held: false, keeping: () => ({}), kept: {}, settled: async () => {},
     value: name => own.changes[name] ?? base(name),
 
     async post(action, asked, signal) {
@@ -60,6 +59,14 @@ function openHand(about, react) {
     lost(error) {
       ended = true;
       own.warn(`The server does not answer (${error.message}). What is here stays; start mechdesign live again and open its new address.`);
+    },
+
+    // The answer to a question in its room, or why there is none.
+    answered(room, answer, show) {
+      own.warn(about.mistake);
+      if (answer.wrong) room.replaceChildren(html("p", {className: "failed", textContent: answer.wrong}));
+      else show(answer);
+      room.removeAttribute("aria-busy");
     },
 
     // Colours of a part of the page on a dark screen.
@@ -118,7 +125,6 @@ function openHand(about, react) {
 
     // A pointer holds a ring until it lets go: `moved` gets how far it is from where it took it, in pixels.
     grasp(event, ring, moved, done) {
-      if (event.button) return;
       event.preventDefault();
       event.stopPropagation();
       ring.focus({preventScroll: true});
@@ -146,17 +152,23 @@ function openHand(about, react) {
       for (const [kind, call] of listeners) ring.addEventListener(kind, call);
     },
 
-    // A ring of a drawing, on which a hand, or the arrow keys, take hold of something.
-    ring(parent, label, radius) {
-      const space = "http://www.w3.org/2000/svg", ring = document.createElementNS(space, "g"), circle = document.createElementNS(space, "circle");
-      ring.setAttribute("class", "live-handle");
-      ring.setAttribute("tabindex", "0");
-      ring.setAttribute("role", "button");
-      ring.setAttribute("aria-label", `${label}: drag it, or use the arrow keys`);
-      circle.setAttribute("r", radius);
+    // Pixels of the screen in a unit of a drawing.
+    pixels: drawing => drawing.getBoundingClientRect().width / drawing.viewBox.baseVal.width,
+
+    // A ring of a drawing, which a pointer takes hold of (`take`), or an arrow key moves one way (`press`).
+    ring(parent, label, radius, take, press) {
+      const looks = {class: "live-handle", tabindex: 0, role: "button", "aria-label": `${label}: drag it, or use the arrow keys`};
+      const ring = make("g", looks, parent);
+      make("circle", {r: radius}, ring);
       ring.addEventListener("blur", () => { series = null; });
-      ring.append(circle);
-      parent.append(ring);
+      ring.addEventListener("pointerdown", event => { if (!event.button) take(event, ring); });
+      ring.addEventListener("keydown", event => {
+        const way = WAYS[event.key];
+        if (!way) return;
+        event.preventDefault();
+        event.stopPropagation();
+        press(event, ring, way);
+      });
       return ring;
     },
 

@@ -46,7 +46,7 @@ def rendered(
         return "" if file is None else _INDENT.sub("", file.read_text(encoding="utf-8"))
 
     styles = "".join(text(f"{part}.css") for part in ("page", *parts)) + dark(drawings)
-    script = "".join(text(f"{part}.js") for part in (*parts, "page"))
+    script = "".join(text(f"{part}.js") for part in ("elements", *parts, "page"))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}", f"script-src {_hash(script)}"]
     policy += [f"connect-src {connect}"] if connect else []
     return (

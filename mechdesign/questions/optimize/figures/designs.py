@@ -19,7 +19,7 @@ from mechdesign.questions.optimize.variables import Design, variables_of
 FEW = 1000  # so many designs have larger dots
 GREY_DOTS: dict[str, Any] = {"marker": ".", "color": style.FAINT, "markeredgewidth": 0, "alpha": 0.6}
 OUTLYING = 3.0  # ranges of the middle half of some values
-_AROUND_CHOICES = 0.2  # of their range
+_MARGIN, _AROUND_CHOICES = 0.02, 0.2  # around an axis of numbers, and of choices; of their range
 MAX_TICKS = 8  # of an axis with a number at each choice
 
 
@@ -43,10 +43,10 @@ def quantity_axis(designs: DesignSet, name: str, **options: Any) -> Axis:
     return Axis(name, designs.unit_of(name), **options)
 
 
-def variable_axis(designs: DesignSet, name: str, margin: float) -> Axis:
+def variable_axis(designs: DesignSet, name: str) -> Axis:
     """The axis of a variable with the places of its choices, unless they are many numbers."""
     variable = variables_of(designs.study)[name]
-    axis = quantity_axis(designs, name, margin=margin if variable.choices is None else _AROUND_CHOICES)
+    axis = quantity_axis(designs, name, margin=_MARGIN if variable.choices is None else _AROUND_CHOICES)
     if variable.choices is None or not (variable.words or len(variable.choices) <= MAX_TICKS):
         return axis
     words = variable.words or [value_text(choice) for choice in variable.choices]

@@ -112,7 +112,7 @@ def score_curves(designs: DesignSet, front: Table | None = None) -> Picture:
         look = {"color": style.VERMILION, "markersize": 6.5, "zorder": 4}
         marks.append(Dots([column[winner]], [score[winner]], label="best", look=look))
         words = f"best: {listed(designs, {name: designs.design(winner)[name]})[0]}"
-        panels.append(Panel(marks, variable_axis(designs, name, 0.02), axis, aside=words))
+        panels.append(Panel(marks, variable_axis(designs, name), axis, aside=words))
     return Picture(title, panels, (outside(near),) * cut, 3 if len(panels) > 2 else 1, "y")
 
 
@@ -183,7 +183,7 @@ def goal_maps(view: DesignsView) -> Picture | None:
 def _map(designs: DesignSet, values: Floats, name: str, *, smallest: bool) -> Panel:
     """Values over two variables, with a bar of colours of this name."""
     mark = Coloured(partial(_fill, designs=designs, values=values, smallest=smallest), bar=name)
-    x, y = (variable_axis(designs, variable, 0.02) for variable in designs.variables)
+    x, y = (variable_axis(designs, variable) for variable in designs.variables)
     return Panel([mark], x, y)
 
 

@@ -1,6 +1,4 @@
-"use strict";
 (() => {
-  const SVG = "http://www.w3.org/2000/svg";
   const PLACES = 20, TURNS = 100, TIMES = 10000, ROWS = 1000000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
@@ -38,24 +36,46 @@
     return values[k] + part * (turn ? step - turn * Math.round(step / turn) : step);
   }
 
+  // The pose at a time, by the times of poses up to the last one, between two where it is between two.
+  function timed(times, last, time) {
+    let low = 0, high = last;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= time) low = middle; else high = middle;
+    }
+    return low + (time - times[low]) / (times[high] - times[low] || 1);
+  }
+
+  // Index of the smallest of some numbers that are known.
+  function least(values) {
+    let best = 0, smallest = Infinity;
+    values.forEach((value, k) => { if (value < smallest) { smallest = value; best = k; } });
+    return best;
+  }
+
   // The pose nearest to a place of the motion at which a track has a value; the place itself where it has one, or none.
   function present(values, at) {
-    if (isFinite(between(values, at))) return at;
-    const poses = [...values.keys()].filter(k => isFinite(values[k])).sort((a, b) => Math.abs(a - at) - Math.abs(b - at));
-    return poses.length ? poses[0] : at;
+    if (isFinite(between(values, at)) || !values.some(isFinite)) return at;
+    return least(values.map((value, k) => isFinite(value) ? Math.abs(k - at) : NaN));
   }
 
-  function make(name, attributes, parent) {
-    const element = document.createElementNS(SVG, name);
-    for (const key in attributes) element.setAttribute(key, attributes[key]);
-    parent.append(element);
-    return element;
+  // Numbers of the poses with their decimals.
+  const tracksOf = data => data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
+
+  // A dot at a place of a drawing, or hidden.
+  function put(dot, x, y, visible = isFinite(x + y)) {
+    dot.classList.toggle("moving-gone", !visible);
+    if (!visible) return;
+    dot.setAttribute("cx", x.toFixed(2));
+    dot.setAttribute("cy", y.toFixed(2));
   }
 
-  function html(name, properties, ...children) {
-    const element = Object.assign(document.createElement(name), properties);
-    element.append(...children);
-    return element;
+  // A picture on which a pointer or the arrow keys choose something.
+  function choosing(picture, use) {
+    picture.classList.add("moving-map");
+    picture.setAttribute("tabindex", "0");
+    picture.setAttribute("role", "application");
+    picture.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys ${use}`);
   }
 
   // A number in words that are not broken into lines.
@@ -164,7 +184,7 @@
 
   // The numbers beside the drawing: their texts at a pose, or between two.
   function numbers(figure, data) {
-    const tracks = data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
+    const tracks = tracksOf(data);
     const cells = [...document.querySelectorAll(`[data-numbers="${figure.id}"] [data-number]`)].map(cell => [cell, ...tracks[cell.dataset.number]]);
     const text = (decimals, value) => isFinite(value) ? value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "\u2013";
     return {
@@ -198,7 +218,7 @@
         for (const [words, at, parts] of shafts) {
           const path = make("path", {}, layer);
           make("title", {}, path).textContent = `${title}: ${words}`;
-          paths.push([...(at.map ? track(at) : [moved.x[at], moved.y[at]]), ...track(parts), path]);
+          paths.push([path, ...(at.map ? track(at) : [moved.x[at], moved.y[at]]), ...track(parts)]);
         }
         return [title, layer, on, color];
       });
@@ -208,21 +228,14 @@
     return {
       boxes,
       show(at) {
-        for (const [...parts] of paths) {
-          const path = parts.pop(), [px, py, x, y] = parts.map(values => between(values, at));
+        for (const [path, ...tracks] of paths) {
+          const [px, py, x, y] = tracks.map(values => between(values, at));
           const finite = isFinite(x + y + px + py);
           path.classList.toggle("moving-gone", !finite);
           if (finite) path.setAttribute("d", `M${px} ${py}${way(x, y)}${px + x} ${py + y}`);
         }
       },
     };
-  }
-
-  // Index of the smallest of some numbers that are known.
-  function least(values) {
-    let best = 0, smallest = Infinity;
-    values.forEach((value, k) => { if (value < smallest) { smallest = value; best = k; } });
-    return best;
   }
 
   // The pictures that follow a motion: a cursor where they are over what moves, dots where they show places. Pointing at
@@ -246,9 +259,8 @@
         cursor.setAttribute("x1", x);
         cursor.setAttribute("x2", x);
         for (const [values, slope, start, dot] of drawn) {
-          const y = start + slope * between(values, pose), visible = inside && y >= top - 0.5 && y <= bottom + 0.5;
-          dot.classList.toggle("moving-gone", !visible);
-          if (visible) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
+          const y = start + slope * between(values, pose);
+          put(dot, x, y, inside && y >= top - 0.5 && y <= bottom + 0.5);
         }
       });
       return place => least(over.map(value => Math.abs(at(value) - place)));
@@ -261,9 +273,7 @@
         const dot = make("circle", {r: 4, fill: color, stroke: "white", "stroke-width": 1.4, class: "moving-dot"}, drawing);
         marks.push(pose => {
           const [x, y] = at(inStudy(point, pose));
-          const inside = x >= left && x <= right && y >= top && y <= bottom;
-          dot.classList.toggle("moving-gone", !inside);
-          if (inside) { dot.setAttribute("cx", x.toFixed(2)); dot.setAttribute("cy", y.toFixed(2)); }
+          put(dot, x, y, x >= left && x <= right && y >= top && y <= bottom);
         });
       }
     }
@@ -329,7 +339,7 @@
     const [x, over] = pick("over", "output across", free[0] || tracks[0]), [y, show] = pick("Show", "output upwards", free[1] || tracks[1]);
     room.querySelector("p").append(show, over);
     const LEFT = 70, RIGHT = 562, TOP = 14, BOTTOM = 284;
-    let place = () => null, at = data.first, dot;
+    let px, py, place, dot, at = data.first;
 
     function axis(values) {
       const known = values.filter(isFinite), low = Math.min(...known), high = Math.max(...known);
@@ -340,8 +350,8 @@
     function draw() {
       const across = tracks[x.value], up = tracks[y.value];
       const [west, east] = axis(across.values), [south, north] = axis(up.values);
-      const px = value => LEFT + (RIGHT - LEFT) * (value - west) / (east - west);
-      const py = value => BOTTOM - (BOTTOM - TOP) * (value - south) / (north - south);
+      px = value => LEFT + (RIGHT - LEFT) * (value - west) / (east - west);
+      py = value => BOTTOM - (BOTTOM - TOP) * (value - south) / (north - south);
       drawing.replaceChildren();
       drawing.setAttribute("aria-label", `${up.label} over ${across.label}`);
       const text = (words, looks) => { make("text", looks, drawing).textContent = words; };
@@ -373,12 +383,7 @@
 
     function mark(pose) {
       at = pose;
-      const across = tracks[x.value].values, up = tracks[y.value].values;
-      const [west, east] = axis(across), [south, north] = axis(up), a = between(across, at), b = between(up, at);
-      dot.classList.toggle("moving-gone", !isFinite(a + b));
-      if (!isFinite(a + b)) return;
-      dot.setAttribute("cx", (LEFT + (RIGHT - LEFT) * (a - west) / (east - west)).toFixed(2));
-      dot.setAttribute("cy", (BOTTOM - (BOTTOM - TOP) * (b - south) / (north - south)).toFixed(2));
+      put(dot, px(between(tracks[x.value].values, at)), py(between(tracks[y.value].values, at)));
     }
 
     follow(drawing, false, (a, b) => choose(place(a, b)));
@@ -475,24 +480,12 @@
       figure.dispatchEvent(new Event("moving-chosen"));
     }
 
-    // The pose of a time of the motion, between two where it is between two.
-    function pose(time) {
-      let low = 0, high = times[data.poses] > times[last] ? data.poses : last;
-      while (high - low > 1) {
-        const middle = (low + high) >> 1;
-        if (times[middle] <= time) low = middle; else high = middle;
-      }
-      return low + Math.max(0, Math.min(1, (time - times[low]) / (times[high] - times[low] || 1)));
-    }
-
     // Where the motion is after a time: round where it closes, back from its ends and from what cannot be assembled.
     function ahead(spent) {
-      let time = times[Math.floor(at)];
-      if (at % 1) time += (at % 1) * (times[Math.floor(at) + 1] - time);
-      time += forward * spent;
+      let time = between(times, at) + forward * spent;
       if (data.returns) time = ((time % whole) + whole) % whole;
       else if (time < 0 || time > times[last]) { forward = -forward; time = Math.max(0, Math.min(times[last], time)); }
-      const next = pose(time);
+      const next = timed(times, times[data.poses] > times[last] ? data.poses : last, time);
       if (gap(Math.floor(next)) || gap(Math.ceil(next) % data.poses)) { forward = -forward; return Math.round(at); }
       return next;
     }
@@ -621,20 +614,13 @@
     // The nearest pose to a place; with a direction the nearest on that side.
     function nearest(x, y, toward) {
       const {x: xs, y: ys} = chosen.moved, px = xs[data.point], py = ys[data.point];
-      let best = -1, least = Infinity;
-      px.forEach((value, k) => {
-        if (toward && toward[0] * (value - px[at]) + toward[1] * (py[k] - py[at]) <= 1) return;
-        const far = Math.hypot(value - x, py[k] - y);
-        if (far < least) { least = far; best = k; }
-      });
-      return best < 0 ? at : best;
+      const behind = k => toward && toward[0] * (px[k] - px[at]) + toward[1] * (py[k] - py[at]) <= 1;
+      const far = px.map((_, k) => behind(k) ? NaN : Math.hypot(px[k] - x, py[k] - y));
+      return far.some(isFinite) ? least(far) : at;
     }
 
     follow(drawing, true, (x, y) => { player.stop(); words.removeAttribute("aria-live"); show(nearest(x, y)); });
-    drawing.classList.add("moving-map");
-    drawing.setAttribute("tabindex", "0");
-    drawing.setAttribute("role", "application");
-    drawing.setAttribute("aria-label", `${drawing.getAttribute("aria-label")}; arrow keys move it`);
+    choosing(drawing, "move it");
     drawing.addEventListener("pointerdown", () => drawing.focus({preventScroll: true}));
     const keys = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
     drawing.addEventListener("keydown", event => {
@@ -674,11 +660,8 @@
     if (!points[data.point]) return;
     const dot = make("circle", {r: 5, fill: "#D55E00", stroke: "white", "stroke-width": 1.6, class: "moving-dot"}, drawing);
     marks.push(pose => {
-      const [x, y] = inStudy(data.point, pose), finite = isFinite(x);
-      dot.classList.toggle("moving-gone", !finite);
-      if (!finite) return;
-      dot.setAttribute("cx", ((x - alike.corner[0]) * alike.scale).toFixed(2));
-      dot.setAttribute("cy", ((alike.corner[1] - y) * alike.scale).toFixed(2));
+      const [x, y] = inStudy(data.point, pose);
+      put(dot, (x - alike.corner[0]) * alike.scale, (alike.corner[1] - y) * alike.scale);
     });
     marks.at(-1)(at());
   }
@@ -729,7 +712,7 @@
       tiles.forEach(({button}, other) => button.setAttribute("aria-pressed", other === k));
       moved = linkage(drawing, chosen);
       own = decode(chosen.times, chosen.poses, TIMES);
-      tracks = chosen.numbers.map(([decimals, steps]) => [decimals, decode(steps, chosen.poses, 10 ** decimals)]);
+      tracks = tracksOf(chosen);
       layer.querySelectorAll(".moving-trace").forEach(trace => trace.classList.toggle("moving-off", !paths.checked));
       rings.forEach((ring, panel) => {
         ring.setAttribute("cx", data.front[panel][0][k]);
@@ -742,14 +725,7 @@
       figure.dispatchEvent(new Event("moving-chosen"));
     }
 
-    const place = (at = share, {poses} = chosen, times = own) => {
-      let low = 0, high = poses - 1;
-      while (high - low > 1) {
-        const middle = (low + high) >> 1;
-        if (times[middle] <= at) low = middle; else high = middle;
-      }
-      return low + (at - times[low]) / (times[high] - times[low] || 1);
-    };
+    const place = () => timed(own, chosen.poses - 1, share);
 
     function show(pose) {
       const broken = chosen.gaps.find(([first, end]) => first <= Math.round(pose) && Math.round(pose) <= end);
@@ -760,38 +736,33 @@
       slider.setAttribute("aria-valuetext", at.join(", "));
       // What does not end where it begins goes back.
       for (const {data, moved, times} of tiles)
-        moved.show(place(chosen.returns && !data.returns ? 1 - Math.abs(1 - 2 * share) : share, data, times));
+        moved.show(timed(times, data.poses - 1, chosen.returns && !data.returns ? 1 - Math.abs(1 - 2 * share) : share));
     }
 
     slider.addEventListener("input", () => {
       player.stop();
-      const at = Number(slider.value), low = Math.floor(at);
-      share = own[low] + (at - low) * ((own[low + 1] ?? own[low]) - own[low]);
+      const at = Number(slider.value);
+      share = between(own, at);
       show(at);
     });
     select.addEventListener("change", () => choose(Number(select.value)));
     paths.addEventListener("change", () => choose(k));
 
-    picture?.classList.add("moving-map");
-    picture?.setAttribute("tabindex", "0");
-    picture?.setAttribute("role", "application");
-    picture?.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys choose a design`);
-    if (picture) follow(picture, false, (x, y) => {
-      let best = 0, least = Infinity;
-      for (const [xs, ys] of data.front) xs.forEach((place, index) => {
-        const far = Math.hypot(place - x, ys[index] - y);
-        if (far < least) { least = far; best = index; }
+    if (picture) {
+      choosing(picture, "choose a design");
+      follow(picture, false, (x, y) => {
+        const best = least(data.choices.map((_, k) => Math.min(...data.front.map(([xs, ys]) => Math.hypot(xs[k] - x, ys[k] - y)))));
+        if (best !== k) choose(best);
       });
-      if (best !== k) choose(best);
-    });
-    const keys = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1};
-    picture?.addEventListener("keydown", event => {
-      const next = event.key === "Home" ? data.first : k + keys[event.key];
-      if (!(next >= 0 && next < data.choices.length)) return;
-      words.setAttribute("aria-live", "polite");
-      event.preventDefault();
-      choose(next);
-    });
+      const keys = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1};
+      picture.addEventListener("keydown", event => {
+        const next = event.key === "Home" ? data.first : k + keys[event.key];
+        if (!(next >= 0 && next < data.choices.length)) return;
+        words.setAttribute("aria-live", "polite");
+        event.preventDefault();
+        choose(next);
+      });
+    }
     // Key numbers lead to the design with their variables.
     for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
       const design = JSON.parse(link.dataset.pose);
@@ -818,8 +789,7 @@
     if (motions.length) maps.forEach(map => mark(motions[0], map));
   }
 
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", () => start());
-  else start();
+  ready(start);
   // A figure that a page gets later.
   document.addEventListener("moving-new", event => start(event.target.parentNode));
 })();

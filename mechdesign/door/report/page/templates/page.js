@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   // Says where there is more to the side than a narrow screen shows; a key brings it there, too.
   function look(room) {
@@ -8,31 +7,26 @@
 
   // Of several pictures of a question the one that the reader chooses is on the screen; paper has all.
   function choice(room) {
-    const figures = [...room.children].filter(figure => !figure.hidden), name = room.closest("section").id, choose = document.createElement("fieldset");
+    const figures = [...room.children].filter(figure => !figure.hidden), name = room.closest("section").id;
     if (figures.length < 2) return;
     const show = chosen => figures.forEach(figure => figure.classList.toggle("away", figure !== chosen));
-    choose.className = "choice";
-    choose.append(Object.assign(document.createElement("legend"), {textContent: "Picture to show"}));
+    const choose = html("fieldset", {className: "choice"}, html("legend", {textContent: "Picture to show"}));
     figures.forEach((figure, k) => {
-      const label = document.createElement("label"), {dataset: {short}} = figure;
-      const box = Object.assign(document.createElement("input"), {type: "radio", name: `${name}-picture`, checked: !k});
+      const box = html("input", {type: "radio", name: `${name}-picture`, checked: !k});
       box.addEventListener("change", () => show(figure));
-      label.append(box, short || figure.querySelector("figcaption").textContent);
-      choose.append(label);
+      choose.append(html("label", {}, box, figure.dataset.short || figure.querySelector("figcaption").textContent));
       // A browser that goes back to the page keeps what was chosen.
       if (box.checked) show(figure);
     });
     room.prepend(choose);
   }
 
-  const start = () => {
+  ready(() => {
     const watcher = new ResizeObserver(entries => entries.forEach(entry => look(entry.target)));
     document.querySelectorAll(".pictures").forEach(choice);
     for (const room of document.querySelectorAll(".scroll, .picture")) {
       watcher.observe(room);
       room.addEventListener("scroll", () => look(room), {passive: true});
     }
-  };
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
-  else start();
+  });
 })();

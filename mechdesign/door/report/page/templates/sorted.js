@@ -1,4 +1,3 @@
-"use strict";
 // A click on a column's name sorts the rows by it, a second one the other way round, a third as they were.
 (() => {
   const NUMBERS = {"\u2013": NaN, "\u221e": Infinity, "\u2212\u221e": -Infinity};
@@ -22,9 +21,7 @@
   function sortable(table) {
     const body = table.tBodies[0], rows = [...body.rows], heads = [...table.tHead.rows[0].cells];
     heads.forEach((head, column) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.append(...head.childNodes);
+      const button = html("button", {type: "button"}, ...head.childNodes);
       head.append(button);
       button.addEventListener("click", () => {
         const sort = {none: "ascending", ascending: "descending", descending: "none"}[head.ariaSort || "none"];
@@ -39,10 +36,5 @@
     table.caption.append("; a click on a column's name sorts them");
   }
 
-  function start() {
-    document.querySelectorAll("table.sorted").forEach(sortable);
-  }
-
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
-  else start();
+  ready(() => document.querySelectorAll("table.sorted").forEach(sortable));
 })();
