@@ -311,3 +311,33 @@ def hoeken_errors(first, third):
         path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
         errors.append(np.abs(path.imag - np.sqrt(4 * l3**2 - (l1 + 1) ** 2)).max())
     return np.array(errors)
+
+
+def s1_means(least: float, upper: float = 0.0):
+    """GII, GRI and SUI of S1's 2-RPR, or of its 2-RRR with lower links of 1 (= R), by quadrature in polar coordinates.
+
+    The substitution takes the roots of the resistivity at the boundary away; differences of squares are factored.
+    """
+    x, w = np.polynomial.legendre.leggauss(300)
+    t, rest, w = np.sin(np.pi / 4 * (x + 1)) ** 2, np.sin(np.pi / 4 * (1 - x)) ** 2, w * np.sin(np.pi / 2 * (x + 1))
+    most, angle = least + 2, np.pi / 2 * t[:, None]
+    cosine = np.cos(angle)
+    inner, outer = cosine + np.sqrt(least**2 - np.sin(angle) ** 2), np.sqrt(most**2 - np.sin(angle) ** 2) - cosine
+    width, rows = np.maximum(outer - inner, 1e-30), []
+    r = inner + width * t
+    weights = w[:, None] * w * width * r
+    near, far = width * t * (r + inner - 2 * cosine), width * rest * (outer + r + 2 * cosine)
+    for base, side in ((1, -1), (-1, 1)):
+        leg = r * np.exp(1j * angle) - base
+        d = np.abs(leg)
+        if not upper:
+            rows.append(leg / d)
+            continue
+        elbow = leg / d * np.exp(1j * side * np.arccos(np.clip((1 + d**2 - upper**2) / (2 * d), -1, 1)))
+        more = 4 * r * cosine
+        rows.append((leg - elbow) / np.sqrt((near + more * (base < 0)) * (far + more * (base > 0))) * 2)
+    determinant = np.abs(np.imag(np.conj(rows[0]) * rows[1]))
+    k = (np.abs(rows[0]) ** 2 + np.abs(rows[1]) ** 2) / determinant
+    inverse_condition = 2 / (k + np.sqrt(np.maximum(k**2 - 4, 0)))
+    gii, gri = ((weights * index).sum() / weights.sum() for index in (inverse_condition, determinant))
+    return gii, gri, weights.sum() * (np.pi**3 / 32) / ((most - 1) * np.sqrt(most**2 - 1))
