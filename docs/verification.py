@@ -112,8 +112,8 @@ def largest(differences: Iterable[float]) -> str:
 
 def work(case: Case) -> str:
     """The book, paper or program that a case is from, without the place in it; else what it is compared with."""
-    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w|"
-                      r"Lecture notes|Reference numbers)", case.source)  # fmt: skip
+    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w)",
+                      case.source)  # fmt: skip
     return found[1] if found else f"{case.evidence}, of no book"
 
 
