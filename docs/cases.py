@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import importlib
-import math
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,6 +53,7 @@ class Row:
     agrees: bool = False
     named: bool = False  #: by words, not by its expression
     note: str = ""  #: why the printed number is another one
+    right: str = ""  #: what should be printed
     bound: str = ""  #: the interval or limit that ours lies within
 
     @property
@@ -63,8 +63,9 @@ class Row:
 
     @property
     def part(self) -> float:
-        """The difference as a part of the largest number compared; 0 of intervals and misprints."""
-        return 0.0 if self.bound or self.note else self.difference / (self.scale or 1.0)
+        """The difference as a part of the largest number compared, of a misprint from what is right; 0 of intervals."""
+        right = float(self.right) if self.right else self.expected
+        return 0.0 if self.bound else float(abs(self.ours - right)) / (self.scale or 1.0)
 
 
 def half_unit(printed: str) -> float:
@@ -255,16 +256,16 @@ def _compared(check: Mapping[str, Any], names: Names, units: Mapping[str, str], 
             )
         good, worst = gaps <= within, int(np.argmax(np.where(np.isnan(gaps), np.inf, gaps)))
         if not good.all():
-            near = (each for each in check.get("notes", ()) if gaps.max() <= each.get("within", math.inf) * scale)
-            note = note or next((each["text"] for each in near), "")
-            good = good | ("notes" in check and bool(note))
-    agrees = bool(good.all())
+            near = [each["text"] for each in check.get("notes", ()) if gaps.max() <= each["within"] * scale]
+            note, good = note or "".join(near[:1]), good | bool(near)
+    agrees, right = bool(good.all()), ""
     if "misprint" in check:
         # Ours is what is right, and the printed number is not.
         agrees &= not abs(ours[worst] - float(printed)) <= half_unit(printed)
+        right = check.get("reads", shown(told[worst]))
         told = np.full(ours.shape, float(printed))
     return Row(_label(check) + variant, units.get(check["of"], ""), told[worst], ours[worst], printed, len(ours), scale,
-               agrees, "name" in check, note, bound)  # fmt: skip
+               agrees, "name" in check, note, right, bound)  # fmt: skip
 
 
 def _label(check: Mapping[str, Any]) -> str:
@@ -317,10 +318,14 @@ def _case(name: str, case: dict[str, Any], studies: Mapping[str, str]) -> Case:
 
 
 def _matrix(table: str, columns: Any, rows: Sequence[Any], notes: Sequence[Any]) -> Iterator[dict[str, Any]]:
-    """The checks of a table that is printed as rows with a number a column; `<` prints a bound, `-` nothing."""
+    """The checks of a table that is printed as rows with a number a column; `<` prints a bound, `-` nothing.
+
+    A row `reads` otherwise where numbers of it are misprints.
+    """
     every = columns if isinstance(columns, dict) else {name: {"of": name} for name in columns}
     for row in rows:
-        for (label, column), printed in zip(every.items(), row["printed"].split(), strict=True):
+        prints = zip(row["printed"].split(), row.get("reads", row["printed"]).split(), strict=True)
+        for (label, column), (printed, reads) in zip(every.items(), prints, strict=True):
             at = {**row.get("at", {}), **column.get("at", {})}
             check = {"table": table, "name": f"{label}, {row['name']}", **column, "at": at, "set": row.get("set", {})}
             if printed.startswith("<"):
@@ -328,4 +333,8 @@ def _matrix(table: str, columns: Any, rows: Sequence[Any], notes: Sequence[Any])
             elif printed != "-":
                 about = [note for note in notes if row["name"] in note.get("rows", [row["name"]])
                          and label in note.get("columns", [label])]  # fmt: skip
-                yield {**check, "printed": printed, "notes": about}
+                check |= {"printed": printed, "notes": about}
+                if reads != printed:
+                    check |= {"expected": float(reads), "within": half_unit(reads), "reads": reads}
+                    check["misprint"] = row["misprint"]
+                yield check

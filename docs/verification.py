@@ -5,6 +5,7 @@ python docs/verification.py [NAME...]      runs these cases, or all, prints thei
 
 from __future__ import annotations
 
+import importlib
 import math
 import platform
 import re
@@ -28,7 +29,8 @@ DIGITS = 15  # of two numbers that are the same
 def agreement(row: Row) -> str:
     """How far a number agrees, in digits."""
     if row.bound or row.note:
-        return "see the note" if row.note else "holds"
+        right = f", {float(row.right):.6g} is right" if row.right else ""
+        return "see the note" + right if row.note else "holds"
     printed = len(re.sub(r"[eE].*|[-.]", "", row.printed).lstrip("0")) or 1
     if row.printed and row.difference <= half_unit(row.printed):
         return f"all {printed} printed"
@@ -63,6 +65,17 @@ def formulas(case: Case) -> str:
     return f"```text\n{chr(10).join(dict.fromkeys(lines))}\n```" if lines else ""
 
 
+def helpers(case: Case) -> str:
+    """Where the functions stand that a case calls besides NumPy's."""
+    text, places = str([case.values, case.checks]), []
+    for name in dict.fromkeys(filter(None, (case.helper, "gallery"))):
+        own = vars(importlib.import_module(f"helpers.{name}")).items()
+        functions = [each for each, value in own if getattr(value, "__module__", "") == f"helpers.{name}"]
+        if re.search(rf"(?<![\w.])({'|'.join({*functions} - {'point'})})\(", text):
+            places.append(f"`tests/helpers/{name}.py`")
+    return f"Functions that are not NumPy's stand in {' and '.join(places)}." if places else ""
+
+
 def page(case: Case, rows: Sequence[Row]) -> str:
     """The page of a case."""
     notes = list(dict.fromkeys(row.note for row in rows if row.note))
@@ -73,7 +86,7 @@ def page(case: Case, rows: Sequence[Row]) -> str:
     parts.append(table(head, *(cells(row, letters[row.note]) for row in rows)))
     parts += [f"{{sup}}`{letters[note]}` {note}" for note in notes]
     parts.append(formulas(case))
-    parts.append(f"Functions that are not NumPy's stand in `tests/helpers/{case.helper}.py`." if case.helper else "")
+    parts.append(helpers(case))
     if case.shipped is None:
         listing = f"```{{code-block}} yaml\n:caption: {case.name}.yaml\n\n{case.study.strip()}\n```"
     else:
@@ -94,8 +107,8 @@ def largest(differences: Iterable[float]) -> str:
 
 def work(case: Case) -> str:
     """The book, paper or program that a case is from, without the place in it; else what it is compared with."""
-    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w|"
-                      r"Lecture notes|Reference numbers)", case.source)  # fmt: skip
+    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w)",
+                      case.source)  # fmt: skip
     return found[1] if found else f"{case.evidence}, of no book"
 
 
@@ -125,7 +138,8 @@ def overview(ran: Mapping[str, Sequence[Row]]) -> str:
         "[Below](#sources) they are counted by their sources.",
         "\n".join(f"- *{evidence}*: {words}" for evidence, words in EVIDENCE.items()),
         "The difference of a case is its largest, as a part of the largest number compared. Of printed numbers it is "
-        "mostly that of their rounding. Intervals of samples, limits and misprints have none.",
+        "mostly that of their rounding; of a misprint it is that from what is right. Intervals of samples and limits "
+        "have none. Places are complex numbers: `point('P')` is x + iy.",
     ]
     for question in questions:
         lines = []

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize
-from scipy.special import ellipk, ndtr, ndtri
+from scipy.special import ellipk, j0, ndtr, ndtri
 
 from helpers.circles import common_area
 from helpers.gallery import meet
@@ -243,6 +244,27 @@ def five_bar_sigma(place):
     return np.sqrt([one.real**2 * v1 + two.real**2 * v2, one.imag**2 * v1 + two.imag**2 * v2])
 
 
+def arm_failure(limit: float) -> float:
+    """Failure probability of S2's arm at 30 and 60 deg, its pins normal and cut to their holes.
+
+    The tip errs by the sum of both lengths' errors and both pins' places. The characteristic function of the sum is
+    the product of theirs; its Fourier series over a square of 0.4 cm, far wider than any error, gives the probability.
+    """
+    node, weight = np.polynomial.legendre.leggauss(16)
+    radius = (node + 1) / 2
+    share = weight * radius * np.exp(-4.5 * radius**2)
+    normal, density = np.polynomial.hermite_e.hermegauss(10)
+    k = np.arange(-200, 201) * 2 * np.pi / 0.4
+    x, y = k[:, None], k
+    at = np.linspace(0, 1.001 * np.hypot(k[-1], k[-1]), 2001)
+    pin = sum(part * (j0(np.outer(clearance * at, radius)) @ share)
+              for clearance, part in zip(0.03 + 0.01 / 3 * normal, density, strict=True))  # fmt: skip
+    pins = make_interp_spline(at, pin / pin[0], k=7)(np.hypot(x, y)) ** 2
+    lengths = sum((x * np.cos(angle) + y * np.sin(angle)) ** 2 for angle in np.radians([30, 60]))
+    square = 2 * limit / 0.4 * np.sinc(k * limit / np.pi)
+    return 1 - (np.exp(-lengths * 0.01**2 / 2) * pins * square[:, None] * square).sum()
+
+
 def cheapest_tolerances():
     """Crank, rod and guide of the gallery's feeder: least cost with one failure in a thousand at its worst stop."""
     slopes = np.array([slider_crank_slopes(80, 200, 60, degrees) for degrees in (-60.0, -20.0, 20.0)])
@@ -311,3 +333,33 @@ def hoeken_errors(first, third):
         path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
         errors.append(np.abs(path.imag - np.sqrt(4 * l3**2 - (l1 + 1) ** 2)).max())
     return np.array(errors)
+
+
+def s1_means(least: float, upper: float = 0.0):
+    """GII, GRI and SUI of S1's 2-RPR, or of its 2-RRR with lower links of 1 (= R), by quadrature in polar coordinates.
+
+    The substitution takes the roots of the resistivity at the boundary away; differences of squares are factored.
+    """
+    x, w = np.polynomial.legendre.leggauss(300)
+    t, rest, w = np.sin(np.pi / 4 * (x + 1)) ** 2, np.sin(np.pi / 4 * (1 - x)) ** 2, w * np.sin(np.pi / 2 * (x + 1))
+    most, angle = least + 2, np.pi / 2 * t[:, None]
+    cosine = np.cos(angle)
+    inner, outer = cosine + np.sqrt(least**2 - np.sin(angle) ** 2), np.sqrt(most**2 - np.sin(angle) ** 2) - cosine
+    width, rows = np.maximum(outer - inner, 1e-30), []
+    r = inner + width * t
+    weights = w[:, None] * w * width * r
+    near, far = width * t * (r + inner - 2 * cosine), width * rest * (outer + r + 2 * cosine)
+    for base, side in ((1, -1), (-1, 1)):
+        leg = r * np.exp(1j * angle) - base
+        d = np.abs(leg)
+        if not upper:
+            rows.append(leg / d)
+            continue
+        elbow = leg / d * np.exp(1j * side * np.arccos(np.clip((1 + d**2 - upper**2) / (2 * d), -1, 1)))
+        more = 4 * r * cosine
+        rows.append((leg - elbow) / np.sqrt((near + more * (base < 0)) * (far + more * (base > 0))) * 2)
+    determinant = np.abs(np.imag(np.conj(rows[0]) * rows[1]))
+    k = (np.abs(rows[0]) ** 2 + np.abs(rows[1]) ** 2) / determinant
+    inverse_condition = 2 / (k + np.sqrt(np.maximum(k**2 - 4, 0)))
+    gii, gri = ((weights * index).sum() / weights.sum() for index in (inverse_condition, determinant))
+    return gii, gri, weights.sum() * (np.pi**3 / 32) / ((most - 1) * np.sqrt(most**2 - 1))

@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-TRAY = Path(__file__).parents[2] / "configs" / "gallery" / "five_positions.yaml"
+from helpers.gallery import meet
+
+GALLERY = Path(__file__).parents[2] / "configs" / "gallery"
+TRAY = GALLERY / "five_positions.yaml"
 LINKS = (("ground.O", "coupler.A", "crank"), ("ground.D", "coupler.B", "rocker"))
 
 
@@ -97,3 +100,36 @@ def structural_error(x1: float, x3: float) -> float:
 def structural_errors(first, third):
     """The same of many."""
     return np.array([structural_error(x1, x3) for x1, x3 in zip(first, third, strict=True)])
+
+
+def task(name: str):
+    """The points of a path of the gallery."""
+    path = yaml.safe_load((GALLERY / f"{name}.yaml").read_text(encoding="utf-8"))["synthesis"]["path"]
+    return np.array([complex(*point) for point in path["points"]])
+
+
+def distances(tables, points):
+    """Distances of points from the coupler curve of the best solution, a four-bar drawn with circles.
+
+    Of its two assemblies the nearer one counts.
+    """
+    table = tables["solutions"]
+    best = {name: values[np.argmin(table["error"])] for name, values in table.items()}
+    pivot, other, carried = (
+        best[f"{name}.x"] + 1j * best[f"{name}.y"] for name in ("ground.O", "ground.D", "coupler.P")
+    )
+    every = []
+    for side in (1, -1):
+        width = 2 * np.pi / 2000
+        angles = np.tile(np.arange(0, 2 * np.pi, width), (len(points), 1))
+        for _ in range(12):
+            pin = pivot + best["crank.length"] * np.exp(1j * angles)
+            with np.errstate(invalid="ignore"):
+                end = meet(pin, best["coupler.length"], other, best["rocker.length"], side)
+            gaps = np.nan_to_num(
+                np.abs(pin + carried * (end - pin) / best["coupler.length"] - points[:, None]), nan=np.inf
+            )
+            angles = angles[np.arange(len(points)), gaps.argmin(axis=1)][:, None] + width * np.linspace(-1, 1, 41)
+            width /= 16
+        every.append(gaps.min(axis=1))
+    return min(every, key=np.max)

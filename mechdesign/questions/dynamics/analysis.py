@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.answer import alone
+from mechdesign.motion.ends import Change
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import MotionQuestion, Passage, PoseValues, Remark
 from mechdesign.motion.solving import solve_rows
@@ -34,6 +35,7 @@ from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table,
 from mechdesign.questions.kinematics.along import KinematicAlong, along_of
 from mechdesign.questions.kinematics.cams import outside
 from mechdesign.questions.kinematics.drawn import DrawnPoses, DrawnVectors, Vector
+from mechdesign.questions.kinematics.limits import LimitPlace, interruptions, limits_of
 from mechdesign.questions.kinematics.velocity_jumps import jumps_in_words, velocity_jumps
 from mechdesign.questions.poses import Shown, shown_of, study_poses
 from mechdesign.study import Study
@@ -75,6 +77,15 @@ class DrawnForces(DrawnPoses):
         yield from (DrawnVectors(kind, unit, vectors) for kind, vectors in forces.items())
 
 
+class Between(NamedTuple):
+    """All tables, warnings about what follows from the forces, and where motions end, are singular or may part."""
+
+    tables: Mapping[str, Table]
+    warnings: Sequence[Caution]
+    limits: Sequence[LimitPlace] = ()
+    changes: Sequence[Change] = ()
+
+
 class Dynamics(DynamicQuestion, MotionQuestion):
     """What drives it, what does it bear?"""
 
@@ -101,7 +112,7 @@ class Dynamics(DynamicQuestion, MotionQuestion):
 
     def chosen(
         self, values: PoseValues, names: Collection[str], outputs: Collection[str] | None = None,
-        requests: Collection[Request] = (), solved: Sequence[SolvedPoses] = (),
+        requests: Collection[Request] = (), solved: Sequence[SolvedPoses] = (), passages: bool = False,
     ) -> tuple[dict[str, Table], KinematicAlong | None]:  # fmt: skip
         """Some tables, and the motions between their poses with the columns of `requests` besides.
 
@@ -112,27 +123,33 @@ class Dynamics(DynamicQuestion, MotionQuestion):
         integrals = [Request(name, integral=True) for name in followed] if "extremes" in names else []
         # Towards a pose in which the mechanism jams forces grow without end: nothing is said between the poses.
         jams = self.acting.friction is not None and bool(self.acting.friction.jammed(values.arrays).any())
-        along = None if jams else along_of(self, followed, requests=[*requests, *integrals])
+        along = None if jams else along_of(self, followed, requests=[*requests, *integrals], passages=passages)
         tables = {name: make(values) for name, make in A_ROW_A_POSE.items() if name in names}
         if "extremes" in names:
             tables["extremes"] = extremes_table(values, along, extremes)
         return tables, along
 
-    def between(self, passage: Passage) -> tuple[KinematicAlong | None, tuple[Mapping[str, Table], Sequence[Caution]]]:
-        """The motion with forces; all tables, and warnings about what follows from the forces."""
+    def between(self, passage: Passage) -> tuple[KinematicAlong | None, Between]:
         normals = [Request(name, end=-1) for name in lift_off.contacts(self.acting).values()]
-        tables, along = self.chosen(passage.values, (*A_ROW_A_POSE, "extremes"), requests=normals)
+        tables, along = self.chosen(passage.values, (*A_ROW_A_POSE, "extremes"), requests=normals, passages=True)
         further, warnings = further_tables(passage.values, along)
-        return along, ({**tables, **further}, warnings)
+        between = Between({**tables, **further}, warnings)
+        if along is not None:
+            between = between._replace(limits=limits_of(along), changes=along.ends.changes())
+        return along, between
 
     def tables(self, passage: Passage) -> Mapping[str, Table]:
-        tables: Mapping[str, Table] = passage.between[0]
-        return tables
+        between: Between = passage.between
+        return between.tables
 
     def say(self, passage: Passage, design: int) -> tuple[list[Caution], list[str]]:
         poses, study, marks = self.poses, self.study, passage.marks[design]
         count, friction, gaps = poses.count // poses.designs, self.acting.friction, list[str]()
+        between: Between = passage.between
         warnings = passage.cautions(design)
+        if passage.along is not None:
+            valid = passage.reason.reshape(poses.designs, -1)[design] == 0
+            warnings += interruptions(between.limits, between.changes, passage.along, design, valid)
         if (mark := marks[_UNDEFINED]).number:
             message = f"{self._undefined(mark.first)} at {mark.number} of {count} poses: forces are nan there"
             warnings.append(Caution("undefined", message, "dynamics", mark.first))
@@ -151,7 +168,7 @@ class Dynamics(DynamicQuestion, MotionQuestion):
             shares = "equilibrium leaves open how a chain of slides and clamps shares them"
             message = f"moments of {chains} are nan: {shares}; {settled}"
             warnings.append(Caution("undefined", message, "joint_forces"))
-        return [*warnings, *assumed(study), *passage.between[1]], gaps
+        return [*warnings, *assumed(study), *between.warnings], gaps
 
     def drawn(self, passage: Passage) -> DrawnForces:
         return DrawnForces(shown_of(self.study, passage), passage.values, passage.along)

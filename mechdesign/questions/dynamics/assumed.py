@@ -20,14 +20,15 @@ def assumed(study: Study) -> list[Caution]:
     """Warnings of gravity, centres of mass and moments of inertia that are left out where forces follow from them."""
     section, warnings = DynamicsSection.of(study), []
     moves = section.modes or section.forward is not None or pace(study).rated
+    forced = moves or any(section.gravity)
     if study.dynamics is None:
         message = "without a section 'dynamics' there is no gravity; give {gravity: [0, -9.81 m/s^2]}, or [0, 0]"
         warnings.append(Caution("assumed", message))
-    if (moves or any(section.gravity)) and (centers := ", ".join(_centers(study))):
+    if forced and (centers := ", ".join(_centers(study))):
         message = f"centres of mass that are left out are the middles of joints: {centers}; give 'center'"
         warnings.append(Caution("assumed", message))
     acting = any(_masses(study)) or section.loads or study.mechanism.description.springs
-    if study.dynamics is not None and moves and not acting:
+    if study.dynamics is not None and forced and not acting:
         warnings.append(
             Caution("assumed", "no link has a mass, and no load or spring acts: efforts and forces are zero")
         )

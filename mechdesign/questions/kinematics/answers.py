@@ -23,7 +23,7 @@ from mechdesign.questions.kinematics.cams import CamSide, cam_table, cautions, p
 from mechdesign.questions.kinematics.collisions import collision
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
-from mechdesign.questions.kinematics.limits import LimitPlace, change_points, hidden, limits_of, limits_table, passed
+from mechdesign.questions.kinematics.limits import LimitPlace, interruptions, limits_of, limits_table
 from mechdesign.questions.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
 from mechdesign.questions.kinematics.question import KinematicQuestion
 from mechdesign.questions.kinematics.remarks import astray, marks_of, unfollowed, valued, without_value
@@ -149,8 +149,7 @@ class Kinematics(KinematicQuestion, MotionQuestion):
         if along is None:
             warnings += unfollowed(own.poses)
         else:
-            limits, changes = _by_line(between.limits, designs)[design], _by_line(between.changes, designs)[design]
-            warnings += hidden(limits, along, valid) + passed(limits, along) + change_points(changes, along)
+            warnings += interruptions(between.limits, between.changes, along, design, valid)
             if along.functions.unresolved.any():
                 warnings.append(Caution(
                     "unconverged",

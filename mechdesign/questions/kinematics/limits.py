@@ -77,7 +77,16 @@ def place_in_words(along: KinematicAlong, line: int, place: float) -> str:
     return f"row {place:.6g} ({motion.at(poses.along(lines, s)).in_words(0)})"
 
 
-def hidden(limits: Sequence[LimitPlace], along: KinematicAlong, valid: Flags) -> list[Caution]:
+def interruptions(
+    limits: Sequence[LimitPlace], changes: Sequence[Change], along: KinematicAlong, line: int, valid: Flags
+) -> list[Caution]:
+    """What is said of a motion: where it ends between its poses, passes a singularity, or two assemblies meet."""
+    own = [limit for limit in limits if limit.line == line]
+    changed = [change for change in changes if change.line == line]
+    return _hidden(own, along, valid) + _passed(own, along) + _change_points(changed, along)
+
+
+def _hidden(limits: Sequence[LimitPlace], along: KinematicAlong, valid: Flags) -> list[Caution]:
     """A warning where a motion ends between neighbouring poses that are both valid: the motion table hides it."""
     places = [
         place_in_words(along, limit.line, limit.place)
@@ -89,19 +98,21 @@ def hidden(limits: Sequence[LimitPlace], along: KinematicAlong, valid: Flags) ->
     ]
     if not places:
         return []
-    words = f"the motion ends between poses that are both valid, at {_first(places)}: see the limits"
+    words = f"the motion ends between poses that are both valid, at {_first(places)}: see the limits of kinematics"
     return [Caution("unassembled", words, "limits", pose=places[0])]
 
 
-def passed(limits: Sequence[LimitPlace], along: KinematicAlong) -> list[Caution]:
+def _passed(limits: Sequence[LimitPlace], along: KinematicAlong) -> list[Caution]:
     """A warning where a motion passes a forward singularity."""
-    places = [place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None]
+    # Forces are followed from either side of one, and find it twice.
+    ways = (place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None)
+    places = list(dict.fromkeys(ways))
     if not places:
         return []
     return [Caution(
         "singular",
         f"the motion passes a singularity at {_first(places)}: the drives hold nothing there, and a made mechanism may "
-        "go on in another assembly; see the limits",
+        "go on in another assembly; see the limits of kinematics",
         "limits", pose=places[0],
     )]  # fmt: skip
 
@@ -112,7 +123,7 @@ def _first(places: Sequence[str]) -> str:
     return "; ".join(places[:MOST_NAMED]) + more
 
 
-def change_points(changes: Sequence[Change], along: KinematicAlong) -> list[Caution]:
+def _change_points(changes: Sequence[Change], along: KinematicAlong) -> list[Caution]:
     """A warning for each place of a motion at which two assemblies meet, where the study keeps joints on their sides.
 
     `changes` are those of the motion.
