@@ -35,6 +35,10 @@ EVIDENCE = {
 CLOSED = 1e-9  # closed forms agree to this part of the largest number, where a case says nothing else
 # What all cases of a file may share.
 SHARED = ("source", "question", "evidence", "helper", "recorded", "night")
+# What a check compares with.
+TOLD = {"printed", "expected", "at_most"}
+# The rest of its keys says of what, and how closely.
+OTHERS = "of", "name", "set", "table", "at", "where", "row", "within", "rel", "size", "between", "misprint", "notes"
 Array = NDArray[Any]
 _NUMBER = re.compile(r"-?\d+(?:\.(\d+))?(?:[eE]([+-]?\d+))?")
 
@@ -104,7 +108,11 @@ class Names(dict[str, Any]):
         if name in self.definitions:
             self[name] = self.value(self.definitions[name])
             return self[name]
-        return next(names[name] for names in ({"len": len}, *self.others) if name in names)
+        for names in self.others:
+            if name in names:
+                return names[name]
+        # Python looks among its own names, and says if it is none.
+        raise KeyError(name)
 
 
 class Columns(dict[str, Array]):
@@ -185,11 +193,18 @@ class Case:
             for check in self.checks:
                 settings = {**self.settings, **variant, **check.get("set", {})}
                 tables = self.tables(settings, recorded=recorded and self.recorded)
-                table = tables[check["table"]] if "table" in check else next(iter(tables.values()))
                 others = [{"tables": tables}, parameters(self.study, settings), *helpers]
-                names = Names({**given, **self.values}, table.chosen(check), *others)
                 label = "".join(f", {name} = {value}" for name, value in given.items())
-                yield _compared(check, names, table.units, label)
+                try:
+                    table = tables[check.get("table", next(iter(tables)))]
+                    names = Names({**given, **self.values}, table.chosen(check), *others)
+                    row = _compared(check, names, table.units, label)
+                except Exception as error:
+                    error.add_note(f"case {self.name}, {dict(check)}; columns of the tables:")
+                    for name, table in tables.items():
+                        error.add_note(f"  {name}: {', '.join(table)}")
+                    raise
+                yield row
 
     def tables(self, settings: Mapping[str, Any], *, recorded: bool) -> dict[str, Columns]:
         """The tables of the answer."""
@@ -302,7 +317,11 @@ def cases() -> dict[str, Case]:
             if name in every:
                 raise ValueError(f"{path.name}: there are two cases {name}")
             case = {key: data[key] for key in SHARED if key in data} | given
-            every[name] = _case(name, case, data.get("studies", {}))
+            try:
+                every[name] = _case(name, case, data.get("studies", {}))
+            except Exception as error:
+                error.add_note(f"case {name} in {path.name}")
+                raise
     return every
 
 
@@ -313,6 +332,12 @@ def _case(name: str, case: dict[str, Any], studies: Mapping[str, str]) -> Case:
     case["source"] = case["source"].strip() + (f", {page}" if page else "")
     case["study"] = studies.get(case["study"], case["study"])
     case["settings"] = case.pop("set", {})
+    for check in case["checks"]:
+        if unknown := check.keys() - TOLD - {*OTHERS}:
+            every = ", ".join((*OTHERS, *sorted(TOLD)))
+            raise ValueError(f"a check has no {', '.join(sorted(unknown))}; it takes {every}")
+        if not check.keys() & TOLD:
+            raise ValueError(f"{check} compares with nothing: it needs one of {', '.join(sorted(TOLD))}")
     printed = any("printed" in check for check in case["checks"])
     return Case(name=name, **{"evidence": "printed" if printed else "closed form", **case})
 

@@ -18,7 +18,7 @@ from mechdesign.drawing.sweep import Sweep
 from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.results import Result
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.joints import Sliding
 from mechdesign.motion.solving import solve_rows
 from mechdesign.questions.dynamics.free_bodies import mass_centers
 from mechdesign.questions.kinematics.drawn import DrawnPoses
@@ -150,7 +150,7 @@ def _lines(study: Study, name: str, configuration: Configuration, index: int) ->
         return
     course = beam_line(link, configuration)
     riding = [joint.point for joint in mechanism.description.joints.values()
-              if not isinstance(joint, Fixed) and joint.line.link == name]  # fmt: skip
+              if isinstance(joint, Sliding) and joint.line.link == name]  # fmt: skip
     for point in (*link.points, *riding):
         place = configuration.point(point)
         ends = np.array([np.ravel(end)[index] for end in (course.place(course.foot(point, place)), place)])

@@ -15,7 +15,7 @@ from mechdesign.ground.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.mechanism import Mechanism, plates
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.elements.joints import Fixed, Slot
+from mechdesign.mechanism.elements.joints import Fixed, Sliding, Slot
 from mechdesign.mechanism.elements.springs import Spring
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description
@@ -163,7 +163,7 @@ class Scene:
         """Origins and directions of the lines of the slides."""
         graph, description = self.mechanism.graph, self.mechanism.description
         edges = {name: graph.edge_of(graph.slides.index(name))
-                 for name, joint in description.joints.items() if not isinstance(joint, Fixed)}  # fmt: skip
+                 for name, joint in description.joints.items() if isinstance(joint, Sliding)}  # fmt: skip
         return {name: (self._all(self.configuration.nodes[graph.edges[k].tail]),
                        self._all(self.configuration.direction(k))) for name, k in edges.items()}  # fmt: skip
 
@@ -219,7 +219,7 @@ class Scene:
         description, guides, room = self.mechanism.description, [], 0.1 * self.span
         for name, (origin, along) in self.lines.items():
             joint, (low, high) = description.joints[name], self.travel[name]
-            assert not isinstance(joint, Fixed)
+            assert isinstance(joint, Sliding)
             slider = None if isinstance(joint, Slot) else joint.slider
             guides.append(Guide(name, joint.line.link, joint.point, slider, complex(origin[k]), complex(along[k]),
                                 points[joint.point], (low - room, high + room)))  # fmt: skip

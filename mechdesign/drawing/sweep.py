@@ -12,7 +12,7 @@ from mechdesign.drawing.framing import extent
 from mechdesign.drawing.scene import Scene, Still
 from mechdesign.ground.numerics.arrays import Complexes, Ints
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.joints import Sliding
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.motion.finer import CHORD, near_chords, ways_of
 from mechdesign.questions.poses import Shown, pose_in_words
@@ -120,7 +120,7 @@ def ranks(study: Study) -> dict[str, int]:
     simple = {
         joint.point
         for joint in mechanism.description.joints.values()
-        if not isinstance(joint, Fixed) and joint.line.link == GROUND
+        if isinstance(joint, Sliding) and joint.line.link == GROUND
     }
     for name, link in links.items():
         points = link.all_points

@@ -41,6 +41,8 @@ class TableKind:
         return {name: kind for kind in self.kinds for name in kind.names}
 
     def __getitem__(self, name: str) -> ColumnKind:
+        if name not in self._by_name:
+            raise KeyError(f"table {self.name!r} declares no column {name!r}; it declares {', '.join(self._by_name)}")
         return self._by_name[name]
 
     def columns(self, words: Mapping[str, str], /, **values: ArrayLike) -> list[Column]:

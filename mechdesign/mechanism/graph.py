@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mechdesign.mechanism.elements.declared import Term
-from mechdesign.mechanism.elements.joints import Fixed, LinkLine, Prismatic
+from mechdesign.mechanism.elements.joints import Fixed, LinkLine, Prismatic, Sliding
 from mechdesign.mechanism.model import Description
 
 GROUND = "ground"
@@ -212,7 +212,7 @@ def build_graph(description: Description) -> Graph:
             guides[name] = name, rod_of(name)
     legs = len(guides)
     for joint in description.joints.values():
-        if isinstance(joint, Fixed):
+        if not isinstance(joint, Sliding):
             continue
         line, slider = joint.line, ""
         through = line.through if line.through is not None else origin_of(line.link)

@@ -21,7 +21,7 @@ from mechdesign.ground.numerics.arrays import Complexes
 from mechdesign.mechanism.algebra import Value, Vector, cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.core import Core
-from mechdesign.mechanism.elements.joints import Fixed
+from mechdesign.mechanism.elements.joints import Sliding
 from mechdesign.mechanism.elements.plates import Plates
 from mechdesign.mechanism.model import Description
 
@@ -40,7 +40,7 @@ def joined(description: Description) -> dict[str, tuple[str, ...]]:
         for point in link.all_points:
             links.setdefault(point, []).append(name)
     for joint in description.joints.values():
-        if not isinstance(joint, Fixed) and joint.line.link not in links[joint.point]:
+        if isinstance(joint, Sliding) and joint.line.link not in links[joint.point]:
             links[joint.point].append(joint.line.link)
     return {point: tuple(names) for point, names in links.items() if len(names) > 1}
 

@@ -23,9 +23,8 @@ def test_every_command_and_parameter_has_help(name, invoke):
     assert " ".join(command.help.split())[:40] in " ".join(shown.stdout.split())
 
 
-def test_the_commands_are_those_of_the_study_format():
-    others = {"run", "merge", "check", "watch", "live", "compare", "export", "new", "import", "docs", "schema"}
-    assert set(GROUP.commands) == {*QUESTIONS, *others}
+def test_every_question_is_a_command():
+    assert set(GROUP.commands) > set(QUESTIONS)
 
 
 @pytest.mark.parametrize("name", [*QUESTIONS, "run"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,6 +58,39 @@ def test_a_closed_form_that_differs_in_one_row_of_many_is_told_with_this_row() -
     assert (right.agrees, wrong.agrees, wrong.count) == (True, False, 73)
     assert wrong.difference == pytest.approx(1e-6, rel=1e-6)
     assert wrong.ours == pytest.approx(np.cos(np.radians(40)) + np.sqrt(9 - np.sin(np.radians(40)) ** 2))
+
+
+def test_a_check_that_cannot_be_made_says_in_which_case_and_which_columns_there_are() -> None:
+    for check, wrong in (
+        ({"of": "B.z", "expected": 0}, "'B' is not defined"),
+        ({"of": "rnge", "table": "extremes", "expected": 0}, "'rnge' is not defined"),
+        ({"of": "range", "table": "extrems", "expected": 0}, "extrems"),
+        ({"of": "B.x", "at": {"crnk": 15}, "expected": 0}, "crnk"),
+    ):
+        with pytest.raises((NameError, KeyError), match=wrong) as told:
+            of(check)
+        notes = "\n".join(told.value.__notes__)
+        assert "case slider_crank_printed" in notes
+        assert "\n  extremes: output, " in notes
+
+
+@pytest.mark.parametrize(
+    ("case", "wrong"),
+    [
+        ("source: Euclid, checks: [{of: B.x, expcted: 0}]", "no expcted; it takes .*expected"),
+        ("source: Euclid, checks: [{of: B.x, within: 1e-9}]", "needs one of at_most, expected, printed"),
+        ("checks: [{of: B.x, expected: 0}]", "source"),
+        ("source: Euclid, title: A crank, checks: [{of: B.x, expected: 0}]", "'text'"),
+    ],
+)
+def test_a_case_that_is_written_wrongly_is_named(
+    case: str, wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "odd.yaml").write_text(f"question: kinematics\ncases:\n  odd: {{study: gallery/hoeken, {case}}}\n")
+    monkeypatch.setattr("cases.FOLDER", tmp_path)
+    with pytest.raises((ValueError, KeyError, TypeError), match=wrong) as told:
+        cases.__wrapped__()
+    assert told.value.__notes__ == ["case odd in odd.yaml"]
 
 
 def test_a_misprint_has_to_be_one_and_has_to_be_told() -> None:

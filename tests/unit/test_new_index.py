@@ -18,12 +18,14 @@ FILE = '''
 
 import numpy as np
 
-from mechdesign.questions.workspace.index import Index, length
+from mechdesign.questions.workspace.index import Evaluate, Index, length
+from mechdesign.questions.workspace.schema import WorkspaceSection
+from mechdesign.study import Study
 
 
-def prepare(study):
+def prepare(study: Study) -> Evaluate:
     """The distance at each place, from the pose that is assembled there."""
-    point = study.workspace.point
+    point = WorkspaceSection.of(study).point
     return lambda local: np.abs(local.configuration.point(point))
 
 

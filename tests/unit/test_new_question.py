@@ -18,8 +18,9 @@ FOLDER = {
     "schema.py": '''
 """The mobility section of the study file."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
+from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.section import Section
 
 
@@ -30,7 +31,7 @@ class MobilitySection(Section):
     ground: bool = True
     """Whether the ground counts as a link."""
 
-    def checked(self, checker):
+    def checked(self, checker: Checker) -> Self:
         """Nothing in it can contradict the mechanism."""
         return self
 ''',
@@ -45,13 +46,14 @@ KEY_NUMBERS = (KeyNumber(MOBILITY, "freedoms", "degrees of freedom", "first"),)
     "analysis.py": '''
 """Count what moves."""
 
-from mechdesign.ground.progress import NULL
+from mechdesign.ground.progress import NULL, Progress
+from mechdesign.ground.results import Result
 from mechdesign.questions.mobility.columns import MOBILITY
 from mechdesign.questions.mobility.schema import MobilitySection
-from mechdesign.ground.results import Result
+from mechdesign.study import Study
 
 
-def mobility(study, *, seed=None, jobs=1, progress=NULL):
+def mobility(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Degrees of freedom of a study's mechanism, and its links."""
     count = len(study.mechanism.description.links) - (not MobilitySection.of(study).ground)
     columns = MOBILITY.columns({}, links=[count], freedoms=[study.mechanism.mobility])
@@ -61,15 +63,17 @@ def mobility(study, *, seed=None, jobs=1, progress=NULL):
     "figures/counts.py": '''
 """What was counted, as bars."""
 
+import numpy as np
+
 from mechdesign.drawing.marks import Axis, Bars, Panel, Picture
 from mechdesign.drawing.pictures import View, picture
 
 
 @picture(View, "counts")
-def counts(view):
+def counts(view: View) -> Picture:
     """Links and degrees of freedom."""
     table = view.result.main
-    bars = Bars([table[name][0] for name in table.names])
+    bars = Bars(np.array([table[name][0] for name in table.names]))
     return Picture("What moves", [Panel([bars], Axis("number"), Axis(words=table.names))])
 ''',
 }

@@ -16,7 +16,7 @@ from mechdesign.ground.errors import MechdesignError
 from mechdesign.ground.expressions import Number
 from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.elements.joints import Prismatic, Slot
+from mechdesign.mechanism.elements.joints import Sliding
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.motion.solving import solve_rows
@@ -282,7 +282,7 @@ def _ranks(mechanism: Mechanism, point: str) -> dict[str, int]:
     """
     links, through = {*mechanism.graph.links_at(point)}, dict[str, str]()
     for name, joint in mechanism.description.joints.items():
-        if isinstance(joint, Prismatic | Slot) and links & {joint.line.link, getattr(joint, "slider", "")}:
+        if isinstance(joint, Sliding) and links & {*joint.links}:
             through[name] = f"{joint.line.link}.{joint.line.through}"
     owners = {*(("links", link) for link in links), *(("joints", guide) for guide in through)}
     ranks = dict[str, int]()

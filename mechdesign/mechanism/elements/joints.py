@@ -103,7 +103,8 @@ class Fixed:
     angle: Term = 0.0
 
 
-AnyJoint = Prismatic | Slot | Fixed
+Sliding = Prismatic | Slot
+AnyJoint = Sliding | Fixed
 
 
 @dataclass(frozen=True)

@@ -61,19 +61,10 @@ class Spring(Element):
         """Keys that it does not have between two links, or between two points."""
         return ("free_length", "force", "rise") if turning else ("free_angle",)
 
-    @property
-    def rate(self) -> Term:
-        """Its stiffness, or what the force of a gas spring grows by."""
-        return self.stiffness or self.rise
-
-    @property
-    def free(self) -> Term:
-        """Distance or angle at which the stiffness does not act."""
-        return self.free_angle or self.free_length
-
     def pull(self, value: Callable[[Term], Number]) -> tuple[Number, Number, Number, Number]:
         """Numbers of its pull ``constant + stiffness (x - free) + damping x'``, x the distance or the angle.
 
         `value` gives that of a term.
         """
-        return value(self.preload) - value(self.force), value(self.rate), value(self.free), value(self.damping)
+        rate, free = value(self.stiffness or self.rise), value(self.free_angle or self.free_length)
+        return value(self.preload) - value(self.force), rate, free, value(self.damping)

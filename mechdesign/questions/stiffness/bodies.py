@@ -233,8 +233,9 @@ class _Builder:
 
     def spring(self, spring: Spring, holders: Mapping[str, list[str]]) -> None:
         """Add a spring between two links, or between bodies at its points, about which it turns freely."""
-        coil = SpringElement(spring, self.mechanism.geometry)
-        if not self.mechanism.geometry.term(spring.rate, {}):
+        geometry = self.mechanism.geometry
+        coil = SpringElement(spring, geometry)
+        if not spring.pull(lambda term: geometry.term(term, {}))[1]:
             return
         one, other = spring.between
         if spring.turning:

@@ -86,7 +86,7 @@ class SpringElement:
     def freedoms(self, configuration: Configuration, at: Complexes) -> Iterator[tuple[Floats, Value]]:
         """Twists (3, n) that it allows, seen from places `at`, and their compliances."""
         spring, places = self.spring, configuration.places
-        soft = 1 / self.geometry.term(spring.rate, places)
+        soft = 1 / spring.pull(lambda term: self.geometry.term(term, places))[1]
         if spring.turning:
             yield hinge_twist(at - at), soft
             return
@@ -101,8 +101,8 @@ class SpringElement:
     @property
     def isotropic(self) -> bool:
         """Whether it gives alike in every direction."""
-        spring = self.spring
-        return not any(self.geometry.term(term, {}) for term in (spring.free, spring.preload, spring.force))
+        constant, _, free, _ = self.spring.pull(lambda term: self.geometry.term(term, {}))
+        return not (constant or free)
 
 
 Element = Hinge | SlideElement | Beam | Shift | JointCompliance | SpringElement
