@@ -109,13 +109,21 @@ def by_wrenches(
         first += len(block)
         total += np.einsum("ian,ijn,jbn->abn", rows, block, rows)
     compliance = np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
-    return stiffness_of(compliance) / outer, compliance * outer, regular
+    stiffness = stiffness_of(compliance)
+    return stiffness / outer, without_rounding(compliance, stiffness) * outer, regular
 
 
 def stiffness_of(compliance: Floats) -> Floats:
     """Inverses of compliances, shape (n, size, size); nan where the body is rigid in some direction."""
     inverse, soft = inverses(compliance, RIGID)
     return np.where(soft[:, None, None], (inverse + inverse.swapaxes(1, 2)) / 2, np.nan)
+
+
+def without_rounding(compliance: Floats, stiffness: Floats) -> Floats:
+    """Compliances with zeros for entries that are only rounding, where the body is rigid in some direction."""
+    size = np.abs(compliance)
+    rigid = np.isnan(stiffness).any(axis=(1, 2), keepdims=True)
+    return np.where(rigid & (size <= RIGID * size.max(axis=(1, 2), keepdims=True, initial=0.0)), 0.0, compliance)
 
 
 def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:

@@ -8,7 +8,15 @@ import numpy as np
 
 from mechdesign.ground.numerics.arrays import Flags, Floats
 from mechdesign.mechanism.algebra import Value
-from mechdesign.questions.stiffness.compliance import REGULAR, Held, inverses, poses_by, scales, stiffness_of
+from mechdesign.questions.stiffness.compliance import (
+    REGULAR,
+    Held,
+    inverses,
+    poses_by,
+    scales,
+    stiffness_of,
+    without_rounding,
+)
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.screws import RANK, RIGID
 
@@ -137,10 +145,7 @@ def held_of(compliance: Floats, statics: SelfStress, length: Value, size: int) -
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis
         inverse = stiffness_of(inner)
         soft = np.isfinite(inverse).all(axis=(1, 2))
-        # Where the body is rigid in some direction, entries of the compliance that are only rounding become zero.
-        stiff = rows[~soft]
-        largest = np.abs(compliance[stiff]).max(axis=(1, 2), keepdims=True, initial=0.0)
-        compliance[stiff] = np.where(np.abs(compliance[stiff]) > RIGID * largest, compliance[stiff], 0.0)
+        compliance[rows] = without_rounding(compliance[rows], inverse)
         stiffness[rows[soft]] = basis[soft] @ inverse[soft] @ basis[soft].swapaxes(1, 2)
         if count:
             compliance[rows] = np.nan
