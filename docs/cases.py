@@ -38,7 +38,8 @@ SHARED = ("source", "question", "evidence", "helper", "recorded", "night")
 # What a check compares with.
 TOLD = {"printed", "expected", "at_most"}
 # The rest of its keys says of what, and how closely.
-OTHERS = "of", "name", "set", "table", "at", "where", "row", "within", "rel", "size", "between", "misprint", "notes"
+OTHERS = ("of", "name", "set", "table", "at", "where", "row", "within", "rel", "size", "between", "misprint", "reads",
+          "notes")  # fmt: skip
 Array = NDArray[Any]
 _NUMBER = re.compile(r"-?\d+(?:\.(\d+))?(?:[eE]([+-]?\d+))?")
 
