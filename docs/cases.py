@@ -252,36 +252,39 @@ def _compared(check: Mapping[str, Any], names: Names, units: Mapping[str, str], 
     ours = np.atleast_1d(names.value(check["of"]))
     printed, note, bound = check.get("printed", ""), check.get("misprint", ""), ""
     given = check.get("expected", check.get("at_most", float(printed or "nan")))
-    told = np.broadcast_to(names.value(given), ours.shape)
-    scale = float(names.value(check["size"]) if "size" in check else np.abs(told).max())
+    expected = np.broadcast_to(names.value(given), ours.shape)
+    scale = float(names.value(check["size"]) if "size" in check else np.abs(expected).max())
     if "between" in check:
         low, high = (np.broadcast_to(names.value(end), ours.shape) for end in check["between"])
-        good = (low <= told) & (told <= high)
+        good = (low <= expected) & (expected <= high)
         worst = int(np.argmin(good))
-        bound = f"{shown(told[worst])} in {low[worst]:.6g} to {high[worst]:.6g}"
+        bound = f"{shown(expected[worst])} in {low[worst]:.6g} to {high[worst]:.6g}"
     elif "at_most" in check:
-        good, worst = ours <= told, int(np.argmax(ours - told))
-        bound = f"at most {shown(told[worst])}"
+        good, worst = ours <= expected, int(np.argmax(ours - expected))
+        bound = f"at most {shown(expected[worst])}"
     else:
-        gaps = np.abs(ours - told)
-        if printed and "expected" not in check and "within" not in check:
-            within = half_unit(printed)
-        else:
-            within = (
-                names.value(check["within"]) if "within" in check else names.value(check.get("rel", CLOSED)) * scale
-            )
-        good, worst = gaps <= within, int(np.argmax(np.where(np.isnan(gaps), np.inf, gaps)))
+        gaps = np.abs(ours - expected)
+        good, worst = gaps <= _allowed(check, names, scale), int(np.argmax(np.where(np.isnan(gaps), np.inf, gaps)))
         if not good.all():
-            near = [each["text"] for each in check.get("notes", ()) if gaps.max() <= each["within"] * scale]
+            near = [entry["text"] for entry in check.get("notes", ()) if gaps.max() <= entry["within"] * scale]
             note, good = note or "".join(near[:1]), good | bool(near)
     agrees, right = bool(good.all()), ""
     if "misprint" in check:
         # Ours is what is right, and the printed number is not.
         agrees &= not abs(ours[worst] - float(printed)) <= half_unit(printed)
-        right = check.get("reads", shown(told[worst]))
-        told = np.full(ours.shape, float(printed))
-    return Row(_label(check) + variant, units.get(check["of"], ""), told[worst], ours[worst], printed, len(ours), scale,
-               agrees, "name" in check, note, right, bound)  # fmt: skip
+        right = check.get("reads", shown(expected[worst]))
+        expected = np.full(ours.shape, float(printed))
+    return Row(_label(check) + variant, units.get(check["of"], ""), expected[worst], ours[worst], printed, len(ours),
+               scale, agrees, "name" in check, note, right, bound)  # fmt: skip
+
+
+def _allowed(check: Mapping[str, Any], names: Names, scale: float) -> Any:
+    """How far a number may be from the expected one: half a printed unit, where the case says nothing else."""
+    if "within" in check:
+        return names.value(check["within"])
+    if check.get("printed") and "expected" not in check:
+        return half_unit(check["printed"])
+    return names.value(check.get("rel", CLOSED)) * scale
 
 
 def _label(check: Mapping[str, Any]) -> str:

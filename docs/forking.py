@@ -42,8 +42,8 @@ with socket.socket(socket.AF_UNIX) as there:
     there.connect({address!r})
     socket.send_fds(there, [b"-"], [0, 1, 2])
     settings = (name + b"=" + value for name, value in os.environb.items())
-    told = (os.getcwdb(), *settings, b"", *map(os.fsencode, sys.argv[1:]))
-    there.sendall(b"".join(each + b"\\0" for each in told))
+    words = (os.getcwdb(), *settings, b"", *map(os.fsencode, sys.argv[1:]))
+    there.sendall(b"".join(word + b"\\0" for word in words))
     there.shutdown(socket.SHUT_WR)
     sys.exit(int(there.recv(3) or 1))
 """
@@ -89,21 +89,21 @@ def _keep(connection: socket.socket) -> None:
     """Fork the process of a call, and say its exit code."""
     _, streams, _, _ = socket.recv_fds(connection, 1, 3)
     with connection.makefile("rb") as stream:
-        place, *told, _ = stream.read().split(b"\0")
-    end = told.index(b"")
+        place, *words, _ = stream.read().split(b"\0")
+    end = words.index(b"")
     if child := os.fork():
-        for each in streams:
-            os.close(each)
+        for own in streams:
+            os.close(own)
         connection.sendall(b"%d" % (os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) % 256))
         return
     connection.close()
-    for number, each in enumerate(streams):
-        os.dup2(each, number)
-        os.close(each)
+    for number, own in enumerate(streams):
+        os.dup2(own, number)
+        os.close(own)
     os.chdir(place)
     os.environ.clear()
-    os.environb.update(setting.split(b"=", 1) for setting in told[:end])
-    sys.argv = ["mechdesign", *map(os.fsdecode, told[end + 1 :])]
+    os.environb.update(setting.split(b"=", 1) for setting in words[:end])
+    sys.argv = ["mechdesign", *map(os.fsdecode, words[end + 1 :])]
     if "--report" not in sys.argv:
         _draw_only(os.environ[PICTURES].split())
     main()

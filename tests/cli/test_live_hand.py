@@ -30,16 +30,6 @@ def slow(live):
     return bar
 
 
-def field(bar, name):
-    return bar.page.locator(f"[data-name='{name}'] input").first
-
-
-def type_in(bar, name, value):
-    field(bar, name).fill(value)
-    field(bar, name).blur()
-    bar.answered(bar.page)
-
-
 @pytest.mark.nightly
 def test_the_end_of_a_quick_pull_at_a_cranks_pin_sets_angle_and_length(slow):
     drive = slow.page.get_by_role("spinbutton", name="theta deg")
@@ -80,33 +70,33 @@ def test_quick_presses_of_an_arrow_key_add_up_to_one_step_of_the_history(slow):
     slow.page.locator(".live-handle[data-at=D]").focus()
     for _ in range(6):
         slow.page.keyboard.press("ArrowRight")
-    expect(field(slow, "ground.D.x")).to_have_value("106")
-    said = slow.page.locator(".live-said")
+    expect(slow.field("ground.D.x")).to_have_value("106")
+    said = slow.said
     slow.page.keyboard.press("Control+z")
-    expect(field(slow, "ground.D.x")).to_have_value("100")
+    expect(slow.field("ground.D.x")).to_have_value("100")
     # What was said of the drag holds no more.
     expect(said).to_have_text("Undone: ground.D.x = 100 mm")
     slow.page.keyboard.press("Control+y")
-    expect(field(slow, "ground.D.x")).to_have_value("106")
+    expect(slow.field("ground.D.x")).to_have_value("106")
     expect(said).to_have_text("Redone: ground.D.x = 106 mm")
     slow.page.wait_for_timeout(1100)
     slow.page.locator(".live-handle[data-at=D]").focus()
     slow.page.keyboard.press("ArrowLeft")
-    expect(field(slow, "ground.D.x")).to_have_value("105")
+    expect(slow.field("ground.D.x")).to_have_value("105")
     slow.page.keyboard.press("Control+z")
-    expect(field(slow, "ground.D.x")).to_have_value("106")
+    expect(slow.field("ground.D.x")).to_have_value("106")
 
 
 @pytest.mark.nightly
 def test_where_a_pose_cannot_be_assembled_a_pivot_is_dragged_back(live):
     bar = live()
     # Rod and rocker reach 150 mm: with D 400 mm away no pose is left, and its ring stays where it was.
-    type_in(bar, "ground.D.x", "400")
+    bar.type("ground.D.x", "400")
     bar.drag("D", 10 * bar.scale, 0)
     assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
     # At 170 mm the pin A at 60 deg is too far away, and rings of the nearest pose that can be assembled stay.
     drive = bar.page.get_by_role("spinbutton", name="theta deg")
-    type_in(bar, "ground.D.x", "170")
+    bar.type("ground.D.x", "170")
     drive.fill("170")
     drive.blur()
     expect(bar.page.locator(".moving-words")).to_contain_text("cannot be assembled")
@@ -134,25 +124,24 @@ def test_a_pivot_that_was_let_go_outside_the_drawing_is_brought_back_into_it(liv
 @pytest.mark.nightly
 def test_what_was_saved_is_said_until_the_next_change_and_a_refused_save_leaves_the_mistake_told(live):
     bar = live()
-    type_in(bar, "rocker.length", "64")
-    bar.page.get_by_role("button", name="Save into bar.yaml").click()
+    bar.type("rocker.length", "64")
+    bar.press("Save into bar.yaml")
     with bar.page.expect_navigation():
-        bar.page.get_by_role("button", name="Save", exact=True).click()
+        bar.press("Save")
     bar.answered(bar.page)
-    said = bar.page.locator(".live-said")
+    said = bar.said
     expect(said).to_have_text("Saved into bar.yaml.")
     bar.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    type_in(bar, "rocker.length", "66")
+    bar.type("rocker.length", "66")
     expect(said).to_have_text("")
-    bar.page.get_by_role("button", name="Copy as --set").click()
+    bar.press("Copy as --set")
     expect(said).to_have_text("Copied one change as --set.")
     assert "rocker" in bar.page.evaluate("navigator.clipboard.readText()")
-    bar.path.write_text(bar.path.read_text().replace("[O, A, 30]", "[O, A, x30]"))
-    bar.session.reload()
+    bar.edit(bar.path.read_text().replace("[O, A, 30]", "[O, A, x30]"))
     message = bar.page.locator(".live-message")
     expect(message).to_contain_text("bar.yaml:")
-    bar.page.get_by_role("button", name="Save into bar.yaml").click()
-    bar.page.get_by_role("button", name="Save", exact=True).click()
+    bar.press("Save into bar.yaml")
+    bar.press("Save")
     expect(message).to_contain_text("Not saved: ")
     expect(message).to_contain_text("bar.yaml:")
 
@@ -176,7 +165,7 @@ def test_beside_a_finger_the_numbers_stand_above_left_and_cover_no_ring(live):
 @pytest.mark.nightly
 def test_a_comma_stands_before_decimals_and_what_is_no_number_is_refused_with_a_message(live):
     bar = live()
-    drawn, said = field(bar, "ground.D.y"), bar.page.locator(".live-said")
+    drawn, said = bar.field("ground.D.y"), bar.said
     drawn.select_text()
     drawn.press_sequentially("3,5")
     drawn.blur()
@@ -193,7 +182,7 @@ def test_a_comma_stands_before_decimals_and_what_is_no_number_is_refused_with_a_
     grid.fill("2,5")
     bar.page.locator(".live-handle[data-at=D]").focus()
     bar.page.keyboard.press("ArrowRight")
-    expect(field(bar, "ground.D.x")).to_have_value("102.5")
+    expect(bar.field("ground.D.x")).to_have_value("102.5")
     grid.press("ArrowDown")
     grid.press("Shift+ArrowDown")
     expect(grid).to_have_value("0")

@@ -29,20 +29,17 @@ def test_a_dragged_pivot_changes_the_study_that_is_saved_and_the_command_line_gi
     bar.drag("D", 10 * pixels, 0)
     assert bar.value("ground.D.x") == pytest.approx(110, abs=0.2)
     shown = bar.page.locator("#kinematics .numbers").inner_text()
-    bar.page.get_by_role("button", name="Save as").click()
-    bar.page.get_by_label("Name of the file").fill("longer.yaml")
-    bar.page.get_by_role("button", name="Save", exact=True).click()
-    expect(bar.page.locator(".live-said")).to_contain_text("Saved as longer.yaml")
-    saved = load(bar.path.with_name("longer.yaml"))
+    copy = bar.save_as("longer.yaml")
+    saved = load(copy)
     assert saved.sizes["ground.D.x"] == bar.value("ground.D.x")
-    assert "# the pivots" in bar.path.with_name("longer.yaml").read_text()
+    assert "# the pivots" in copy.read_text()
     angles = kinematics(saved).tables["extremes"]
     most = next(row["max"] for row in angles if row["output"] == "rocker.angle")
     assert f"to {most:.4g}" in shown
     # One gesture is one entry of the history.
-    bar.page.get_by_role("button", name="Undo").click()
+    bar.press("Undo")
     assert bar.value("ground.D.x") == 100
-    bar.page.get_by_role("button", name="Redo").click()
+    bar.press("Redo")
     assert bar.value("ground.D.x") == saved.sizes["ground.D.x"]
 
 
@@ -65,31 +62,28 @@ def test_keys_move_a_point_by_the_grid_and_what_cannot_be_assembled_is_said(live
     bar.page.locator(".live-grid").fill("5")
     bar.page.locator(".live-handle[data-at=D]").focus()
     bar.page.keyboard.press("ArrowRight")
-    expect(bar.page.locator("[data-name='ground.D.x'] [role=spinbutton]")).to_have_value("105")
+    expect(bar.field("ground.D.x")).to_have_value("105")
     bar.page.wait_for_timeout(50)
     bar.page.keyboard.press("Shift+ArrowRight")
-    expect(bar.page.locator("[data-name='ground.D.x'] [role=spinbutton]")).not_to_have_value("105")
+    expect(bar.field("ground.D.x")).not_to_have_value("105")
     # Rod and rocker reach 150 mm from the crank's pin, 30 mm from O along the line to D.
     assert 105 < bar.value("ground.D.x") <= 180
     for _ in range(4):
         bar.page.wait_for_timeout(100)
         bar.page.keyboard.press("Shift+ArrowRight")
-    expect(bar.page.locator(".live-said")).to_contain_text("cannot be assembled")
+    expect(bar.said).to_contain_text("cannot be assembled")
 
 
 @pytest.mark.nightly
 def test_a_number_in_a_field_and_a_slider_do_the_same_as_a_hand(live):
     bar = live()
-    field = bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")
-    field.fill("70")
-    field.blur()
-    bar.answered(bar.page)
+    bar.type("rocker.length", "70")
     bar.page.get_by_label("rocker.length, slider").fill("66")
     bar.answered(bar.page)
     assert bar.value("rocker.length") == 66
-    bar.page.get_by_role("button", name="Undo").click()
+    bar.press("Undo")
     assert bar.value("rocker.length") == 70
-    bar.page.get_by_role("button", name="Reset").click()
+    bar.press("Reset")
     assert bar.value("rocker.length") == 60
 
 
@@ -97,12 +91,12 @@ def test_a_number_in_a_field_and_a_slider_do_the_same_as_a_hand(live):
 def test_saving_into_the_file_asks_first_and_then_nothing_is_changed_any_more(live):
     bar = live()
     bar.drag("D", 10 * bar.scale, 0)
-    bar.page.get_by_role("button", name="Save into bar.yaml").click()
-    bar.page.get_by_role("button", name="Cancel").click()
+    bar.press("Save into bar.yaml")
+    bar.press("Cancel")
     assert bar.path.read_text() == FOUR_BAR
-    bar.page.get_by_role("button", name="Save into bar.yaml").click()
+    bar.press("Save into bar.yaml")
     with bar.page.expect_navigation():
-        bar.page.get_by_role("button", name="Save", exact=True).click()
+        bar.press("Save")
     bar.answered(bar.page)
     assert load(bar.path).sizes["ground.D.x"] == pytest.approx(110, abs=0.2)
     assert "# the pivots" in bar.path.read_text()
@@ -113,16 +107,14 @@ def test_saving_into_the_file_asks_first_and_then_nothing_is_changed_any_more(li
 @pytest.mark.nightly
 def test_a_saved_file_makes_the_page_anew_and_a_mistake_is_told_while_the_last_answer_stays(live):
     bar = live()
-    bar.path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, x60]"))
-    bar.session.reload()
+    bar.edit(FOUR_BAR.replace("[D, B, 60]", "[D, B, x60]"))
     expect(bar.page.locator(".live-message")).to_contain_text("bar.yaml:6:")
     assert bar.page.locator("#kinematics .numbers").count() == 1
     bar.drag("D", 5 * bar.scale, 0)
     assert bar.value("ground.D.x") == pytest.approx(105, abs=0.2)
     bar.page.get_by_role("slider", name="pose of the motion").fill("40")
-    bar.path.write_text(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
-    bar.session.reload()
-    expect(bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")).to_have_value("64")
+    bar.edit(FOUR_BAR.replace("[D, B, 60]", "[D, B, 64]"))
+    expect(bar.field("rocker.length")).to_have_value("64")
     bar.answered(bar.page)
     # What the hand has changed stays, as does the pose, and nothing is wrong any more.
     assert abs(int(bar.page.get_by_role("slider", name="pose of the motion").input_value()) - 40) <= 1
@@ -157,7 +149,7 @@ def test_a_server_that_has_ended_is_told_and_what_was_changed_stays(live):
     bar.drag("D", 10 * bar.scale, 0)
     port = bar.server.server_port
     bar.server.close()
-    bar.page.get_by_role("button", name="Undo").click()
+    bar.press("Undo")
     expect(bar.page.locator(".live-message")).to_contain_text("does not answer")
     assert bar.value("ground.D.x") == 100
     # What the browser says of the server that is gone.
@@ -189,14 +181,11 @@ def test_a_robot_shows_its_workspace_and_follows_a_drive_that_stands_still(live)
     area = arm.page.locator("#workspace .numbers").inner_text()
     # A ring between 20 and 180 mm: 100530 mm2.
     assert "100\N{NARROW NO-BREAK SPACE}5" in area.replace("\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
-    field = arm.page.locator("[data-name='q2_here'] [role=spinbutton]")
-    field.fill("0")
-    field.blur()
-    arm.answered(arm.page)
+    arm.type("q2_here", "0")
     assert arm.page.locator("#workspace .numbers").inner_text() == area
     # The study has no such entry.
-    arm.page.get_by_role("button", name="Copy as --set").click()
-    assert "q2" not in arm.page.locator(".live-said").inner_text()
+    arm.press("Copy as --set")
+    assert "q2" not in arm.said.inner_text()
     arm.drag("A", 10 * arm.scale, 0)
     assert arm.value("upper.length") != 100
 
@@ -217,8 +206,7 @@ def test_a_task_opens_with_its_linkages_and_one_that_is_taken_over_is_dragged_an
     task = live(TASK)
     page = task.page
     page.wait_for_selector(".moving-grid button")
-    ring = page.locator(".live-handle[aria-label^='position 3']")
-    box = ring.bounding_box()
+    box = page.locator(".live-handle[aria-label^='position 3']").bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] / 2 + 4, box["y"] + box["height"] / 2, steps=3)
@@ -231,20 +219,15 @@ def test_a_task_opens_with_its_linkages_and_one_that_is_taken_over_is_dragged_an
     # A key turns the body, and undo takes that back.
     page.get_by_role("button", name="angle of position 3").press("ArrowLeft")
     assert task.value("synthesis.body.2.angle") == 46
-    page.get_by_role("button", name="Undo").click()
+    task.press("Undo")
     assert task.value("synthesis.body.2.angle") == 45
     page.wait_for_timeout(500)
     task.answered(page)
     page.locator(".moving-grid button").first.press("Enter")
     page.wait_for_selector("#kinematics .live-answer:not([aria-busy])", timeout=30_000)
-    page.get_by_role("button", name="Save as").click()
-    page.get_by_label("Name of the file").fill("mine.yaml")
-    page.get_by_role("button", name="Save", exact=True).click()
-    expect(page.locator(".live-said")).to_contain_text("Saved as mine.yaml")
     # The saved linkage passes the place that the hand gave.
-    assert kinematics(load(task.path.with_name("mine.yaml"))).tables["motion"]["P.x"][2] == pytest.approx(
-        moved, abs=1e-4
-    )
+    motion = kinematics(load(task.save_as("mine.yaml"))).tables["motion"]
+    assert motion["P.x"][2] == pytest.approx(moved, abs=1e-4)
     page.get_by_role("link", name="the linkages of the task").click()
     page.wait_for_selector(".moving-grid button")
     assert task.value("synthesis.body.2.x") == moved
@@ -253,7 +236,7 @@ def test_a_task_opens_with_its_linkages_and_one_that_is_taken_over_is_dragged_an
 def test_axe_finds_no_fault_in_the_pages(live):
     bar = live()
     assert violations(bar.page) == []
-    bar.page.get_by_role("button", name="Save as").click()
+    bar.press("Save as")
     assert violations(bar.page) == []
 
 
@@ -270,26 +253,21 @@ def test_undo_goes_on_after_the_file_was_changed_in_an_editor_and_says_what_it_l
     bar = live()
     bar.drag("D", 10 * bar.scale, 0)
     moved = bar.value("ground.D.x")
-    field = bar.page.locator("[data-name='rocker.length'] [role=spinbutton]")
-    field.fill("66")
-    field.blur()
-    bar.answered(bar.page)
+    bar.type("rocker.length", "66")
     undo = bar.page.get_by_role("button", name="Undo")
     edited = FOUR_BAR.replace("[O, A, 30]", "[O, A, 33]")
-    bar.path.write_text(edited)
-    bar.session.reload()
-    expect(bar.page.locator("[data-name='crank.length'] [role=spinbutton]")).to_have_value("33")
+    bar.edit(edited)
+    expect(bar.field("crank.length")).to_have_value("33")
     assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 66)
     undo.click()
     assert (bar.value("ground.D.x"), bar.value("rocker.length")) == (moved, 60)
     undo.click()
     assert (bar.value("ground.D.x"), bar.value("crank.length")) == (100, 33)
     assert undo.is_disabled()
-    bar.page.get_by_role("button", name="Redo").click()
-    bar.page.get_by_role("button", name="Redo").click()
-    bar.path.write_text(edited.replace("rocker: [D, B, 60]", "arm: [D, B, 60]").replace("rocker.", "arm."))
-    bar.session.reload()
-    expect(bar.page.locator(".live-said")).to_contain_text("Undo goes on without rocker.length")
+    bar.press("Redo")
+    bar.press("Redo")
+    bar.edit(edited.replace("rocker: [D, B, 60]", "arm: [D, B, 60]").replace("rocker.", "arm."))
+    expect(bar.said).to_contain_text("Undo goes on without rocker.length")
     assert bar.value("ground.D.x") == moved
 
 
@@ -305,14 +283,14 @@ def test_a_cranks_pin_turns_the_crank_and_a_button_shows_the_other_assembly(live
     bar.page.mouse.up()
     bar.answered(bar.page)
     assert bar.value("crank.length") == 30
-    bar.page.get_by_role("button", name="Other assembly").click()
-    expect(bar.page.locator(".live-said")).to_contain_text("assembly 2 of 2")
+    bar.press("Other assembly")
+    expect(bar.said).to_contain_text("assembly 2 of 2")
     bar.answered(bar.page)
     _, below = bar.middle("B")
     _, pivot = bar.middle("D")
     assert below > pivot
-    bar.page.get_by_role("button", name="Copy as --set").click()
-    expect(bar.page.locator(".live-said")).to_contain_text("mechanism.sketch.B.1=-40.6")
+    bar.press("Copy as --set")
+    expect(bar.said).to_contain_text("mechanism.sketch.B.1=-40.6")
 
 
 @pytest.mark.nightly
@@ -412,13 +390,9 @@ def test_locks_grid_and_curves_outlast_a_new_version_of_the_file_and_what_it_has
     page.get_by_label("lock rod.length").check()
     page.locator(".live-grid").fill("5")
     curves.nth(0).select_option(index=2)
-    field = page.locator("[data-name='rocker.length'] [role=spinbutton]")
-    field.fill("50")
-    field.press("Tab")
-    bar.answered(page)
-    bar.path.write_text(bar.path.read_text().replace("[D, B, 60]", "[D, B, 62]"))
-    bar.session.reload()
-    expect(page.locator(".live-said")).to_contain_text("The file has rocker.length 62, yours 50 stays.")
+    bar.type("rocker.length", "50")
+    bar.edit(bar.path.read_text().replace("[D, B, 60]", "[D, B, 62]"))
+    expect(bar.said).to_contain_text("The file has rocker.length 62, yours 50 stays.")
     assert bar.value("rocker.length") == 50
     assert page.get_by_label("lock rod.length").is_checked()
     assert page.locator(".live-grid").input_value() == "5"

@@ -80,15 +80,11 @@ def test_a_drag_in_any_mechanism_is_saved_and_the_command_line_gives_the_numbers
     one = live(text)
     before = numbers_of(one.page)
     one.drag(point, 9, -6)
-    assert one.page.locator(".live-number.changed").count() + one.page.locator(".live-said").inner_text().count("=") > 0
+    assert one.page.locator(".live-number.changed").count() + one.said.inner_text().count("=") > 0
     shown = numbers_of(one.page)
     assert shown != before
-    one.page.get_by_role("button", name="Save as").click()
-    one.page.get_by_label("Name of the file").fill("changed.yaml")
-    one.page.get_by_role("button", name="Save", exact=True).click()
-    expect(one.page.locator(".live-said")).to_contain_text("Saved as changed.yaml")
-    out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["run", str(tmp_path / "changed.yaml"), "--report", "--no-plots", f"--out={out}"])
+    out, copy = tmp_path / "out", one.save_as("changed.yaml")
+    done = CliRunner().invoke(app, ["run", str(copy), "--report", "--no-plots", f"--out={out}"])
     assert done.exit_code in (0, 1, 3), done.stderr
     answers = [json.loads(part.read_text()) for part in out.rglob("report.json")]
     assert answers
@@ -107,10 +103,9 @@ def test_hostile_texts_stay_texts(live):
     bar.page.on("dialog", lambda dialog: bar.complaints.append(dialog.message))
     assert HOSTILE in bar.page.locator("h1").inner_text()
     bar.drag("D", 10, 0)
-    bar.page.get_by_role("button", name="Save into").click()
-    bar.page.get_by_role("button", name="Cancel").click()
-    bar.path.write_text(text.replace("[D, B, 60]", f'[D, B, "{HOSTILE}"]'))
-    bar.session.reload()
+    bar.press("Save into")
+    bar.press("Cancel")
+    bar.edit(text.replace("[D, B, 60]", f'[D, B, "{HOSTILE}"]'))
     expect(bar.page.locator(".live-message")).to_contain_text(HOSTILE)
     assert bar.page.locator("img[onerror], img[src=x]").count() == 0
 

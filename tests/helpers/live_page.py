@@ -75,8 +75,40 @@ class Live:
         self.page.wait_for_selector(".live-handle.held", state="detached")
         self.answered(self.page)
 
+    def field(self, name):
+        """The field of a number."""
+        return self.page.locator(f"[data-name='{name}'] [role=spinbutton]")
+
     def value(self, name):
-        return float(self.page.locator(f"[data-name='{name}'] [role=spinbutton]").input_value())
+        return float(self.field(name).input_value())
+
+    def type(self, name, value):
+        """Type a number into its field and leave it."""
+        self.field(name).fill(value)
+        self.field(name).blur()
+        self.answered(self.page)
+
+    @property
+    def said(self):
+        """What the page says of what a hand has done."""
+        return self.page.locator(".live-said")
+
+    def press(self, button):
+        """Click a button of the page."""
+        self.page.get_by_role("button", name=button, exact=button == "Save").click()
+
+    def save_as(self, name):
+        """Save a copy of the study; its path."""
+        self.press("Save as")
+        self.page.get_by_label("Name of the file").fill(name)
+        self.press("Save")
+        self.page.locator(".live-said", has_text=f"Saved as {name}").wait_for()
+        return self.path.with_name(name)
+
+    def edit(self, text):
+        """Write the file as an editor does, and have it read."""
+        self.path.write_text(text)
+        self.session.reload()
 
     @property
     def scale(self):

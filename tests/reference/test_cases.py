@@ -70,7 +70,7 @@ def test_a_check_that_cannot_be_made_says_in_which_case_and_which_columns_there_
         with pytest.raises((NameError, KeyError), match=wrong) as told:
             of(check)
         notes = "\n".join(told.value.__notes__)
-        assert "case slider_crank," in notes
+        assert "case slider_crank, " in notes
         assert "\n  extremes: output, " in notes
 
 
