@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer.main
 import yaml
+from helpers import command_line
 
 from mechdesign.door.cli.app import app
 
@@ -41,13 +42,30 @@ def lines(path: Path) -> list[str]:
 
 @pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.name)
 def test_every_command_line_of_a_shown_file_is_one(path: Path) -> None:
-    calls = [re.match(r"\s*(?:exec )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
+    calls = [re.match(r"\s*(?:exec |\w+= )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
     commands = [shlex.split(call[1]) for call in calls if call]
     assert len(commands) >= 2
     for command, *arguments in commands:
         assert command in GROUP.commands
         # What is unknown, or lacks, is an error.
         GROUP.commands[command].make_context(command, arguments)
+
+
+def test_what_was_wrong_before_a_change_is_not_shown_beside_its_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a change that mends a study is shown the mistake that it mends."""
+    runs = (step.get("run", "") for step in steps(ROOT / "docs/ci/github.yml"))
+    (call,) = (run for run in runs if "before/configs" in run)
+    name, value, command = re.fullmatch(r"(?:(\w+)=(\w*) )?mechdesign (.*) \|\| true", call).groups()
+    (tmp_path / "before/configs").mkdir(parents=True)
+    (tmp_path / "before/configs/wiper.yaml").write_text("mechanism: {}\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    if name:
+        monkeypatch.setenv(name, value)
+    done = command_line.ask(*shlex.split(command), study="")
+    assert (done.exit_code, "::" in done.stdout + done.stderr) == (2, False)
 
 
 @pytest.mark.parametrize("path", [*SHOWN[:1], *OURS], ids=lambda path: path.name)
