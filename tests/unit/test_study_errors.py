@@ -193,6 +193,7 @@ QUESTIONS = [
     ("kinematics: {sweep: {theta: 0..360}}", "a sweep is written {from: 0, to: 360, number: 73}, not 0..360"),
     ("kinematics: {sweep: {theta: 0:5:360}}", "a sweep is written {from: 0, to: 360, step: 5}, not 0:5:360"),
     ("kinematics: {rates: {theta: 60 RPM}}", "unknown unit 'RPM'; did you mean 'rpm'?"),
+    ("kinematics: {rates: {theta: 1 Hz}}", "unknown unit 'Hz'; did you mean 'rev/s'?"),
     ("kinematics: {rates: {theta: 60 U/min}}", "unknown unit 'U/min'; did you mean 'rpm'?"),
     ("kinematics: {outputs: [Q]}", "10:24: kinematics.outputs.0: there is no coordinate 'Q'"),
     ("kinematics: {sweep: {P: 3}}", "'P' is a point; its coordinates are P.x and P.y"),
