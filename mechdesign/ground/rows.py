@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -255,7 +255,7 @@ def named(result: Result, path: str) -> tuple[str, str]:
         return path, ""
     head, _, word = path.rpartition(".")
     if not head or _place(result, head) is None:
-        located(result, head if word in STATISTICS and head else path)
+        located(result, path)
     if word not in STATISTICS:
         raise UnknownColumnError(f"{head} has no {word!r}; it has {', '.join(STATISTICS)}")
     return head, word
@@ -328,9 +328,18 @@ def located(result: Result, path: str) -> tuple[Table, str, Flags]:
     for absent in result.absent:
         if absent in path.split("."):
             raise UnknownColumnError(_why_absent(result, absent))
-    names = [column for table in result.tables.values() for column in table.names]
-    names += [name for table in result.tables.values() if table.strands for name in table.strands.names]
-    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, names))
+    first, word = path.partition(".")[0], path.rpartition(".")[2]
+    tables = [result.tables[first]] if first in result.tables else [*result.tables.values()]
+    columns = [name for table in tables for name in (*table.names, *(table.strands.names if table.strands else ()))]
+    written = [f"{name}.{word}" for name in columns if word in STATISTICS]
+    written += [f"{table.name}.{name}" for table in tables for name in (*table.names, *_of_rows(table))]
+    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, columns, written))
+
+
+def _of_rows(table: Table) -> Iterator[str]:
+    """Its numbers by the words of their rows, such as ``C.x.range`` of the extremes."""
+    words = dict.fromkeys(word for column in table.columns if not column.numeric for word in column.values.tolist())
+    return (f"{word}.{column.name}" for word in words if word for column in table.columns if column.numeric)
 
 
 def _place(result: Result, path: str) -> tuple[Table, str, Flags] | None:
@@ -361,9 +370,9 @@ def _why_absent(result: Result, name: str) -> str:
     return f"{result.command} has no {name}: {result.absent[name]}"
 
 
-def _unknown(where: str, name: str, columns: Iterable[str]) -> str:
+def _unknown(where: str, name: str, columns: Iterable[str], written: Iterable[str] = ()) -> str:
     names = list(dict.fromkeys(columns))
-    hint = suggestion(name, names) or f"; it has {', '.join(names)}"
+    hint = suggestion(name, [*names, *written]) or f"; it has {', '.join(names)}"
     return f"{where}: no column {name!r}{hint}"
 
 

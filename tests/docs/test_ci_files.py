@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer.main
 import yaml
+from helpers import command_line
 
 from mechdesign.door.cli.app import app
 
@@ -41,13 +42,32 @@ def lines(path: Path) -> list[str]:
 
 @pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.name)
 def test_every_command_line_of_a_shown_file_is_one(path: Path) -> None:
-    calls = [re.match(r"\s*(?:exec )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
+    calls = [re.match(r"\s*(?:exec |\w+= )?mechdesign (.*?)(?: \|\| true)?$", line) for line in lines(path)]
     commands = [shlex.split(call[1]) for call in calls if call]
     assert len(commands) >= 2
     for command, *arguments in commands:
         assert command in GROUP.commands
         # What is unknown, or lacks, is an error.
         GROUP.commands[command].make_context(command, arguments)
+
+
+def test_what_is_wrong_is_shown_once_and_what_was_wrong_before_a_change_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four parts read each study; and a change that mends one would be shown the mistake that it mends."""
+    calls = [step.get("run", "").removesuffix(" || true") for step in steps(ROOT / "docs/ci/github.yml")]
+    shown = {}
+    for folder in ("configs", "before/configs"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "wiper.yaml").write_text("mechanism: {}\n")
+    monkeypatch.chdir(tmp_path)
+    for call in [call for call in calls if re.search("mechdesign (run|merge)", call)]:
+        setting, command = re.fullmatch(r"(?:GITHUB_ACTIONS=(\w*) )?mechdesign (.*)", VARIABLE.sub("1", call)).groups()
+        monkeypatch.setenv("GITHUB_ACTIONS", "true" if setting is None else setting)
+        done = command_line.ask(*shlex.split(command), study="")
+        assert done.exit_code == 2
+        shown[" ".join(command.split()[:2])] = done.stderr.count("::error file=")
+    assert shown == {"run configs": 0, "merge configs": 1, "run before/configs": 0}
 
 
 @pytest.mark.parametrize("path", [*SHOWN[:1], *OURS], ids=lambda path: path.name)

@@ -237,7 +237,9 @@ def test_sums_of_numbers_of_one_unit() -> None:
     ("requirement", "message"),
     [
         ("{result: kinematics.C.x.average, at_most: 1}", "C.x has no 'average'; it has min, max, mean, range"),
-        ("{result: kinematics.C.z.mean, at_most: 1}", "no column 'C.z'"),
+        ("{result: kinematics.C.z.mean, at_most: 1}", "no column 'C.z.mean'; did you mean 'C.[xy].mean'"),
+        ("{result: kinematics.extremes.rocker.range, at_most: 1}", "; did you mean 'extremes.rocker.angle.range'"),
+        ("{result: kinematics.extreme.C.x.max, at_most: 1}", "; did you mean 'extremes.C.x.max'"),
         (
             "{result: kinematics.C.x.mean + kinematics.rocker.angle.mean, at_most: 1}",
             r"several: C.x.mean \(mm\), rocker",

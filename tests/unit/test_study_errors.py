@@ -193,6 +193,8 @@ QUESTIONS = [
     ("kinematics: {sweep: {theta: 0..360}}", "a sweep is written {from: 0, to: 360, number: 73}, not 0..360"),
     ("kinematics: {sweep: {theta: 0:5:360}}", "a sweep is written {from: 0, to: 360, step: 5}, not 0:5:360"),
     ("kinematics: {rates: {theta: 60 RPM}}", "unknown unit 'RPM'; did you mean 'rpm'?"),
+    ("kinematics: {poses: [0, 90]}", "a pose names its coordinates, as in [{theta: 0}]"),
+    ("kinematics: {rates: {theta: 1 Hz}}", "unknown unit 'Hz'; did you mean 'rev/s'?"),
     ("kinematics: {rates: {theta: 60 U/min}}", "unknown unit 'U/min'; did you mean 'rpm'?"),
     ("kinematics: {outputs: [Q]}", "10:24: kinematics.outputs.0: there is no coordinate 'Q'"),
     ("kinematics: {sweep: {P: 3}}", "'P' is a point; its coordinates are P.x and P.y"),
@@ -356,7 +358,8 @@ def test_files_that_cannot_be_read(tmp_path):
         ("stiffness", "stiffness: is missing: say which point's stiffness is asked"),
         ("reliability", "reliability: asks what varies: give 'dimensions' or 'clearances'"),
         ("workspace", "workspace.point: the point whose workspace is asked for is needed"),
-        ("optimize", "optimize.variables: an optimisation needs variables"),
+        ("optimize", "optimize.variables: are missing: say what may change, for example {crank.length:"),
+        ("synthesize", "synthesis: is missing: say what linkages shall do, for example {path: {points:"),
     ],
 )
 def test_a_missing_section_is_told_with_its_file_and_line(tmp_path, question, said):

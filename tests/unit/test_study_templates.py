@@ -42,7 +42,8 @@ def test_templates_are_studies(name, validator):
 def test_unknown_template():
     done = command_line.ask("new", "five_bra", study="")
     assert done.exit_code == 2
-    assert "no template 'five_bra'; did you mean 'five_bar'?; there are " + ", ".join(TEMPLATES) in done.stderr
+    assert "did you mean 'five_bar'?; templates are " + ", ".join(TEMPLATES) in done.stderr
+    assert "did you mean 'cam_dwell'?" in command_line.ask("new", "cam_dwel", study="").stderr
 
 
 def test_shipped_studies_and_pages_are_printed_where_there_is_no_checkout():

@@ -6,8 +6,8 @@ import os
 
 from mechdesign.door.cli.options import Options
 from mechdesign.door.cli.terminal import emit, emit_words, say
-from mechdesign.door.reference import text_of
-from mechdesign.ground.errors import OutputError, StudyError
+from mechdesign.door.reference import studies, text_of
+from mechdesign.ground.errors import OutputError, StudyError, suggestion
 from mechdesign.ground.files import replace
 from mechdesign.study import template
 from mechdesign.study.importing.conversion import conversion
@@ -15,10 +15,22 @@ from mechdesign.study.templates import BUILT_IN, templates
 
 
 def new(options: Options) -> int:
-    """Print a commented study to start from, or one that is shipped."""
+    """Print a commented study to start from, or one that is shipped.
+
+    Raises
+    ------
+    StudyError
+        If there is none of that name.
+    """
     name = options.template or BUILT_IN
-    shipped = None if name in templates() else text_of(name)
-    emit(template(name) if shipped is None else shipped)
+    text = template(name) if name in templates() else text_of(name)
+    if text is None:
+        near = suggestion(name, (*templates(), *studies()))
+        raise StudyError(
+            f"there is no template or shipped study {name!r}{near}; templates are {', '.join(templates())}; "
+            "mechdesign docs WORD finds the shipped studies that have a word"
+        )
+    emit(text)
     return 0
 
 

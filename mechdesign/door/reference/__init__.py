@@ -3,7 +3,7 @@
 from mechdesign.door.reference.entries import Entry
 from mechdesign.door.reference.keys import place
 from mechdesign.door.reference.lookup import below, find, holding, near
-from mechdesign.door.reference.pages import PAGE, SHIPPED, pages, text_of
+from mechdesign.door.reference.pages import PAGE, SHIPPED, pages, studies, text_of
 from mechdesign.door.reference.sources import entries
 from mechdesign.door.reference.tables import tables
 
@@ -18,6 +18,7 @@ __all__ = [
     "near",
     "pages",
     "place",
+    "studies",
     "tables",
     "text_of",
 ]

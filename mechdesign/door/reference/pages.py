@@ -45,10 +45,14 @@ def _pages() -> tuple[_Page, ...]:
     )
 
 
+def studies() -> dict[str, Path]:
+    """Shipped studies by their names."""
+    return {path.stem: path for path in _files().values() if path.suffix == _STUDY}
+
+
 def text_of(name: str) -> str | None:
     """The text of a page, study or file for CI by its place, or of a study by its name; None where there is none."""
-    studies = {path.stem: path for path in _files().values() if path.suffix == _STUDY}
-    path = _files().get(name, studies.get(name))
+    path = _files().get(name, studies().get(name))
     return None if path is None else path.read_text("utf-8")
 
 

@@ -66,7 +66,8 @@ def optimize(
     """Evaluate designs, and find the best for each set of weights [S1, eqs. 27, 28]; see `mechdesign.optimize`."""
     section = study.optimize
     if section is None or not section.variables:
-        raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
+        message = "are missing: say what may change, for example {crank.length: {from: 20, to: 40, step: 5}}"
+        raise StudyError((study.problem(message, "optimize", "variables"),))
     if not (section.maximize or section.minimize):
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))

@@ -52,7 +52,8 @@ def synthesize(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     """Find linkages that do a task; see `mechdesign.synthesize`."""
     section = study.synthesis
     if section is None:
-        raise StudyError((study.problem("there is no task", "synthesis"),))
+        message = "is missing: say what linkages shall do, for example {path: {points: [[0, 0], [40, 25], [80, 0]]}}"
+        raise StudyError((study.problem(message, "synthesis"),))
     if seed is None:
         seed = study.seed if section.seed is None else section.seed
     random = np.random.default_rng(seed)

@@ -86,6 +86,9 @@ def _poses(raw: Any) -> Any:
         return ()
     if isinstance(raw, list) and not raw:
         raise failure("an empty list of poses; give one or more, such as [{theta: 30}]")
+    for pose in raw if isinstance(raw, list) else ():
+        if isinstance(pose, int | float | str):
+            raise failure(f"a pose names its coordinates, as in [{{theta: {cut(str(pose))}}}]")
     return raw
 
 

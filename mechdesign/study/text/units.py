@@ -70,7 +70,8 @@ MAX_UNIT = 60
 MAX_POWER = 9
 
 # Units as other languages and programs write them.
-_SYNONYMS = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
+_TURNS = dict.fromkeys(("u/min", "upm", "tr/min", "rev/min"), "rpm")
+_SYNONYMS = _TURNS | {"hz": "rev/s", "grad": "deg", "sek": "s", "zoll": "in"}
 
 
 class QuantityError(ValueError):
