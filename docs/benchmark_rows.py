@@ -184,7 +184,7 @@ def motion(share: float) -> dict[str, Side]:
 
     return {OURS: Side(lambda: mechdesign.kinematics(study, jobs=1), ours)} | in_pylinkage(
         2 * math.pi / poses,
-        lambda linkage: Side(lambda: linkage.step_fast_with_kinematics(poses), lambda found: found[2][:, 3].T, 1e-6),
+        lambda linkage: Side(lambda: linkage.step_fast_with_kinematics(poses), lambda result: result[2][:, 3].T, 1e-6),
     )
 
 
@@ -213,11 +213,11 @@ def turns(share: float) -> dict[str, Side]:
             a, b = (places[:, :, k, 0] + 1j * places[:, :, k, 1] for k in (2, 3))
             return np.asarray(np.ptp((a + (1.75 + 1.5j) * (b - a) / lengths[1][:, None]).real, axis=1))
 
-        return Side(ranges, lambda found: found, 1e-2)
+        return Side(ranges, lambda result: result, 1e-2)
 
     return {
         OURS: Side(lambda: mechdesign.evaluate(study, values, extremes), lambda table: table[extremes[0]]),
-        "NumPy": Side(lambda: floors.ends_of_turns(*lengths), lambda found: found[0], 1e-6),
+        "NumPy": Side(lambda: floors.ends_of_turns(*lengths), lambda result: result[0], 1e-6),
         **in_pylinkage(math.radians(5), stepped),
     }
 
@@ -234,7 +234,7 @@ def robots(share: float) -> dict[str, Side]:
     values = {f"mechanism.parameters.{name}": size for name, size in zip("abc", sizes, strict=True)}
     return {
         OURS: Side(lambda: mechdesign.evaluate(study, values, [swing]), lambda table: table[swing]),
-        "NumPy": Side(lambda: floors.five_bar_ranges(*sizes), lambda found: found, 1e-2),
+        "NumPy": Side(lambda: floors.five_bar_ranges(*sizes), lambda result: result, 1e-2),
     }
 
 
@@ -254,7 +254,7 @@ def precision(share: float) -> dict[str, Side]:
 
     return {
         OURS: Side(lambda: mechdesign.evaluate(study, values, [worst]), lambda table: table[worst]),
-        "NumPy": Side(by_hand, lambda found: found, 1e-6),
+        "NumPy": Side(by_hand, lambda result: result, 1e-6),
     }
 
 
@@ -296,7 +296,7 @@ def made(share: float) -> dict[str, Side]:
     def analysed(linkage: Any) -> Side:
         errors = dict.fromkeys(("A_radius", "B_dist1", "B_dist2"), 0.01)
         work = partial(linkage.analyze_tolerance, errors, iterations=72, n_samples=few, seed=1)
-        return Side(work, lambda found: found.position_std.mean(), 6 / math.sqrt(2 * few), few / samples)
+        return Side(work, lambda result: result.position_std.mean(), 6 / math.sqrt(2 * few), few / samples)
 
     def ours(result: mechdesign.Answer) -> Any:
         return np.hypot(*result.tables["moments"]["sigma"].reshape(-1, 2).T).mean()
@@ -342,7 +342,7 @@ def s1_grid(share: float, sums: str, within: float) -> dict[str, Side]:
     lengths = s1_designs(mechdesign.optimize(study, jobs=1), "l_min", "l_a")
     ours = Side(lambda: mechdesign.optimize(study, jobs=1), lambda result: s1_designs(result, "GII", "GRI"))
     return {OURS: ours} | in_c(
-        lambda _: Side(lambda: floors.region_sums(*lengths, *SUMS[sums]), lambda found: found, within)
+        lambda _: Side(lambda: floors.region_sums(*lengths, *SUMS[sums]), lambda result: result, within)
     )
 
 
@@ -374,9 +374,9 @@ def accuracy() -> dict[str, float]:
         mechdesign.optimize(mechdesign.load(study, {"workspace.integrate": {"rule": "gauss", "tolerance": tolerance}}))
         for tolerance in (1e-4, 1e-6)
     )
-    found = {OURS: s1_designs(result, "GII", "GRI")}
+    indices = {OURS: s1_designs(result, "GII", "GRI")}
     if floors.library() is not None:
         lengths = s1_designs(result, "l_min", "l_a")
-        found |= {f"C, {name}": floors.region_sums(*lengths, *sums) for name, sums in SUMS.items()}
-    apart = {name: np.abs(values / s1_designs(exact, "GII", "GRI") - 1).max() for name, values in found.items()}
+        indices |= {f"C, {name}": floors.region_sums(*lengths, *sums) for name, sums in SUMS.items()}
+    apart = {name: np.abs(values / s1_designs(exact, "GII", "GRI") - 1).max() for name, values in indices.items()}
     return {name: float(f"{error:.2g}") for name, error in apart.items()}

@@ -117,10 +117,10 @@ def _read(terminal: int) -> bytes:
     return b"".join(blocks)
 
 
-def agree(told: str, shown: str) -> bool:
+def agree(written: str, shown: str) -> bool:
     """Whether an output is the one in the page, whose lines `...` stand for any lines; numbers agree to six digits."""
     lines = shown.splitlines()
-    first, *others = _split(told.splitlines())
+    first, *others = _split(written.splitlines())
     if not _same(first, lines[: len(first)]) or (not others and len(lines) != len(first)):
         return False
     at = len(first)
@@ -134,10 +134,10 @@ def agree(told: str, shown: str) -> bool:
     return True
 
 
-def _split(told: Iterable[str]) -> Iterator[list[str]]:
+def _split(written: Iterable[str]) -> Iterator[list[str]]:
     """The runs of lines between those that stand for any lines."""
     part: list[str] = []
-    for line in told:
+    for line in written:
         if line.strip() == ANY:
             yield part
             part = []
@@ -146,15 +146,15 @@ def _split(told: Iterable[str]) -> Iterator[list[str]]:
     yield part
 
 
-def _same(told: Sequence[str], shown: Sequence[str]) -> bool:
+def _same(written: Sequence[str], shown: Sequence[str]) -> bool:
     """Whether lines are the same: words to the letter, numbers to six digits, as machines differ in the last ones.
 
     Numbers below `ROUNDING` are what rounding leaves, another on every machine. Columns are as wide as their numbers.
     """
-    words = [[_NUMBER.sub("", line).split() for line in lines] for lines in (told, shown)]
+    words = [[_NUMBER.sub("", line).split() for line in lines] for lines in (written, shown)]
     if words[0] != words[1]:
         return False
-    numbers = [_NUMBER.findall("\n".join(lines)) for lines in (told, shown)]
+    numbers = [_NUMBER.findall("\n".join(lines)) for lines in (written, shown)]
     if len(numbers[0]) != len(numbers[1]):
         return False
     pairs = zip(*numbers, strict=True)
@@ -172,14 +172,14 @@ def _commands(body: str) -> Iterator[tuple[str, str]]:
 
 
 def _console(page: Page, body: str, where: int) -> str:
-    found = []
-    for command, told in _commands(body):
+    parts = []
+    for command, written in _commands(body):
         shown = terminal(command, page.folder, page.tools, page.pictures)
-        if not agree(told, shown):
-            page.fail(where, f"$ {command}\nshows\n{shown}where the page has\n{told}")
-            told = shown
-        found.append(f"$ {command}\n{told}")
-    return "".join(found)
+        if not agree(written, shown):
+            page.fail(where, f"$ {command}\nshows\n{shown}where the page has\n{written}")
+            written = shown
+        parts.append(f"$ {command}\n{written}")
+    return "".join(parts)
 
 
 def _yaml(page: Page, body: str, where: int) -> None:
@@ -239,20 +239,20 @@ def run(tools: Path, path: Path, base: Path = RUN) -> tuple[str, list[str]]:
     text = path.read_text(encoding="utf-8")
     page = Page(path, folder, tools, frozenset(_PICTURE.findall(text)))
 
-    def block(found: re.Match[str]) -> str:
-        kind, body = found["kind"].strip(), found["body"]
+    def block(match: re.Match[str]) -> str:
+        kind, body = match["kind"].strip(), match["body"]
         if kind == "console":
-            body = _console(page, body, found.start())
+            body = _console(page, body, match.start())
         elif kind in ("yaml", "{code-block} yaml"):
-            _yaml(page, body, found.start())
+            _yaml(page, body, match.start())
         elif kind == "python":
-            _python(page, body, found.start())
+            _python(page, body, match.start())
         elif kind == "text" and page.printed:
             if not agree(body, page.printed):
-                page.fail(found.start(), f"prints\n{page.printed}where the page has\n{body}")
+                page.fail(match.start(), f"prints\n{page.printed}where the page has\n{body}")
                 body = page.printed
             page.printed = ""
-        return f"{found['fence']}{found['kind']}\n{body}{found['fence']}"
+        return f"{match['fence']}{match['kind']}\n{body}{match['fence']}"
 
     if is_notebook(path):
         (folder / f"{path.stem}.ipynb").write_text(jupyter(text), encoding="utf-8")
@@ -272,16 +272,16 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
 def wrong(paths: Iterable[Path]) -> list[str]:
     """Run the examples of these pages; what is wrong with them, in words."""
     with forked() as tools, ThreadPoolExecutor(os.cpu_count()) as pool:
-        return [words for _, told in pool.map(partial(run, tools), paths) for words in told]
+        return [words for _, faults in pool.map(partial(run, tools), paths) for words in faults]
 
 
 def main() -> None:
     """Write into the pages what their commands print now."""
     with forked() as tools:
         for path in pages(sys.argv[1:]):
-            text, told = run(tools, path)
+            text, faults = run(tools, path)
             path.write_text(text, encoding="utf-8")
-            print(*told, sep="\n")
+            print(*faults, sep="\n")
 
 
 if __name__ == "__main__":

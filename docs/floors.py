@@ -74,11 +74,11 @@ def region_sums(l_min: Floats, l_a: Floats, places: Places, rays: int, radii: in
     at, weight = places(rays // 2)
     at, weight = np.pi / 2 * np.concatenate([at, 1 + at]), np.pi / 2 * np.tile(weight, 2)
     radius, part = places(radii)
-    found = np.empty((len(l_min), 3))
+    sums = np.empty((len(l_min), 3))
     library().regions(
-        len(l_min), l_min.ctypes.data, l_a.ctypes.data, rule_of(at, weight), rule_of(radius, part), found.ctypes.data
+        len(l_min), l_min.ctypes.data, l_a.ctypes.data, rule_of(at, weight), rule_of(radius, part), sums.ctypes.data
     )
-    return found[:, :2].T
+    return sums[:, :2].T
 
 
 def ends_of_turns(crank: Floats, rod: Floats, rocker: Floats) -> list[Floats]:
@@ -96,7 +96,7 @@ def ends_of_turns(crank: Floats, rod: Floats, rocker: Floats) -> list[Floats]:
         turn = span / np.abs(span) * (along + 1j * np.sqrt(b**2 - along**2)) / b
         return pin + (1.75 + 1.5j) * turn, np.angle(pin + b * turn - d)
 
-    found = []
+    numbers = []
     for part in (0, 1):
         ends = []
         for sign in (1, -1):
@@ -106,9 +106,9 @@ def ends_of_turns(crank: Floats, rod: Floats, rocker: Floats) -> list[Floats]:
                 low, middle, high = (sign * poses(place + h)[part].real for h in (-1e-3, 0.0, 1e-3))
                 place = place - 5e-4 * (high - low) / (high - 2 * middle + low)
             ends.append((sign * poses(place)[part].real, place))
-        found += [ends[0][0] + ends[1][0], ends[0][1] - ends[1][1]]
+        numbers += [ends[0][0] + ends[1][0], ends[0][1] - ends[1][1]]
     mu = [np.arccos((b**2 + c**2 - (d + side * a) ** 2) / (2 * b * c)) for side in (-1, 1)]
-    return [part[:, 0] for part in (*found, np.minimum(mu[0], np.pi - mu[1]))]
+    return [part[:, 0] for part in (*numbers, np.minimum(mu[0], np.pi - mu[1]))]
 
 
 def five_bar_ranges(lower: Floats, upper: Floats, other: Floats) -> Floats:

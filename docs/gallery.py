@@ -60,8 +60,8 @@ def comment(text: str) -> str:
     return re.sub(r"(?m)(?:^ {2,}\S.*\n?)+", _block, "\n".join(lines) + "\n")
 
 
-def _block(found: re.Match[str]) -> str:
-    lines = [line.strip() for line in found.group().splitlines()]
+def _block(match: re.Match[str]) -> str:
+    lines = [line.strip() for line in match.group().splitlines()]
     kind = "sh" if lines[0].startswith("mechdesign ") else "text"
     return "\n".join((f"```{kind}", *lines, "```", ""))
 
@@ -73,8 +73,8 @@ def results(path: Path) -> Path:
 
 def picture(folder: Path) -> Path | None:
     """The picture of a study's results that says most."""
-    found = {path.stem: path for path in sorted(folder.rglob("*.png"))}
-    return next((found[name] for name in PICTURES if name in found), None)
+    images = {path.stem: path for path in sorted(folder.rglob("*.png"))}
+    return next((images[name] for name in PICTURES if name in images), None)
 
 
 @cache
@@ -102,9 +102,9 @@ def wall(names: Iterable[str], moving: Container[str], folder: str = "") -> str:
 
     `folder` is the way from the page with the wall to the gallery.
     """
-    found, lines = studies(), []
+    paths, lines = studies(), []
     for name in names:
-        shown = picture(results(found[name]))
+        shown = picture(results(paths[name]))
         if name in moving:
             image = f"![]({folder}{name}.svg)"
         elif shown is not None:
@@ -112,7 +112,7 @@ def wall(names: Iterable[str], moving: Container[str], folder: str = "") -> str:
             image = f"![]({up}{shown.relative_to(ROOT).as_posix()})"
         else:
             image = ""
-        lines.append(f"[{image} {title(found[name])}]({folder}{name}.md)")
+        lines.append(f"[{image} {title(paths[name])}]({folder}{name}.md)")
     return "\n\n".join((":::{container} wall", *lines, ":::"))
 
 

@@ -96,7 +96,7 @@ def in_place(entry: Entry) -> str:
         indent, dash = indent + " " * (2 + len(dash)), ""
     first, *others = entry.examples
     lines += _written(f"{indent}{dash}{last}:", first, indent + " " * (2 + len(dash)))
-    return "\n".join([*lines, *(f"{indent}{' ' * len(dash)}# or {last}: {each}" for each in others)])
+    return "\n".join([*lines, *(f"{indent}{' ' * len(dash)}# or {last}: {example}" for example in others)])
 
 
 def _example_name(path: str, inner: str) -> str:
@@ -126,9 +126,9 @@ def _page(title: str, parts: Iterable[str]) -> str:
     return "\n\n".join([f"# {title}", *parts]) + "\n"
 
 
-def section(found: list[Entry]) -> str:
+def section(group: list[Entry]) -> str:
     """The page of a section of the study: the section, then every key in it."""
-    first, *keys = found
+    first, *keys = group
     parts = [*_told(first)]
     for entry in keys:
         path = entry.word.partition(".")[2]
@@ -136,10 +136,10 @@ def section(found: list[Entry]) -> str:
     return _page(code(first.word), parts)
 
 
-def listed(title: str, before: str, found: Iterable[Entry]) -> str:
+def listed(title: str, before: str, chosen: Iterable[Entry]) -> str:
     """The page of a list: a part a kind, its words in the order of the source."""
     parts = [before]
-    for kind, words in groupby(found, key=lambda entry: entry.kind):
+    for kind, words in groupby(chosen, key=lambda entry: entry.kind):
         parts.append(f"## {kind[0].upper()}{kind[1:]}")
         alike = list(words)
         where = alike[0].where
@@ -152,13 +152,13 @@ def listed(title: str, before: str, found: Iterable[Entry]) -> str:
     return _page(title, parts)
 
 
-def table_page(command: str, found: Iterable[TableKind]) -> str:
+def table_page(command: str, kinds: Iterable[TableKind]) -> str:
     """The page of a command's tables, with every column."""
     parts = [
         f"What `mechdesign {command}` writes. `<names>` stand for those of a study. Lengths, angles, times and forces "
         "are in the study's units; an empty cell or `nan` has no value."
     ]
-    for kind in found:
+    for kind in kinds:
         rows = [[code(column.name), markdown(column.meaning), markdown(column.unit.replace("_", " ")),
                  code(column.formula) if column.formula else ""] for column in kind.kinds]  # fmt: skip
         parts += [
@@ -176,7 +176,7 @@ def messages_page() -> str:
         "the key takes and an example. One of an option begins with it; `mechdesign COMMAND --help` lists them. "
         "Exit codes are those of [](exit_codes.md): with 2 nothing was computed.",
     ]
-    kinds = (f"- {code(kind)}: {each.meaning}. See [](../../{each.page}.md)." for kind, each in KINDS.items())
+    kinds = (f"- {code(kind)}: {caution.meaning}. See [](../../{caution.page}.md)." for kind, caution in KINDS.items())
     parts += ["## Kinds of warnings", "What `fail_on` lists, and the page that tells more.", "\n".join(kinds)]
     reasons = (f"- {code(reason)}: {cure}" for reason, cure in REASONS.items())
     parts += [
@@ -190,12 +190,12 @@ def messages_page() -> str:
 @cache
 def pages() -> dict[str, str]:
     """The texts of all pages by their paths in the folder of the site."""
-    known = entries()
-    keys = [entry for entry in known if entry.kind == "key"]
-    sections = {name: list(found) for name, found in groupby(keys, key=lambda entry: entry.word.partition(".")[0])}
-    alone = [name for name, found in sections.items() if len(found) == 1]
+    every = entries()
+    keys = [entry for entry in every if entry.kind == "key"]
+    sections = {name: list(group) for name, group in groupby(keys, key=lambda entry: entry.word.partition(".")[0])}
+    alone = [name for name, group in sections.items() if len(group) == 1]
     text: dict[str, str] = {
-        f"reference/study/{name}.md": section(found) for name, found in sections.items() if name not in alone
+        f"reference/study/{name}.md": section(group) for name, group in sections.items() if name not in alone
     }
     single = [part for name in alone for part in (f"## {code(name)}", *_told(sections[name][0]))]
     text[f"reference/study/{ALONE}.md"] = _page("Keys without a section", single)
@@ -205,15 +205,15 @@ def pages() -> dict[str, str]:
         "stands for a name of yours or a place in a list: `mechanism.joints.*.angle`.",
         f"```{{toctree}}\n:maxdepth: 1\n\n{names}\n```",
     ])  # fmt: skip
-    commands = {name: [kind for _, kind in found] for name, found in groupby(tables(), key=lambda pair: pair[0])}
-    text |= {f"reference/tables/{name}.md": table_page(name, found) for name, found in commands.items()}
+    commands = {name: [kind for _, kind in group] for name, group in groupby(tables(), key=lambda pair: pair[0])}
+    text |= {f"reference/tables/{name}.md": table_page(name, group) for name, group in commands.items()}
     listing = "\n".join(commands)
     text["reference/tables/index.md"] = _page("Tables and columns", [
         "Every table that a command writes. The `manifest.json` of a run has the meaning and the unit of every column.",
         f"```{{toctree}}\n:maxdepth: 1\n\n{listing}\n```",
     ])  # fmt: skip
     for name, (title, before, kinds) in LISTS.items():
-        found = [entry for entry in known if (entry.kind in kinds if kinds else entry.kind not in _APART)]
-        text[f"reference/lists/{name}.md"] = listed(title, before, found)
+        group = [entry for entry in every if (entry.kind in kinds if kinds else entry.kind not in _APART)]
+        text[f"reference/lists/{name}.md"] = listed(title, before, group)
     text["reference/lists/messages.md"] = messages_page()
     return text

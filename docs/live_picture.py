@@ -129,11 +129,11 @@ def linkages(page: Page) -> None:
 
 def main() -> None:
     """Write the pictures."""
-    found = next(filter(None, map(shutil.which, BROWSERS)))
+    program = next(filter(None, map(shutil.which, BROWSERS)))
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = Path(folder) / "study.yaml"
         path.write_text(study_text(), encoding="utf-8")
-        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", "--disable-gpu"])
         for file, show in ((path, drags), (DOCS.parent / "configs/gallery/five_positions.yaml", linkages)):
             server = LiveServer(session_of(mechdesign.load(file)))
             server.start()

@@ -46,11 +46,11 @@ def evolved(problem: Problem, seconds: float) -> FourBar:
 
     until = time.process_time() + seconds
     ranges = [(-3, 3)] * 4 + [(0.05, 6)] * 3 + [(0, 6), (-np.pi, np.pi), (-1, 1)]
-    found = differential_evolution(
+    optimum = differential_evolution(
         errors, ranges, vectorized=True, updating="deferred", polish=False, tol=0, maxiter=100_000, rng=SEED,
         callback=lambda *_: time.process_time() > until,
     )  # fmt: skip
-    return bar_of(found.x)
+    return bar_of(optimum.x)
 
 
 def by_burmester(problem: Problem) -> FourBar | None:

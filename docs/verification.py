@@ -70,7 +70,7 @@ def helpers(case: Case) -> str:
     text, places = str([case.values, case.checks]), []
     for name in dict.fromkeys(filter(None, (case.helper, "gallery"))):
         own = vars(importlib.import_module(f"helpers.{name}")).items()
-        functions = [each for each, value in own if getattr(value, "__module__", "") == f"helpers.{name}"]
+        functions = [function for function, value in own if getattr(value, "__module__", "") == f"helpers.{name}"]
         if re.search(rf"(?<![\w.])({'|'.join({*functions} - {'point'})})\(", text):
             places.append(f"`tests/helpers/{name}.py`")
     return f"Functions that are not NumPy's stand in {' and '.join(places)}." if places else ""
@@ -107,9 +107,9 @@ def largest(differences: Iterable[float]) -> str:
 
 def work(case: Case) -> str:
     """The book, paper or program that a case is from, without the place in it; else what it is compared with."""
-    found = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w)",
+    match = re.search(r"(?:^|after |; )((?:[A-Z][\w.-]*\.?[ -])+[^;*]*\*[^*]+\*|ISO \d+|The public program \S+\w)",
                       case.source)  # fmt: skip
-    return found[1] if found else f"{case.evidence}, of no book"
+    return match[1] if match else f"{case.evidence}, of no book"
 
 
 def overview(ran: Mapping[str, Sequence[Row]]) -> str:
@@ -192,8 +192,8 @@ def main() -> int:
         rows = list(cases()[name].rows())
         print(f"{cases()[name].title} ({name})")
         for row in rows:
-            label, told, ours, difference, digits = cells(row)
-            print(f"  {label:50} {told:>24} {ours:>24} {difference:>9}  {digits if row.agrees else 'DIFFERS'}")
+            label, expected, ours, difference, digits = cells(row)
+            print(f"  {label:50} {expected:>24} {ours:>24} {difference:>9}  {digits if row.agrees else 'DIFFERS'}")
         differs += wrong(cases()[name], rows)
     print(*differs, sep="\n")
     return int(bool(differs))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import counted
+from mechdesign.ground.long_tables import LongTable
 from mechdesign.ground.numerics.arrays import Flags, Floats, Ints
-from mechdesign.ground.results import Drawn, LongTable, Scope, Table
+from mechdesign.ground.results import Drawn, Scope, Table
 from mechdesign.ground.statistics import Request
 from mechdesign.ground.work.chunks import map_chunks
 from mechdesign.mechanism import Reason

@@ -237,6 +237,26 @@ def forked(call):
     return pid
 
 
+def killed_at(instant, work):
+    """Do work in a process that is killed after so many files were renamed or removed."""
+    steps = []
+
+    def last(step):
+        def counted(*given, **options):
+            if len(steps) == instant:
+                os.kill(os.getpid(), signal.SIGKILL)
+            steps.append(step)
+            return step(*given, **options)
+
+        return counted
+
+    def killed():
+        os.replace, Path.unlink = last(os.replace), last(Path.unlink)
+        work()
+
+    os.waitpid(forked(killed), 0)
+
+
 def table(value, columns=3):
     """A result of several tables, large enough to be cut off in."""
     names = [f"t{k}" for k in range(columns)]
@@ -285,22 +305,7 @@ def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
     invoke(*arguments, "new", "--seed", 2)
     invoke(*arguments, "out", "--seed", 1)
     old, new = contents(here / "out"), contents(here / "new")
-    steps = []
-
-    def last(step):
-        def counted(*given, **options):
-            if len(steps) == instant:
-                os.kill(os.getpid(), signal.SIGKILL)
-            steps.append(step)
-            return step(*given, **options)
-
-        return counted
-
-    def killed():
-        os.replace, Path.unlink = last(os.replace), last(Path.unlink)
-        invoke(*arguments, "out", "--seed", 2)
-
-    os.waitpid(forked(killed), 0)
+    killed_at(instant, lambda: invoke(*arguments, "out", "--seed", 2))
     left = contents(here / "out")
     assert "manifest.json" not in left or {name: left[name] for name in left if name[0] != "."} in (old, new)
     assert invoke(*arguments, "out", "--seed", 2).exit_code == 0
@@ -312,22 +317,7 @@ def test_a_kill_among_the_pictures_leaves_files_that_are_known(here, analysis, i
     """The run is begun again: the tables, which no manifest vouches for while pictures come, are nobody else's."""
     arguments = ("run", "slider.yaml", "--quiet", "--out", "out")
     analysis(lambda study, **options: table(study.seed, 1))
-    steps = []
-
-    def last(step):
-        def counted(*given, **options):
-            if len(steps) == instant:
-                os.kill(os.getpid(), signal.SIGKILL)
-            steps.append(step)
-            return step(*given, **options)
-
-        return counted
-
-    def killed():
-        os.replace, Path.unlink = last(os.replace), last(Path.unlink)
-        invoke(*arguments)
-
-    os.waitpid(forked(killed), 0)
+    killed_at(instant, lambda: invoke(*arguments))
     assert (here / "out/kinematics/t0.csv").exists()
     done = invoke(*arguments)
     assert done.exit_code == 0, done.stderr

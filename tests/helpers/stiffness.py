@@ -67,6 +67,25 @@ stiffness:
 """
 )
 AXIAL, BENDING = 200e9 * 8e-4, 200e9 * 0.02 * 0.04**3 / 12
+# A platform that turns about a point in a pose where its three struts meet there.
+MEETING_STRUTS = (
+    METRES
+    + """
+mechanism:
+  links:
+    ground: {A1: [-1, 0], A2: [1, 0], A3: [0, -1]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+    platform: {P: [0, 0], B1: [-0.5, -0.5], B2: [0.5, -0.5], B3: [0, -0.7]}
+  drives: [leg_1, leg_2, leg_3]
+  sketch: {P: [0.1, 1], B1: [-0.4, 0.5], B2: [0.6, 0.5], B3: [0.1, 0.3]}
+stiffness:
+  link: platform
+  at: P
+  actuators: {leg_1: 1e4, leg_2: 1e4, leg_3: 1e4}
+"""
+)
 
 
 def ask_stiffness(text: str, *overrides: str) -> mechdesign.Answer:

@@ -83,6 +83,36 @@ COMMENTED_FOUR_BAR = (
     .replace("  links:", "  links:                              # a point of two links is the pin between them")
     .replace("D: [100, 0]}", "D: [100, 0]}  # the pivots")
 )
+# A five-bar whose forearms come in line inside the region of all its assemblies.
+CROSSED = """
+units: {length: mm}
+mechanism:
+  links:
+    ground: {O1: [-100, 0], O2: [100, 0]}
+    upper_1: [O1, A1, 80]
+    upper_2: [O2, A2, 80]
+    lower_1: [A1, P, 110]
+    lower_2: [A2, P, 110]
+  drives: {q1: {angle: upper_1}, q2: {angle: upper_2}}
+  sketch: {A1: [-90, 79], A2: [90, 79], P: [0, 142]}
+workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: inverse_condition}
+"""
+# A 3-RPR platform whose legs drive it at given speeds.
+PLATFORM = """
+mechanism:
+  links:
+    ground: {A1: [-60, 0], A2: [60, 0], A3: [30, -20]}
+    platform: {B1: [-20, 0], B2: [20, 0], B3: [25, 15]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
+  sketch: {B1: [-20, 100], B2: [20, 100], B3: [25, 115]}
+reliability:
+  poses: [{B1.x: -20, B1.y: 100, platform.angle: 0}]
+  rates: {l1: 10, l2: 5}
+  outputs: [B1, platform.angle]
+"""
 
 
 def of_readme() -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.stiffness import ARM, FIVE_BAR, METRES, ask_stiffness, matrix
+from helpers.stiffness import ARM, FIVE_BAR, MEETING_STRUTS, METRES, ask_stiffness, matrix
 from helpers.studies import study_of
 from scipy.special import ndtr
 
@@ -278,21 +278,8 @@ reliability:
 def test_a_pose_that_does_not_hold_the_load_is_not_valid() -> None:
     """A platform whose three struts meet turns about their common point: it bears no moment."""
     text = (
-        METRES
-        + """
-mechanism:
-  links:
-    ground: {A1: [-1, 0], A2: [1, 0], A3: [0, -1]}
-    leg_1: {from: A1, to: B1, telescopic: true}
-    leg_2: {from: A2, to: B2, telescopic: true}
-    leg_3: {from: A3, to: B3, telescopic: true}
-    platform: {P: [0, 0], B1: [-0.5, -0.5], B2: [0.5, -0.5], B3: [0, -0.7]}
-  drives: [leg_1, leg_2, leg_3]
-  sketch: {P: [0.1, 1], B1: [-0.4, 0.5], B2: [0.6, 0.5], B3: [0.1, 0.3]}
-stiffness:
-  link: platform
-  at: P
-  actuators: {leg_1: 1e4, leg_2: 1e4, leg_3: 1e4}
+        MEETING_STRUTS
+        + """\
 reliability:
   dimensions: {platform.B1.x: 1e-4}
   poses: [{P.x: 0, P.y: 1, platform.angle: 0}, {P.x: 0.1, P.y: 1, platform.angle: 0}]

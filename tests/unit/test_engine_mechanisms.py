@@ -6,26 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from helpers.studies import study_of
+from helpers.studies import PLATFORM, study_of
 from scipy import optimize, stats
 
 import mechdesign
 
-PLATFORM = """
-mechanism:
-  links:
-    ground: {A1: [-60, 0], A2: [60, 0], A3: [30, -20]}
-    platform: {B1: [-20, 0], B2: [20, 0], B3: [25, 15]}
-    leg_1: {from: A1, to: B1, telescopic: true}
-    leg_2: {from: A2, to: B2, telescopic: true}
-    leg_3: {from: A3, to: B3, telescopic: true}
-  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
-  sketch: {B1: [-20, 100], B2: [20, 100], B3: [25, 115]}
-reliability:
-  poses: [{B1.x: -20, B1.y: 100, platform.angle: 0}]
-  rates: {l1: 10, l2: 5}
-  outputs: [B1, platform.angle]
-"""
 ARM = """
 mechanism:
   parameters: {r1: 10, r2: 8}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.studies import FIVE_BAR, study_of
+from helpers.studies import CROSSED, FIVE_BAR, study_of
 from scipy.optimize import brentq
 
 import mechdesign
@@ -109,21 +109,6 @@ def test_a_side_along_which_one_margin_ends_the_region() -> None:
     assert (width, height) == pytest.approx((1, np.sqrt(4 - 1.5**2)), rel=1e-7)
     assert main["rectangle_y"][0] == pytest.approx(height / 2, abs=1e-7)
     assert main["circle_radius"][0] == pytest.approx(0.75, rel=1e-7)
-
-
-CROSSED = """
-units: {length: mm}
-mechanism:
-  links:
-    ground: {O1: [-100, 0], O2: [100, 0]}
-    upper_1: [O1, A1, 80]
-    upper_2: [O2, A2, 80]
-    lower_1: [A1, P, 110]
-    lower_2: [A2, P, 110]
-  drives: {q1: {angle: upper_1}, q2: {angle: upper_2}}
-  sketch: {A1: [-90, 79], A2: [90, 79], P: [0, 142]}
-workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: inverse_condition}
-"""
 
 
 @pytest.mark.nightly

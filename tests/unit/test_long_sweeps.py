@@ -16,7 +16,8 @@ import mechdesign
 from mechdesign.door.report.requirements import requirements
 from mechdesign.door.report.tables import csv_blocks
 from mechdesign.ground.errors import OutputError
-from mechdesign.ground.results import LongTable, Result
+from mechdesign.ground.long_tables import LongTable
+from mechdesign.ground.results import Result
 from mechdesign.motion import passage, solving
 from mechdesign.questions.kinematics import remarks
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.studies import PLATFORM
 from scipy.special import ndtr
 
 import mechdesign
@@ -277,24 +278,8 @@ def test_nothing_varies(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_velocity_errors_of_a_group_without_a_closed_form(tmp_path: Path) -> None:
     """A 3-RPR platform's forward problem: Newton's method for every sample, three orders."""
-    text = """
-mechanism:
-  links:
-    ground: {A1: [-60, 0], A2: [60, 0], A3: [30, -20]}
-    platform: {B1: [-20, 0], B2: [20, 0], B3: [25, 15]}
-    leg_1: {from: A1, to: B1, telescopic: true}
-    leg_2: {from: A2, to: B2, telescopic: true}
-    leg_3: {from: A3, to: B3, telescopic: true}
-  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
-  sketch: {B1: [-20, 100], B2: [20, 100], B3: [25, 115]}
-reliability:
-  poses: [{B1.x: -20, B1.y: 100, platform.angle: 0}]
-  rates: {l1: 10, l2: 5}
-  outputs: [B1, platform.angle]
-  dimensions: {l1: 0.03, ground.A2.x: 0.06, platform.B3.y: 0.06}
-  samples: 20000
-"""
-    result = ask(tmp_path, text)
+    dimensions = "dimensions: {l1: 0.03, ground.A2.x: 0.06, platform.B3.y: 0.06}"
+    result = ask(tmp_path, PLATFORM, dimensions, "samples: 20000")
     analytic, simulated = (pick(result, "moments", "sigma", method=m) for m in ("analytic", "monte_carlo"))
     assert len(analytic) == 9
     assert simulated == pytest.approx(analytic, rel=0.03)

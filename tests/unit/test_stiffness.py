@@ -7,7 +7,7 @@ import pytest
 from helpers.stiffness import (
     ARM,
     FIVE_BAR,
-    METRES,
+    MEETING_STRUTS,
     ask_stiffness,
     matrix,
 )
@@ -49,21 +49,8 @@ def test_pin_of_one_link_is_asked_with_the_link_free_to_turn() -> None:
 def test_under_constrained_pose_reports_its_free_twist() -> None:
     """A platform whose three struts meet: it turns about their common point."""
     text = (
-        METRES
-        + """
-mechanism:
-  links:
-    ground: {A1: [-1, 0], A2: [1, 0], A3: [0, -1]}
-    leg_1: {from: A1, to: B1, telescopic: true}
-    leg_2: {from: A2, to: B2, telescopic: true}
-    leg_3: {from: A3, to: B3, telescopic: true}
-    platform: {P: [0, 0], B1: [-0.5, -0.5], B2: [0.5, -0.5], B3: [0, -0.7]}
-  drives: [leg_1, leg_2, leg_3]
-  sketch: {P: [0.1, 1], B1: [-0.4, 0.5], B2: [0.6, 0.5], B3: [0.1, 0.3]}
-stiffness:
-  link: platform
-  at: P
-  actuators: {leg_1: 1e4, leg_2: 1e4, leg_3: 1e4}
+        MEETING_STRUTS
+        + """\
   poses: [{P.x: 0, P.y: 1, platform.angle: 0}, {P.x: 0.1, P.y: 1, platform.angle: 0}]
 """
     )

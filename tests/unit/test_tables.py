@@ -8,7 +8,7 @@ import numpy as np
 
 import mechdesign
 from mechdesign.door.report.tables import from_csv, json_blocks, to_csv
-from mechdesign.ground.results import LongTable
+from mechdesign.ground.long_tables import LongTable
 
 
 def table(**columns):

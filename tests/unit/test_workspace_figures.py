@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.pictures import figure_of
-from helpers.studies import study_of
+from helpers.studies import CROSSED, study_of
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
@@ -296,19 +296,6 @@ mechanism:
   sketch: {C: [0, 1.2]}
 workspace: {point: C, scan: {about: [0, 0], rays: 61}, assembly: any, indices: []}
 """
-RODS = """
-units: {length: mm}
-mechanism:
-  links:
-    ground: {O1: [-100, 0], O2: [100, 0]}
-    upper_1: [O1, A1, 80]
-    upper_2: [O2, A2, 80]
-    lower_1: [A1, P, 110]
-    lower_2: [A2, P, 110]
-  drives: {q1: {angle: upper_1}, q2: {angle: upper_2}}
-  sketch: {A1: [-90, 79], A2: [90, 79], P: [0, 142]}
-workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: inverse_condition}
-"""
 SERIAL = """
 mechanism:
   links: {ground: {O: [0, 0]}, upper: [O, E, 100], lower: [E, P, 60]}
@@ -345,7 +332,7 @@ def test_in_the_plane_of_two_strokes_limits_are_a_square_and_the_stretched_legs_
 
 @pytest.mark.slow
 def test_in_the_plane_of_two_cranks_a_singularity_is_where_the_rods_are_in_line() -> None:
-    curves, _ = joint_space(RODS)
+    curves, _ = joint_space(CROSSED)
     ends = [
         place + 80 * np.exp(1j * np.radians(angle))
         for place, angle in zip((-100, 100), curves[style.VERMILION].T, strict=True)

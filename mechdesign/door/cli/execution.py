@@ -33,8 +33,9 @@ from mechdesign.drawing.before import Before
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.ground.files import owned, settle
+from mechdesign.ground.long_tables import LongTable
 from mechdesign.ground.progress import Progress
-from mechdesign.ground.results import LongTable, Result, Table
+from mechdesign.ground.results import Result, Table
 from mechdesign.ground.work import ahead, shards
 from mechdesign.ground.work.chunks import worker_count
 from mechdesign.ground.work.journal import INTERVAL, NAME, Journal

@@ -25,6 +25,7 @@ from mechdesign.door.report.page.solutions import mark_task, solutions
 from mechdesign.door.report.page.template import fragment, rendered
 from mechdesign.drawing import style
 from mechdesign.ground.errors import AssemblyError, StudyError, counted
+from mechdesign.ground.progress import Progress
 from mechdesign.ground.results import Result
 from mechdesign.questions.look import ask
 from mechdesign.questions.synthesize.analysis import DrawnSolutions
@@ -103,31 +104,37 @@ class TaskSession(ServedStudy):
         changes = changes_of(request)
         key = repr(sorted(changes.items()))
         with self._watched(request) as (_, progress):
-            study, result = altered(self.study, changes), self._searches.get(key)
-            if result is None:
-                try:
-                    result = ask(study, _QUESTION, progress=progress)
-                except AssemblyError as error:
-                    if error.result is None:
-                        raise
-                    result = error.result
-                progress.look()
-                self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
+            study = altered(self.study, changes)
+            result = self._search(study, key, progress)
+            progress.look()
             with DRAWING, style.context("paper"):
                 part = solutions(study, result, f"{_QUESTION}-trade")
-        whole: dict[str, Any] | None = None
+        content: dict[str, Any] = {"part": None, "name": _QUESTION, "result": result}
+        choices, drawn = list[dict[str, Any]](), list[str]()
         if part is not None:
-            count = f"{len(part.data['choices'])} of {counted(len(result.main), 'linkage')} drawn."
-            whole = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
-        content: dict[str, Any] = {"part": whole, "name": _QUESTION, "result": result}
-        rows = [] if whole is None else [one["number"] - 1 for one in whole["data"]["choices"]]
-        drawn = [] if whole is None else [*(one["drawing"] for one in whole["data"]["choices"]), whole["beside"]]
+            choices = part.data["choices"]
+            count = f"{len(choices)} of {counted(len(result.main), 'linkage')} drawn."
+            content["part"] = dataclasses.asdict(dataclasses.replace(part, data={**part.data, "pace": count}))
+            drawn = [*(choice["drawing"] for choice in choices), part.beside]
+        rows, texts = [choice["number"] - 1 for choice in choices], [text for _, text in _files(result)]
         return {
             "set": overrides(self.study, study), "search": key, "dark": dark(drawn),
-            "tiles": [[row, f"linkage/{_name(_files(result)[row][1])}/"] for row in rows],
+            "tiles": [[row, f"linkage/{_name(texts[row])}/"] for row in rows],
             "words": [*task_in_words(study)], "stage": fragment("task_stage.html.j2", PACKAGE, **content),
             "html": fragment("linkages.html.j2", PACKAGE, **content),
         }  # fmt: skip
+
+    def _search(self, study: Study, key: str, progress: Progress) -> Result:
+        """The linkages of a task; those of the newest tasks are kept."""
+        if (result := self._searches.get(key)) is None:
+            try:
+                result = ask(study, _QUESTION, progress=progress)
+            except AssemblyError as error:
+                if error.result is None:
+                    raise
+                result = error.result
+            self._searches = dict([*self._searches.items(), (key, result)][-_MOST_ANSWERS:])
+        return result
 
     def take(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Take over a linkage of a search: the address of its page, in which it is dragged and saved."""
@@ -184,10 +191,12 @@ def _handles(study: Study) -> list[dict[str, Any]]:
         rows: list[tuple[float, ...]] = [(part.x, part.y, part.angle) for part in section.body]
     else:
         keys, what, where, rows = (0, 1), "point", POINTS, [*map(tuple, path_points(study))]
+    if len(rows) > _MOST_HANDLES:
+        return []
     return [
         {"label": f"{what} {k + 1}", "names": [f"{where}.{k}.{key}" for key in keys], "values": [*map(float, row)]}
         for k, row in enumerate(rows)
-    ] if len(rows) <= _MOST_HANDLES else []  # fmt: skip
+    ]
 
 
 def _groups(study: Study, handles: list[dict[str, Any]], size: float) -> Iterator[tuple[str, list[dict[str, Any]]]]:
@@ -205,17 +214,12 @@ def _groups(study: Study, handles: list[dict[str, Any]], size: float) -> Iterato
     for key, kind in _CONDITIONS.items():
         unit, written = study.units.label(kind), leaves({key: plain(study.resolved[TASK]).get(key, {})})
         # What is written with its unit, or follows a parameter, stays text.
-        numbers = {dotted(keys): float(value) for keys, value in written if isinstance(value, int | float)}
-        if numbers:
+        limits = {dotted(keys): float(value) for keys, value in written if isinstance(value, int | float)}
+        if limits:
             yield key, [number_field(f"{TASK}.{name}", name, value, unit, reaches[unit])
-                        for name, value in numbers.items()]  # fmt: skip
+                        for name, value in limits.items()]  # fmt: skip
     for handle in handles:
-        yield (
-            handle["label"],
-            [
-                number_field(name, f"{handle['label']}, {key}", value, unit, reaches[unit])
-                for name, value, key, unit in zip(
-                    handle["names"], handle["values"], ("x", "y", "angle"), (length, length, angle), strict=False
-                )
-            ],
-        )
+        numbers = zip(handle["names"], handle["values"], ("x", "y", "angle"), (length, length, angle), strict=False)
+        label = handle["label"]
+        yield label, [number_field(name, f"{label}, {key}", value, unit, reaches[unit])
+                      for name, value, key, unit in numbers]  # fmt: skip

@@ -19,9 +19,10 @@ from mechdesign.door.report.tables import csv_blocks
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import OutputError, explain
 from mechdesign.ground.files import Transaction, check_writable, flowing
+from mechdesign.ground.long_tables import LongTable
 from mechdesign.ground.progress import NULL, Progress
 from mechdesign.ground.records import check_replaceable, write_recorded
-from mechdesign.ground.results import LongTable, Result, Table
+from mechdesign.ground.results import Result, Table
 from mechdesign.ground.work import ahead
 from mechdesign.study import Study
 

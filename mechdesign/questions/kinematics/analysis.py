@@ -10,8 +10,9 @@ import numpy as np
 
 from mechdesign.ground.cautions import Caution
 from mechdesign.ground.errors import Problem, StudyError
+from mechdesign.ground.long_tables import LongTable
 from mechdesign.ground.progress import NULL, Progress
-from mechdesign.ground.results import LongTable, Result, Table
+from mechdesign.ground.results import Result, Table
 from mechdesign.ground.work.threads import one_thread
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.motion.answer import alone, answer_of

@@ -26,8 +26,8 @@ function openHand(react) {
     about, changes: {}, set: [], held: false, keeping: () => ({}), kept: {}, settled: async () => {},
     value: name => own.changes[name] ?? base(name),
 
-    async post(action, asked, signal) {
-      const body = JSON.stringify({version: about.version, page, changes: own.changes, ...asked});
+    async post(action, request, signal) {
+      const body = JSON.stringify({version: about.version, page, changes: own.changes, ...request});
       const answer = await fetch(action, {method: "POST", body, signal});
       if (!answer.ok) throw new Error(`refused: ${answer.status} ${answer.statusText}`);
       const content = await answer.json();
@@ -265,7 +265,7 @@ function openHand(react) {
   find(".live-numbers").addEventListener("submit", event => event.preventDefault());
 
   // A question with an answer: the name of a file, "" for the study's own, or null.
-  function asked(title, name) {
+  function question(title, name) {
     const label = dialog.querySelector("label"), field = dialog.querySelector("input");
     dialog.querySelector("h2").textContent = title;
     label.hidden = name === null;
@@ -280,7 +280,7 @@ function openHand(react) {
     try {
       const answer = await own.post("save", {name, replace});
       if (answer.exists) {
-        if (await asked(`${answer.exists} is there already. Replace it?`, null) !== null) await save(name, true);
+        if (await question(`${answer.exists} is there already. Replace it?`, null) !== null) await save(name, true);
       // A mistake in the file, which is told above, stays there.
       } else if (answer.wrong) own.warn([`Not saved: ${answer.wrong}`, about.mistake].filter(Boolean).join("\n"));
       else own.tell(lasting = `Saved ${name ? "as" : "into"} ${answer.saved}${answer.comments ? "" : "; its comments could not be kept"}.`);
@@ -296,11 +296,11 @@ function openHand(react) {
       try { await navigator.clipboard.writeText(words); own.tell(`Copied ${own.set.length === 1 ? "one change" : `${own.set.length} changes`} as --set.`); } catch { own.tell(words); }
     },
     async saveas() {
-      const name = await asked("Save a copy of the study, in its folder", about.copy);
+      const name = await question("Save a copy of the study, in its folder", about.copy);
       if (name) save(name, false);
     },
     async save() {
-      if (await asked(`Replace ${about.file} by the study as it is here?`, null) !== null) await (saving = save("", true));
+      if (await question(`Replace ${about.file} by the study as it is here?`, null) !== null) await (saving = save("", true));
     },
   };
   for (const name in actions) buttons[name].addEventListener("click", actions[name]);

@@ -58,8 +58,8 @@ ready(() => {
       if (mine?.over) continue;
       try {
         // A drag goes on from the pose and the numbers of the last answer, which may be newer than the pointer's place.
-        const asked = drag && {drag: {...drag, row: mine.row, held: mine.held}};
-        const answer = await own.post("move", {...asked, poses, rows: places, sheet: sheet(), turn: ++turn});
+        const hold = drag && {drag: {...drag, row: mine.row, held: mine.held}};
+        const answer = await own.post("move", {...hold, poses, rows: places, sheet: sheet(), turn: ++turn});
         if (mine?.over) continue;
         if (answer.wrong) { own.beside(answer.wrong, true); continue; }
         if (drag) {

@@ -342,9 +342,9 @@
     let px, py, place, dot, at = data.first;
 
     function axis(values) {
-      const known = values.filter(isFinite), low = Math.min(...known), high = Math.max(...known);
+      const finite = values.filter(isFinite), low = Math.min(...finite), high = Math.max(...finite);
       const room = 0.04 * (high - low) || 0.05 * Math.abs(high) || 1;
-      return known.length ? [low - room, high + room] : [0, 1];
+      return finite.length ? [low - room, high + room] : [0, 1];
     }
 
     function draw() {
