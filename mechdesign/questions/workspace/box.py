@@ -99,9 +99,11 @@ def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats
     ends = np.sort(np.concatenate([panels.design + 1j * panels.low, panels.design + 1j * panels.high]))
     after = np.clip(np.searchsorted(ends, design + 1j * place), 1, len(ends) - 1)
     gaps = np.stack([ends[after - 1].imag, ends[after].imag]) - place
-    gap = np.take_along_axis(gaps, np.abs(gaps).argmin(axis=0)[None], axis=0)[0]
-    nearer, beside, farther = (-depth(every, place + part * gap) for part in (TOWARDS, -TOWARDS, -1.0))
+    # The tip may be at the farther of the two ends.
+    nearer, beside, farther = (
+        np.stack([-depth(every, place + part * gap) for gap in gaps]) for part in (TOWARDS, -TOWARDS, -1.0)
+    )
     tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
-    tip &= np.abs(gap) < theta[2] - theta[0]
-    more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
+    tip &= np.abs(gaps) < theta[2] - theta[0]
+    more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0).max(axis=0)
     return np.stack([-low + more, -low + (1 + TIP) * more])
