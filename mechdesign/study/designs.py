@@ -21,6 +21,7 @@ from mechdesign.study.loading import load_document
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.text.document import Document
 from mechdesign.study.text.fields import Model, own_numbers, parts_of, positive
+from mechdesign.study.text.reading import MIN_NUMBER
 from mechdesign.study.text.units import Amount
 from mechdesign.study.variants import Judging, changed_data, remeasured
 
@@ -184,6 +185,7 @@ class Designs:
                 if part.least is not None:
                     small = column <= part.least if part.exclusive else column < part.least
                     note(small, f"{key} must be {positive(part.least, exclusive=part.exclusive)}")
+                    note((column > 0) & (column < MIN_NUMBER), f"{key} is too small a number")
             elif isinstance(part, Model) and moved:
                 for misfit in part.with_numbers(self._numbers_of).misfits():
                     note(misfit.wrong, lambda k, key=key, misfit=misfit: f"{key}: {misfit.message(k)}")

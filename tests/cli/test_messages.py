@@ -37,6 +37,7 @@ optimize:
         ("1500 g + balance", "an expression takes no units: write 1.5 + balance (kg)"),
         ("balance*2 + 3 cm/s", "an expression takes no units: write balance*2 + 30 (mm/s)"),
         ("1 + 2 foo", "unexpected 'foo'"),
+        ("3 m" + "  m" * 1000 + "!", "units: write 3000" + "  m" * 17 + "  ... (mm)"),
     ],
 )
 def test_an_expression_with_units_is_shown_without_them(written: str, said: str) -> None:

@@ -58,6 +58,7 @@ class Structure:
     def __init__(self, study: Study, poses: Configuration, row: int = 0, teeth: dict[str, Teeth] | None = None) -> None:
         self.study, self.pose, self.frame = study, poses.take(np.array([row])), Frame()
         self.section, self.description = study.stiffness, study.mechanism.description
+        self.motors = {name: 1 / sum(1 / part for part in parts) for name, parts in self.section.actuators.items()}
         self.nodes: dict[tuple[str, str], int] = {}  # of each link: at its points, and where each line's slider is
         self.there: dict[str, list[int]] = {}  # nodes at each point, before joints join them
         self.pins: dict[str, int] = {}  # each in the middle of what it joins
@@ -189,8 +190,8 @@ class Structure:
         """A slide, its drive and its bearing."""
         self.guides[name] = a, b, along / abs(along)
         drive = next((d for d in self.description.drives.values() if d.kind != "angle" and d.target == name), None)
-        if drive is not None and drive.name in self.section.actuators:
-            self.frame.sliding_spring(a, b, along, self.section.actuators[drive.name])
+        if drive is not None and drive.name in self.motors:
+            self.frame.sliding_spring(a, b, along, self.motors[drive.name])
         elif drive is not None:
             self.frame.stay(a, b, along)
         bearing = self.section.bearings.get(name)
@@ -237,8 +238,8 @@ class Structure:
         if drive.kind != "angle":
             return
         a, b = self._ends(drive.target, drive.reference)
-        if name in self.section.actuators:
-            self.frame.turning_spring(a, b, self.section.actuators[name])
+        if name in self.motors:
+            self.frame.turning_spring(a, b, self.motors[name])
         else:
             self.frame.turn_together(a, b)
 

@@ -312,6 +312,21 @@ stiffness:
         assert matrix(answer, "C")[1, 1] == pytest.approx(soft, rel=1e-12)
 
 
+@pytest.mark.parametrize(("actuators", "gear", "least"), [("k", 0, -3), ("[k, 6]", 1 / 6, -3), ("k", 0, 1e-100)])
+def test_a_motor_without_a_stiffness_above_zero_is_no_design(actuators: str, gear: float, least: float) -> None:
+    """The tip of a rigid arm of 100 mm on a motor k and a gear of 6 N*mm/rad moves by 100^2 (1/k + 1/6) mm/N."""
+    study = study_of(f"""
+mechanism: {{parameters: {{k: 4}}, links: {{ground: {{O: [0, 0]}}, arm: [O, P, 100]}}, drives: [arm]}}
+stiffness: {{link: arm, at: P, actuators: {{arm: {actuators}}}, poses: [{{arm: 0}}]}}
+optimize: {{variables: {{k: {{from: {least}, to: 6, number: 4}}}}, maximize: stiffness.compliance.C22}}
+""")
+    designs = mechdesign.optimize(study).tables["designs"]
+    good = designs["k"] > 1
+    assert (designs["reason"] == "").tolist() == good.tolist()
+    expected = np.where(good, 1e4 * (1 / np.where(good, designs["k"], 1) + gear), np.nan)
+    np.testing.assert_allclose(designs["stiffness.compliance.C22"], expected, rtol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "names", "column"),

@@ -281,6 +281,7 @@ QUESTIONS = [
     ("stiffness: {at: P, sections: {b: {E: 1, diameter: 2, shear_factor: 0.5}}}", "counts with 'shear: true' only"),
     ("stiffness: {at: P, bearings: {A: {radial: 1, moment: 1}}}", "pin 'A' turns freely: it bears no moment"),
     ("stiffness: {at: P, actuators: {theta: [1, -2]}}", "must be positive, not -2"),
+    ("stiffness: {at: P, actuators: {theta: 1e-308}}", "1e-308 is too small a number: none but 0 is below 1e-60"),
     ("stiffness: {at: P, actuators: {theta: [1, 2 N/mm]}}", "stiffness.actuators.theta.1: '2 N/mm' is"),
     ("stiffness: {at: P, actuators: {theta: []}}", "a list of those in series"),
     ("stiffness: {at: P, bearings: {P: 1}}", "no pin or slide 'P'"),

@@ -223,7 +223,7 @@ def freedoms(
                 if isinstance(element, SlideElement)
                 else hinge_twist(configuration.point(element.point) - at)
             )
-            yield twist, None if element.drive is None else 1 / section.actuators[element.drive]
+            yield twist, None if element.drive is None else sum(1 / part for part in section.actuators[element.drive])
 
 
 def _bearing_freedoms(

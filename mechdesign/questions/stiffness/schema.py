@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.ground.expressions import Expression, Number
 from mechdesign.mechanism.elements.declared import Quantity
@@ -16,8 +16,7 @@ from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.reading import Context, failure, read_number
-from mechdesign.study.text.units import Amount
+from mechdesign.study.text.reading import failure
 
 # Keys of each form of cross-section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
@@ -118,19 +117,8 @@ class CouplingStiffness(fields.Model):
             yield "a coupling that gives has a 'force' stiffness or, where an angle follows, one of 'moment'"
 
 
-def _series(raw: Any, context: Context) -> float:
-    """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
-    parts = {f"k{number}": read_number(entry, context) for number, entry in enumerate(fields.as_list(raw))}
-    if not parts:
-        raise failure("expected a stiffness, or a list of those in series, [1e6, 2e6]")
-    for part in parts.values():
-        if part <= 0:
-            raise failure(f"must be positive, not {part:g}")
-    return Amount.by(f"1/({' + '.join(f'1/{name}' for name in parts)})", **parts)
-
-
-_SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
-
+# Stiffnesses in series.
+_Series = Annotated[tuple[fields.PositiveNumber, ...], BeforeValidator(fields.as_list), fields.OrShort()]
 
 _SHORT_LOAD: fields.Form = {"type": "array", "items": fields.NUMBER_FORM, "minItems": 2, "maxItems": 3, "title": "load"}
 
@@ -167,7 +155,7 @@ class StiffnessSection(PoseSection):
     points brackets, rigid from their foot on it; a link of points alone is beams along them as listed; a telescopic one
     a cantilever from ``from``. Example: {leg_1: beam, leg_2: beam}
     """
-    actuators: dict[fields.DriveName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
+    actuators: dict[fields.DriveName, _Series] = Field(default_factory=dict)
     """Stiffness of each drive that gives, or a list of those in series; other drives are rigid. A bare one of an angle
     is moment per radian. Example: {l1: 5e7, theta1: 1e5 N*m/rad} Example: {theta: [3e4 N*m/rad, 1.5e4 N*m/rad]}
     """
@@ -256,8 +244,10 @@ class StiffnessSection(PoseSection):
             if profile not in named:
                 others = [other for other in self.sections if other != profile]
                 checker.reporter.unused((*root, "sections", profile), "section", others)
-        for drive in self.actuators:
+        for drive, series in self.actuators.items():
             path = (*root, "actuators", drive)
+            if not series:
+                checker.report(path, "expected a stiffness, or a list of those in series, [1e6, 2e6]")
             if checker.check_name(drive, checker.mechanism.driven_kinds, "drive", path, at_key=True):
                 checker.kind(path, _STIFFNESS_KINDS[checker.mechanism.driven_kinds[drive]])
         slides = [*checker.mechanism.slides, *checker.mechanism.legs]

@@ -83,7 +83,7 @@ class Context:
             return f"{value:.12g}"
 
         words = _WITH_UNIT.sub(bare, text)
-        return f"{words} ({', '.join(labels)})" if labels else ""
+        return f"{cut(words)} ({cut(', '.join(labels))})" if labels else ""
 
 
 LOST = Amount(math.nan)
