@@ -79,8 +79,9 @@ def faults(case: Case, seed: int, poses: int) -> list[str]:
                 wrong.append(f"{name} {end}: {told!r} is not {value!r}")
                 continue
             if np.isnan(place):
-                # A column that is rounding all along the motion is 0, and has no place of its extremes.
-                if told or max(abs(course.low), abs(course.high)) > WITHIN * size:
+                # What is the same all along the motion has no place of its extremes; what is rounding is 0.
+                same = 0.0 if max(abs(course.low), abs(course.high)) <= WITHIN * size else value
+                if course.range > WITHIN * size or abs(told - same) > WITHIN * abs(same):
                     wrong.append(f"{name} {end}: {told!r} has no place")
                 continue
             sides = case.place(place) + (case.high - case.low) * BESIDE
