@@ -78,7 +78,7 @@ def ways_of(curve: Curve, points: Sequence[str]) -> Callable[[Floats], Complexes
         if len(held):
             there = curve.solve(line[held], s[held]).configuration
             drawn[:, held] = paths_of(there, points) / (CHORD * curve.mechanism.size)
-        return drawn.reshape(-1, len(places))
+        return drawn.reshape(len(points) * curve.lines, len(places))
 
     return ways
 
