@@ -46,7 +46,7 @@ def thumbnail(path: Path) -> str | None:
     root.set("xmlns", "http://www.w3.org/2000/svg")
     root.attrib.pop("class")
     for trace in root.iterfind("path[@class='moving-trace']"):
-        trace.set("d", re.sub(r"\d+\.\d", lambda number: f"{float(number[0]):.0f}", trace.get("d", "")))
+        trace.set("d", _thinned(trace.get("d", "")))
     rules: dict[tuple[str, ...], str] = {}
     for element in root.iter():
         key = tuple(element.attrib.pop(name, "") for name in _MOVED_BY)
@@ -119,6 +119,14 @@ def _rule(name: str, motion: Mapping[str, Floats], times: Floats) -> str:
     still = ";".join(frames[0])
     moves = "".join(f"{100 * times[index]:.3g}%{{{';'.join(frames[index])}}}" for index in sorted(frames))
     return f".{name}{{{still};animation-name:{name}}}@keyframes {name}{{{moves}}}"
+
+
+def _thinned(path: str) -> str:
+    """A path of an SVG by as few points as show it."""
+    lines = [np.reshape(re.findall(r"-?[\d.]+", line), (-1, 2)).astype(float) for line in path.split("M")[1:]]
+    ways = [np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum()) for line in lines]
+    kept = [line[_corners(way, line, _NEAR["translate"])] for way, line in zip(ways, lines, strict=True)]
+    return "".join("M" + "L".join(f"{x:.0f} {y:.0f}" for x, y in line) for line in kept)
 
 
 def _corners(times: Floats, values: Floats, near: float) -> Ints:

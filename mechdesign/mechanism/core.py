@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
+from mechdesign.ground.numerics.arrays import Floats
 from mechdesign.mechanism import coordinates as names
-from mechdesign.mechanism.algebra import TURN, Value, Vector, norm2, wrap
+from mechdesign.mechanism.algebra import TURN, Value, Vector, largest, norm2, wrap
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.elements.measures import Limit
@@ -125,6 +126,8 @@ class Core:
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
         self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
+        #: Distance of the farthest point from the origin, as it is drawn.
+        self.reach = max((abs(complex(node)) for node in self.sketch.nodes if node is not None), default=0.0)
         self.bounds = tuple(map(self._bound, description.limits))
 
     def why(self, number: int) -> str:
@@ -174,10 +177,16 @@ class Core:
 
         Of slides that are drawn at the origin it is the largest of their other lengths, or else a unit.
         """
-        vectors = [*self.geometry.nominal.w, *(node for node in self.sketch.nodes if node is not None)]
-        places = [place.nominal for place in self.description.places.values() if place.quantity == "length"]
-        lengths = (max((abs(complex(length)) for length in some), default=0.0) for some in (vectors, places))
-        return next(filter(None, lengths), 1.0)
+        return float(self.sizes({}))
+
+    def sizes(self, places: Mapping[str, Value]) -> Floats:
+        """The characteristic length at dimensions that are not all nominal."""
+        vectors = largest((np.hypot(w.real, w.imag) for w in self.geometry.vectors(places).w), self.reach)
+        lengths = largest(
+            np.abs(places.get(name, place.nominal))
+            for name, place in self.description.places.items() if place.quantity == "length"
+        )  # fmt: skip
+        return np.where(vectors, vectors, np.where(lengths, lengths, 1.0))
 
     @cached_property
     def windings(self) -> dict[str, Coordinate]:

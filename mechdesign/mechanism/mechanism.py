@@ -264,7 +264,7 @@ class Variant(Mechanism):
         self.nominal = {name: place.nominal for name, place in description.places.items()}
         self._plans = {}
         self._check_ties()
-        self.sketch = original.sketch
+        self.sketch, self.reach = original.sketch, original.reach
         self.drives = original.drives
         self.bounds = original.bounds
         self.couplings = original.couplings

@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.ground.numerics.arrays import Complexes, Floats
 from mechdesign.mechanism import Configuration
 from mechdesign.motion.along import AlongMotion
-from mechdesign.motion.curve import Curve
+from mechdesign.motion.curve import INSET, Curve
 from mechdesign.motion.motion import SolvedPoses
 from mechdesign.motion.question import PoseQuestion, PoseValues, unfilled
 
@@ -73,7 +73,7 @@ def ways_of(curve: Curve, points: Sequence[str]) -> Callable[[Floats], Complexes
 
     def ways(places: Floats) -> Complexes:
         line, s = curve.grid(places)
-        held = np.flatnonzero(curve.holds(line, s))
+        held = np.flatnonzero(curve.holds(line, s, INSET * curve.poses.end))
         drawn = np.full((len(points), len(s)), np.nan, dtype=complex)
         if len(held):
             there = curve.solve(line[held], s[held]).configuration
@@ -165,7 +165,7 @@ def finer(
 
     def ways(places: Floats) -> Complexes:
         drawn = np.full((len(ranges), len(places)), np.nan, dtype=complex)
-        held = np.flatnonzero(curve.holds(np.zeros(len(places), dtype=np.intp), places))
+        held = np.flatnonzero(curve.holds(np.zeros(len(places), dtype=np.intp), places, INSET * curve.poses.end))
         if len(held):
             there = columns(asked_at(question, curve, places[held])[1])
             for row, (name, (size, low, high)) in zip(drawn, ranges.items(), strict=True):

@@ -209,6 +209,26 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
 
 
 @pytest.mark.slow
+def test_between_the_last_pose_and_a_dead_centre_curves_are_bent_and_rates_legible():
+    """Three links of 60 on a ground of 150 stretch beyond 40 deg: cos(mu) = 1 - d^2 / 7200 [law of cosines]."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0], C: [150, 0]}, crank: [O, A, 60], coupler: [A, B, 60], rocker: [C, B, 60]}
+  drives: [crank]
+  sketch: {A: [59, 10], B: [105, 40]}
+kinematics: {sweep: {crank: {from: -60, to: 60, step: 10}}, rates: {crank: 1 rad/s}}
+""")
+    crank = np.array([42, 45, 48])
+    across = 60**2 + 150**2 - 2 * 60 * 150 * np.cos(np.radians(crank))
+    curve = next(line for line in drawn(study, "transmission").axes[0].lines if len(line.get_xdata()) > 5)
+    angle = np.interp(crank, *curve.get_data())
+    assert angle == pytest.approx(np.degrees(np.arccos(1 - across / 7200)), abs=0.2)
+    axes = next(axes for axes in drawn(study, "motion").axes if axes.get_ylabel() == "velocity [deg/s]")
+    rates = max(axes.lines, key=lambda line: len(line.get_xdata()))
+    assert np.ptp(axes.get_ylim()) < 5 * np.ptp(np.interp([-40, 40], *rates.get_data()))
+
+
+@pytest.mark.slow
 def test_an_animation_of_a_turn_with_a_gap_has_no_jump():
     sweep = sweep_of(study_of(ROCKER))
     assert not sweep.closed

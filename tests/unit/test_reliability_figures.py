@@ -454,12 +454,20 @@ def test_a_sweep_of_a_single_pose_is_drawn_as_one_that_is_listed() -> None:
     assert place.get_text() == "crank = 30 deg"
 
 
-@pytest.mark.nightly
-def test_poses_out_of_reach_leave_gaps() -> None:
+@pytest.mark.slow
+def test_a_curve_over_poses_out_of_reach_goes_on_to_the_ends_of_the_reach_and_leaves_a_gap() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [300, 100], [70, 90], [60, 100]]}"
-    figure, _ = one("reliability", ARM, path, "reliability.methods=[analytic, monte_carlo]")
-    known = np.isfinite(figure.axes[0].lines[0].get_ydata())
-    assert known.tolist() == [True, True, False, True, True]
+    figure, _ = one("reliability", ARM, path, "reliability.methods=[analytic]")
+    places, failure = figure.axes[0].lines[0].get_data()
+    (lost,) = np.flatnonzero(np.isnan(failure))
+    # The arm of 100 and 80 reaches 180: parts of the ways from (70, 110) and (70, 90) to (300, 100).
+    ends = [max(np.roots([230**2 + rise**2, 2 * (70 * 230 + y * rise), 70**2 + y**2 - 180**2]))
+            for y, rise in ((110, -10), (90, 10))]  # fmt: skip
+    assert places[lost - 1 : lost + 2] == pytest.approx([2 + ends[0], 3, 4 - ends[1]], abs=1e-6)
+    # Beside the reach it is bent: a fifth of the way is a pose of its own.
+    _, there = one("reliability", ARM, "reliability.poses=[{P.x: 116, P.y: 108}]", "reliability.methods=[analytic]")
+    (expected,) = {*there.tables["reliability"].take(there.tables["reliability"].where(scope="pose"))["failure"]}
+    assert np.interp(2.2, places, failure) == pytest.approx(expected, rel=1e-3)
 
 
 def test_contributions_are_one_bar_with_sobol_indices_where_these_differ() -> None:

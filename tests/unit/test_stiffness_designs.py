@@ -373,3 +373,25 @@ def test_a_leg_that_has_a_spring_in_one_design_only() -> None:
         least = [table["stiffness"][table["leg"] == text].min() for table in tables]
         values = Evaluator(designs_question(study, [asked]))(designs.changed).table[:, 0]
         np.testing.assert_allclose(values[np.isfinite(values)], least, rtol=1e-12)
+
+
+def test_a_deflection_is_a_part_of_the_size_of_its_own_design() -> None:
+    """F L^2 / 3 E I of a strip."""
+    text = """
+mechanism:
+  parameters: {l: 1000}
+  links: {ground: {O: [0, 0]}, arm: [O, P, l]}
+  drives: [arm]
+stiffness:
+  link: arm
+  at: P
+  sections: {strip: {E: 200 GPa, width: 10, height: 10}}
+  elastic: {arm: strip}
+  poses: [{arm: 0}]
+  loads: [[0, -100, 0]]
+"""
+    found = assert_as_alone(Designs(study_of(text), {"l": np.array([1000, 1500, 2000.0])}), mechdesign.stiffness)
+    for answer, part in zip(found, ("0.2", "0.45", "0.8"), strict=True):
+        assert not isinstance(answer, Exception)
+        (large,) = (str(warning) for warning in answer.warnings if warning.kind == "suspect")
+        assert f"the asked point moves by {part} times the mechanism's size" in large

@@ -278,11 +278,12 @@ class Stiffness(MotionQuestion):
         """A warning about the largest deflection of the asked point where it is not small."""
         if not self.body.given.wrenches:
             return
-        body, values = self.body.at(self.poses.take(np.arange(rows.start, rows.stop))), passage.values
+        poses, values = self.poses.take(np.arange(rows.start, rows.stop)), passage.values
+        body, size = self.body.at(poses), self.motion.mechanism.sizes(poses.places)
         soft = values.arrays["compliance"][rows]
         loads = np.broadcast_to(body.loads, (len(soft), len(self.body.given.wrenches), 3))
         moved = tables.deflections(loads, soft, values.arrays["moved"][rows] if self.loaded and body.uneven else None)
-        way = np.hypot(moved[..., 0], moved[..., 1]) / body.extent
+        way = np.hypot(moved[..., 0], moved[..., 1]) / np.reshape(size, (-1, 1))
         share = np.nan_to_num(np.fmax(way, np.abs(moved[..., 2]) if body.size == 3 else 0.0))
         if share.max(initial=0.0) <= SMALL:
             return

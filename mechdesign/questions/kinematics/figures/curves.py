@@ -14,7 +14,7 @@ from mechdesign.drawing.layout import fitting_rows
 from mechdesign.drawing.legends import fitting, legend_names
 from mechdesign.drawing.marks import Axis, Lines, Panel, PanelMark, Picture, Trace, Zone
 from mechdesign.drawing.overlay import DASHES, both_named
-from mechdesign.drawing.panels import Along, abscissa, moving_names, times
+from mechdesign.drawing.panels import Along, abscissa, moving_names, quantile, times
 from mechdesign.drawing.pictures import picture
 from mechdesign.drawing.sweep import ranks
 from mechdesign.ground.columns import Column
@@ -41,7 +41,7 @@ _STILL = 1e-9  # part of its size by which a column changes that does not change
 _FLAT = 0.05  # part of the range of a panel below which a curve that moves has another panel
 _AROUND = 0.05  # part of the range beyond it
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
-_TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
+_TAIL_PERCENT = 4  # of the motion, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 
 
@@ -270,7 +270,10 @@ def _panel(
                 "markevery": over.spread(_MARKS, which / len(_COLORS))}  # fmt: skip
         marks.append(Trace(over.values, values, label=curve.label if named else "", look=look))
         shown.append(values)
-    ends = _ends(group, np.concatenate([values[np.isfinite(values)] for values in shown]))
+    # What a value takes of the axis, for places lie closer where curves are bent.
+    parts = np.abs(np.diff(over.values, prepend=over.values[:1]) + np.diff(over.values, append=over.values[-1:]))
+    values, finite = np.concatenate(shown), np.isfinite(np.concatenate(shown))
+    ends = _ends(group, values[finite], np.tile(parts, len(shown))[finite])
     if before is not None:
         if first.order != "position" and ends == (None, None):
             # Of the study before rates may grow without bound: their axis stays that of the study now.
@@ -298,14 +301,14 @@ def _title(group: _Group, study: Study) -> str:
     return kind if len(measures) < len(names) else f"{kind} of {', '.join(measures)}"
 
 
-def _ends(group: _Group, values: Floats) -> tuple[float | None, float | None]:
+def _ends(group: _Group, values: Floats, parts: Floats) -> tuple[float | None, float | None]:
     """What stands still is not drawn by its rounding; near a dead centre rates grow without bound, elsewhere they stay
     legible.
     """
     if _still(values, 1.0):
         middle = float(values.mean())
         return middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1)
-    low, high = np.percentile(values, (_TAIL_PERCENT, 100 - _TAIL_PERCENT)).tolist()
+    low, high = (quantile(values, parts, percent / 100) for percent in (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
     if group.curves[0].order == "position" or not np.ptp(values) > _PEAK_RATIO * (high - low) > 0:
         return None, None
     return low - 0.5 * (high - low), high + 0.5 * (high - low)
