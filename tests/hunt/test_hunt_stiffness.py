@@ -75,7 +75,7 @@ def test_random_mechanisms_against_frames(seeds: Seeds) -> None:
         places = tables["displacements"]
         nodes = [structure.nodes[pair] for pair in zip(places["link"], places["point"], strict=True)]
         for axis, name in enumerate(("dx", "dy")):
-            # A unit of the load, as the compliances: where all is rigid the frame leaves the rounding of its stiffest bars.
+            # A unit of the load, as the compliances: where all is rigid the frame leaves rounding of its stiffest bars.
             assert same(places[name] / LOAD, moved[[3 * node + axis for node in nodes], 0] / LOAD), seed
         assert {str(link) for link in places["link"]} == set(case.layout.bodies) - {GROUND}
 
