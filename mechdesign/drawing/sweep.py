@@ -56,12 +56,13 @@ class Sweep(Shown):
     def traces(self) -> dict[str, Complexes]:
         """Path of every moving point as a curve, with more places than those of the poses."""
         curve, points = self.curve, [*self.places]
-        if curve is None or curve.spent.any() or len(self.rows) < 2:
-            # A closed path is listed without its begin at its end.
-            return {name: np.append(path, path[:1]) if self.poses.closed else path
-                    for name, path in self.places.items()}  # fmt: skip
-        _, ways = near_chords(curve, ways_of(curve, points), self.poses.numbers[self.rows])
-        return dict(zip(points, CHORD * curve.mechanism.size * ways, strict=True))
+        if curve is not None and not curve.spent.any() and len(self.rows) > 1:
+            _, ways = near_chords(curve, ways_of(curve, points), self.poses.numbers[self.rows])
+            # Of a motion that ends where it begins, at a dead centre, there are the poses alone.
+            if np.isfinite(ways).any():
+                return dict(zip(points, CHORD * curve.mechanism.size * ways, strict=True))
+        # A closed path is listed without its begin at its end.
+        return {name: np.append(path, path[:1]) if self.poses.closed else path for name, path in self.places.items()}
 
     @cached_property
     def scene(self) -> Scene:

@@ -628,3 +628,20 @@ def test_other_assemblies_have_names_and_paths_of_their_own():
         assert {text.get_text() for text in axes.texts} >= {"O", "A", "B", "C", "D"}
     ways = zip(*(axes.get_lines() for axes in figure.axes), strict=True)
     assert any(not np.allclose(one.get_xydata(), other.get_xydata()) for one, other in ways)
+
+
+@pytest.mark.slow
+def test_a_motion_that_ends_where_it_begins_is_drawn_in_its_only_pose() -> None:
+    """Both legs lie along the line between their pivots, from which one of them gets too short for any pose."""
+    legs = """
+mechanism:
+  links:
+    ground: {A: [0, 0], B: [100, 0]}
+    one: {from: A, to: P, telescopic: true}
+    other: {from: B, to: P, telescopic: true}
+  drives: {a: {length: one}, b: {length: other}}
+  sketch: {P: [50, 40]}
+kinematics: {sweep: {b: {from: 41, to: 30, number: 7}, a: 59}}
+"""
+    figure = drawn(mechdesign.load(text=legs), "paths")
+    assert any(text.get_text() == "P" for text in figure.findobj(Text))
