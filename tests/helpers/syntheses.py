@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,17 +30,22 @@ class Problem:
     cost : callable
         From variables, each of shape (designs,), to the goal; `OPEN` and more where a design does not assemble or
         misses a condition.
+    rows : callable
+        The same by the poses of the study alone, which lead a search to the largest error of a motion; as `cost` where
+        left out.
     """
 
     study: str
     goal: str
     ranges: Mapping[str, tuple[float, float]]
     cost: Callable[..., Floats]
+    rows: Callable[..., Floats] | None = None
 
-    def of_cube(self, u: Floats) -> Floats:
+    def of_cube(self, u: Floats, *, by_rows: bool = False) -> Floats:
         """The goal at points of the unit cube, shape (variables, designs), as SciPy asks for them."""
         low, high = np.array(list(self.ranges.values())).T
-        return np.asarray(self.cost(*(low[:, None] + u * (high - low)[:, None])))
+        cost = self.rows if by_rows and self.rows else self.cost
+        return np.asarray(cost(*(low[:, None] + u * (high - low)[:, None])))
 
 
 def third(p: Any, q: Any, to_p: Any, to_q: Any, side: float) -> tuple[Any, Any]:
@@ -70,14 +76,31 @@ def _rms(errors: Floats) -> Floats:
 
 # Of a motion the root mean square is that of the whole way, by a Gauss rule.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
+# Of the largest error these places between the ends, and parabolas between them, leave less than 1e-8 of it.
+FINE = np.linspace(-1, 1, 3001)
 
 
-def _of_motion(errors: Callable[[Floats], tuple[Floats, Floats]], crank: Floats, *, rms: bool) -> Floats:
-    """The root mean square of errors over the way of a crank, or the largest at its poses; `OPEN` where some miss."""
+def _of_motion(errors: Callable[[Floats], tuple[Floats, Floats]], crank: Floats, goal: str, *, rows: bool) -> Floats:
+    """The root mean square of errors over the way of a crank, or the largest on it or at its poses, the rows.
+
+    `OPEN` where some miss.
+    """
+    rms = goal.endswith("rms")
     at_poses, missed = errors(crank)
-    between, missed_between = errors((crank[-1] + crank[0] + (crank[-1] - crank[0]) * NODES) / 2)
-    values = np.sqrt(between**2 @ WEIGHTS / 2) if rms else np.abs(at_poses).max(axis=1)
+    places = NODES if rms or rows else FINE
+    between, missed_between = errors((crank[-1] + crank[0] + (crank[-1] - crank[0]) * places) / 2)
+    largest = np.abs(at_poses).max(axis=1) if rows else _largest(np.abs(between))
+    values = np.sqrt(between**2 @ WEIGHTS / 2) if rms else largest
     return _judged(values, missed + missed_between)
+
+
+def _largest(curves: Floats) -> Floats:
+    """The greatest value of each, shape (designs, places), by the parabola through a top and the places beside it."""
+    before, at, after = curves[:, :-2], curves[:, 1:-1], curves[:, 2:]
+    bend = before - 2 * at + after
+    top = (at >= before) & (at >= after) & (bend < 0)
+    tops = at - np.where(top, (after - before) ** 2, 0) / np.where(top, 8 * bend, 1)
+    return np.maximum(curves.max(axis=1), tops.max(axis=1))
 
 
 FOUR_BAR = """\
@@ -123,14 +146,15 @@ def held_height(goal: str, begin: float, end: float, step: float) -> Problem:
     ranges = {"a": (10, 100), "b": (40, 200), "c": (40, 200), "u": (-100, 200), "v": (-100, 200)}
     crank = np.arange(begin, end + step / 2, step)
 
-    def cost(a: Floats, b: Floats, c: Floats, u: Floats, v: Floats) -> Floats:
+    def cost(a: Floats, b: Floats, c: Floats, u: Floats, v: Floats, *, rows: bool = False) -> Floats:
         def errors(angles: Floats) -> tuple[Floats, Floats]:
             point, _, missed = four_bar(a, b, c, u, v, angles, 100, 1)
             return point.imag - 100, missed
 
-        return _of_motion(errors, crank, rms=goal.endswith("rms"))
+        return _of_motion(errors, crank, goal, rows=rows)
 
-    return Problem(four_bar_study(ranges, "C.y: 100", goal, (begin, end, step)), goal, ranges, cost)
+    study = four_bar_study(ranges, "C.y: 100", goal, (begin, end, step))
+    return Problem(study, goal, ranges, cost, partial(cost, rows=True))
 
 
 def function_generator(ranges: Mapping[str, tuple[float, float]], formula: str, wanted: Callable[[Floats], Floats],
@@ -138,15 +162,15 @@ def function_generator(ranges: Mapping[str, tuple[float, float]], formula: str, 
     """A rocker that follows a function of the crank, measured from `first`."""
     crank = np.arange(20.0, 111.0, 5.0)
 
-    def cost(a: Floats, b: Floats, c: Floats, first: Floats) -> Floats:
+    def cost(a: Floats, b: Floats, c: Floats, first: Floats, *, rows: bool = False) -> Floats:
         def errors(angles: Floats) -> tuple[Floats, Floats]:
             _, angle, missed = four_bar(a, b, c, 0, 0, angles, 100, 1)
             return (np.degrees(angle) - first[:, None] - wanted(angles) + 180) % 360 - 180, missed
 
-        return _of_motion(errors, crank, rms=goal.endswith("rms"))
+        return _of_motion(errors, crank, goal, rows=rows)
 
     study = four_bar_study(ranges, f'rocker.angle: "first + {formula}"', goal, (20, 110, 5), u="0", v="0")
-    return Problem(study, goal, ranges, cost)
+    return Problem(study, goal, ranges, cost, partial(cost, rows=True))
 
 
 def timed_path(

@@ -187,6 +187,20 @@ def test_of_more_positions_each_linkage_stands_once_and_is_a_mechanism() -> None
 
 
 @pytest.mark.slow
+def test_a_linkage_that_misses_no_pair_by_more_than_it_must_in_one_assembly_needs_no_other() -> None:
+    """At the fourth of four pairs another assembly comes nearer; the second is missed by more in any."""
+    inputs, outputs = np.array([183.7, 205.7, 225.1, 240.4]), np.array([43.4, 35.8, -2.9, -42.5])
+    task = {"function": {"input": inputs.tolist(), "output": outputs.tolist()}, "frame": 1}
+    row = next(iter(mechdesign.synthesize(mechdesign.load({"synthesis": task})).main))
+    crank, coupler, rocker = (row[f"{name}.length"] for name in ("crank", "coupler", "rocker"))
+    _, angles, _ = four_bar(crank, coupler, rocker, 0, 0, inputs + 180, 1, -1)
+    errors = (np.degrees(angles[0]) - outputs) % 360 - 180
+    assert np.abs(errors) == pytest.approx([0, 19.07, 0, 17.12], abs=0.01)
+    assert (row["error"], row["max_error"]) == pytest.approx((np.sqrt((errors**2).mean()), np.abs(errors).max()))
+    assert row["defects"] == ""
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pairs", "zeros", "kind"),
     [

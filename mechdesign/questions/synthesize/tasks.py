@@ -37,8 +37,8 @@ _DISTINCT = 1e-5
 MOST = 200
 # Linkages that are sampled of each kind and assembly for a path, and pairs of dyads of each kind for a body.
 PATHS, OPEN_PATHS, PAIRS = 30_000, 4_000, 1_500
-# An assembly at a position is another one where the task is missed by this part of its size more than in the best one.
-_OTHER = 1e-6
+# Errors that differ by less than this part of the task's size are the same.
+_EQUAL = 1e-6
 _NONE = np.empty(0, dtype=complex)
 
 
@@ -318,30 +318,36 @@ def _distinct(parts: Sequence[paths.Starts], size: float) -> paths.Starts:
 
 
 def assembled(part: Candidates, gaps: Sequence[Floats], conditions: Conditions, size: float) -> Iterator[Linkages]:
-    """Linkages by the assembly in which they are at the first position, with how they pass the others.
+    """Linkages, each in an assembly whose largest error is no larger than with an assembly at each position.
 
+    Where there is none it is the one that is nearest at the first position; those that it misses by more need another.
     Errors are infinite at positions at which they cannot be assembled.
     """
     stack = np.nan_to_num(np.stack(gaps), nan=np.inf)
-    errors, lost = stack.min(axis=0).max(axis=1), np.isinf(stack).all(axis=0).sum(axis=1)
-    # Those without a defect come first, as far as the positions alone tell.
-    branch = ~(stack <= stack.min(axis=0) + _OTHER * size).all(axis=2).any(axis=0)
-    order = np.lexsort((np.where(errors < EXACT * size, 0.0, errors), in_order(part.angles)[1], branch, lost))
-    rows = conditions.begun(part.kind, part.values, order, MOST)
-    whole = conditions.counted([("it cannot be assembled at a position", lost[rows] == 0)], len(rows))
-    # Where none can be, that with the fewest such positions is the nearest.
-    rows = rows[whole] if whole.any() else rows[:1][lost[rows[:1]] < stack.shape[2]]
-    part, stack = Candidates(part.kind, part.values[rows], part.angles[rows]), stack[:, rows]
     nearest = stack.min(axis=0)
-    known, lane = np.isfinite(nearest).argmax(axis=1), np.arange(len(rows))
-    first = (stack[:, lane, known] <= nearest[lane, known] + _OTHER * size).argmax(axis=0)
+    errors, unreached = nearest.max(axis=1), np.isinf(nearest)
+    lost = unreached.sum(axis=1)
+    most = np.where(unreached, 0.0, nearest).max(axis=1, keepdims=True)
+    passes = unreached | (stack <= most + _EQUAL * size)
+    whole = passes.all(axis=2)
+    # Those without a defect come first, as far as the positions alone tell.
+    order = np.lexsort(
+        (np.where(errors < EXACT * size, 0.0, errors), in_order(part.angles)[1], ~whole.any(axis=0), lost)
+    )
+    rows = conditions.begun(part.kind, part.values, order, MOST)
+    kept = conditions.counted([("it cannot be assembled at a position", lost[rows] == 0)], len(rows))
+    # Where none can be, that with the fewest such positions is the nearest.
+    rows = rows[kept] if kept.any() else rows[:1][lost[rows[:1]] < stack.shape[2]]
+    known = (~unreached[rows]).argmax(axis=1)
+    begun = stack[:, rows, known] <= nearest[rows, known] + _EQUAL * size
+    first = (2 * whole[:, rows] + begun).argmax(axis=0)
     for number, modes in enumerate(part.kind.modes):
-        some = np.flatnonzero(first == number)
+        some = rows[first == number]
         if len(some):
-            other = stack[number, some] > nearest[some] + _OTHER * size
+            other = ~passes[number, some]
             way = passed(part.kind, modes, part.values[some], part.angles[some], other,
                          full_turn=conditions.section.needs_turn)  # fmt: skip
-            yield Linkages(way, nearest[some])
+            yield Linkages(way, np.where(other, nearest[some], stack[number, some]))
 
 
 def task_of(study: Study, section: SynthesisSection) -> Task:
