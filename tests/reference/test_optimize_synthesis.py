@@ -149,7 +149,8 @@ def test_straightness_against_uniform_speed() -> None:
     order = np.argsort(up)
     assert (np.diff(along[order]) < 0).all()
     assert front["knee"].sum() == 1
-    # Neither end of the front is anywhere near the other in its own goal. The straightest design has its best speed.
+    # Neither end of the front is anywhere near the other in its own goal. No speed of the straightest design is better
+    # than its best one, which no descent need have met: descents are led by the rows, the front by the peaks between.
     assert up.max() > 5 * up.min()
     l1, l3, pin = front["l1"][order[0]], front["l3"][order[0]], np.exp(1j * crank)
     x = (pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)).real
@@ -158,6 +159,5 @@ def test_straightness_against_uniform_speed() -> None:
         return float(np.abs(x - l1 + speed * (crank - np.pi)).max())
 
     best = minimize_scalar(unevenness, bounds=(1.35, 1.6), method="bounded", options={"xatol": 1e-12}).fun
-    # The search descends by the rows, of which the peaks between them differ a little.
-    assert best - 1e-9 <= along.max() < 1.002 * best
+    assert best - 1e-9 <= along.max()
     assert along.max() > 4 * along.min()
