@@ -159,5 +159,6 @@ def test_straightness_against_uniform_speed() -> None:
         return float(np.abs(x - l1 + speed * (crank - np.pi)).max())
 
     best = minimize_scalar(unevenness, bounds=(1.35, 1.6), method="bounded", options={"xatol": 1e-12}).fun
-    assert best - 1e-9 <= along.max()
+    # By how much it is missed: 0.2 to 12 % in four seeds.
+    assert best - 1e-9 <= along.max() < 1.15 * best
     assert along.max() > 4 * along.min()
