@@ -97,5 +97,5 @@ def test_what_no_result_has_is_found_before_anything_is_computed():
     with pytest.raises(mechdesign.StudyError) as error:
         swept(SLIDER_CRANK, {R: [20]}, STROKE, SWING, "kinematics.rod.angel.max", "kinematics.B.x")
     misspelt, several = map(str, error.value.problems)
-    assert "did you mean 'rod.angle'?" in misspelt
+    assert "did you mean 'rod.angle.max'?" in misspelt
     assert "13 rows; ask for kinematics.B.x.min" in several

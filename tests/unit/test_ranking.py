@@ -180,7 +180,7 @@ def test_a_case_that_does_not_turn_has_no_rank_and_is_told_unless_it_may_be_so()
         ({"maximize": ANGLE, "minimize": ANGLE}, "cannot be both large and small"),
         ({"maximize": [ANGLE, ANGLE]}, "is listed twice"),
         ({"maximize": "kinematics.rod.angle"}, "13 rows; ask for kinematics.rod.angle.min"),
-        ({"minimize": "kinematics.rod.angel.max"}, "did you mean 'rod.angle'?"),
+        ({"minimize": "kinematics.rod.angel.max"}, "did you mean 'rod.angle.max'?"),
         ({"minimize": "kinematic.mu"}, "there is no command 'kinematic'; did you mean"),
         ({"maximise": ANGLE}, "did you mean 'maximize'?"),
     ],

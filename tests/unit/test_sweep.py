@@ -141,7 +141,7 @@ def test_cases_of_a_file(tmp_path: Path):
         ({"vary": {"matrix.samples": [1]}}, "a matrix does not vary itself"),
         ({"results": ["GII"]}, "a matrix says what to 'vary', or names a file of 'cases'"),
         ({"vary": {R: [1]}, "results": ["kinematic.mu"]}, "there is no command 'kinematic'; did you mean"),
-        ({"vary": {R: [1]}, "results": ["kinematics.rod.angel.max"]}, "did you mean 'rod.angle'?"),
+        ({"vary": {R: [1]}, "results": ["kinematics.rod.angel.max"]}, "did you mean 'rod.angle.max'?"),
         ({"vary": {R: [1]}, "results": ["kinematics.rod.angle"]}, "13 rows; ask for kinematics.rod.angle.min"),
         ({"vary": {R: [1]}, "results": ["2*r"]}, "is of parameters alone"),
         ({"cases": "none.csv"}, "none.csv cannot be read"),
