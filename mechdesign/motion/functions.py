@@ -21,6 +21,8 @@ from mechdesign.motion.series import EXACT
 
 # A quotient is infinite where its divisor is zero and its numerator is more than this part of its largest value.
 POLE = 1e-9
+# Zeros of a divisor that are this near, in their piece, to a place at which it touches zero are that place.
+TOUCH = 1e-2
 # At the end of a piece a divisor of this part of its largest value or less is zero.
 ZERO = 1e-8
 # The same at a dead centre, whose place has half the digits.
@@ -299,7 +301,9 @@ class Functions(Means):
             # From either side the divisor has its sign a little before the place.
             beside = np.stack([x - 1e-4, x + 1e-4])
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
-            by = by ** self._orders[rows[k]]
+            # A divisor that touches zero has the sign of the whole piece; beside the place rounding may have the other.
+            touched = flat & (turned == piece[:, None]) & (np.abs(place - x[:, None]) < TOUCH)
+            by = np.where(touched.any(axis=1), divisor[piece, 0], by) ** self._orders[rows[k]]
             up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
             poles.append((np.full(np.count_nonzero(up), k), some[piece[up]], x[up]))
         lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))

@@ -391,3 +391,31 @@ requirements:
     loose, held, soft, positive = verdicts(pushed, "stiffness")
     assert (loose.met, held.met, soft.met, positive.met) == (False, True, False, True)
     assert (loose.worst, soft.worst) == (0.0, math.inf)
+
+
+def test_a_stiffness_that_grows_without_bound_is_never_below_zero() -> None:
+    """Where the body is rigid in a direction the largest stiffness goes up on both sides; its least is that of rows."""
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0.08477207196661851], D: [98.47507140212251, 5]}
+    crank: {from: O, to: A, length: 30}
+    rod: {from: A, to: B, length: 90, points: {C: [44.40082840919299, 30]}}
+    rocker: {from: D, to: B, length: 59.993342537879926}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+stiffness:
+  at: C
+  link: rod
+  characteristic_length: 50
+  actuators: {crank: [100000, 300000]}
+  bearings: {B: {radial: 98668.50757598442}}
+  elastic: {rocker: beam}
+  sections: {beam: {E: 201695.44143933238, height: 8, width: 10}}
+  sweep: {crank: SWEEP}
+requirements: [{result: stiffness.k_max, at_least: 0}]
+"""
+    turn, part = "{from: 0, to: 360, step: 5}", "{from: 15, to: 25, step: 0.01}"
+    whole, fine = (mechdesign.stiffness(mechdesign.load(text=text.replace("SWEEP", sweep))) for sweep in (turn, part))
+    assert whole.verdicts[0].met
+    assert whole.verdicts[0].worst == pytest.approx(fine.main["k_max"].min(), rel=1e-6)
