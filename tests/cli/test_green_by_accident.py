@@ -25,11 +25,11 @@ BROKEN = "mechanism.limits=[{drive: theta, min: 0, max: 300}]"
 
 NAMES = {
     "kinematics.B.z": "did you mean 'B.y'?", "kinematics.b.x": "did you mean 'B.x'?", "kinematics.B.X": "'B.X'",
-    "kinematics.B": "no column 'B'", "kinematics.B.xx.max": "no column 'B.xx'",
+    "kinematics.B": "no column 'B'", "kinematics.B.xx.max": "no column 'B.xx.max'",
     "kinematic.B.x": "no command 'kinematic'",
     "Kinematics.B.x": "no command 'Kinematics'", "B.x": "no command 'B'", "sweep.case": "no command 'sweep'",
-    "kinematics.extremes.B.x.rang": "no column", "kinematics.extremes.C.x.range": "no column 'extremes.C.x'",
-    "kinematics.motion.B.x.maximum": "has no 'maximum'", "kinematics.B.x.max.min": "no column 'B.x.max'",
+    "kinematics.extremes.B.x.rang": "no column", "kinematics.extremes.C.x.range": "no column 'extremes.C.x.range'",
+    "kinematics.motion.B.x.maximum": "has no 'maximum'", "kinematics.B.x.max.min": "no column 'B.x.max.min'",
     "kinematics": "no result 'kinematics'", "kinematics.": "no meaning", "kinematics.B.x.": "no meaning",
     "kinematics..B.x": "no meaning", "": "empty text", "kinematics.extremes": "no column", "kinematics.0": "no column",
     "kinematics.motion": "no column 'motion'", "kinematics.limits.theta": "no column", "GII": "no result 'GII'",
