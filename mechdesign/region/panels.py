@@ -227,10 +227,11 @@ def _along_ends(
         # Where the margin that ends an interval is not zero it jumps, as others do with it; those inside count.
         value, most = np.abs(margins[name[own], own]), np.nan_to_num(np.abs(margins)).max(axis=1, initial=0.0)
         at = own[value > JUMPS * most[name[own]]]
-        step = np.minimum(INSIDE * radius[at], 0.5 * (traced.outer - traced.inner)[slot[at]])
-        inside = radius[at] + np.where(last[at], -step, step)
-        for table, there in zip((margins, away, rotations), sampled(lane[at], inside, angle[at]), strict=True):
-            table[:, at] = there
+        if at.size:
+            step = np.minimum(INSIDE * radius[at], 0.5 * (traced.outer - traced.inner)[slot[at]])
+            inside = radius[at] + np.where(last[at], -step, step)
+            for table, there in zip((margins, away, rotations), sampled(lane[at], inside, angle[at]), strict=True):
+                table[:, at] = there
         margins[name[own], own] = 1.0
         # Of several assembly modes that of the end counts.
         margins[name // size != np.arange(labels)[:, None] // size] = 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers.frames import posed
-from helpers.stiffness import ARM, AXIAL, BENDING, FIVE_BAR, METRES, ask_stiffness, matrix
+from helpers.stiffness import ARM, AXIAL, BENDING, FIVE_BAR, MEETING_STRUTS, METRES, ask_stiffness, matrix
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
@@ -28,23 +28,10 @@ def free(result: mechdesign.Answer, row: int = 0) -> list[float]:
 
 
 TRIPOD = (
-    METRES
+    MEETING_STRUTS.replace("B3: [0, -0.7]}", "B3: [0, -0.7], FAR: [3000, 4000]}")
     + """
-mechanism:
-  links:
-    ground: {A1: [-1, 0], A2: [1, 0], A3: [0, -1]}
-    leg_1: {from: A1, to: B1, telescopic: true}
-    leg_2: {from: A2, to: B2, telescopic: true}
-    leg_3: {from: A3, to: B3, telescopic: true}
-    platform: {P: [0, 0], B1: [-0.5, -0.5], B2: [0.5, -0.5], B3: [0, -0.7], FAR: [3000, 4000]}
-  drives: [leg_1, leg_2, leg_3]
-  sketch: {P: [0.1, 1], B1: [-0.4, 0.5], B2: [0.6, 0.5], B3: [0.1, 0.3]}
-stiffness:
-  link: platform
-  at: P
   sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}
   elastic: {leg_1: beam, leg_2: beam, leg_3: beam}
-  actuators: {leg_1: 1e4, leg_2: 1e4, leg_3: 1e4}
   poses: [{P.x: 0.1, P.y: 1, platform.angle: 0}]
 """
 )
